@@ -1,0 +1,159 @@
+/* SPDX-License-Identifier: MIT */
+#include "event.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+
+#include "status.h"
+
+static const struct {
+	const char *name;
+	enum event_severity severity;
+} kinds[EVENT_COUNT] = {
+	[EVENT_NONE] = { "none", EVENT_INFO },
+	[EVENT_STARTED] = { "started", EVENT_INFO },
+	[EVENT_STOPPED] = { "stopped", EVENT_INFO },
+	[EVENT_BUS_STATE] = { "bus_state", EVENT_INFO },
+	[EVENT_FRAME_LOST] = { "frame_lost", EVENT_WARNING },
+	[EVENT_FRAME_LATE] = { "frame_late", EVENT_WARNING },
+	[EVENT_FRAME_DOUBLED] = { "frame_doubled", EVENT_WARNING },
+	[EVENT_WKC_LOW] = { "wkc_low", EVENT_WARNING },
+	[EVENT_WKC_OK] = { "wkc_ok", EVENT_NOTICE },
+	[EVENT_OVERRUN] = { "overrun", EVENT_WARNING },
+	[EVENT_NUMBERING_JUMP] = { "numbering_jump", EVENT_ERROR },
+	[EVENT_DC_LOCKED] = { "dc_locked", EVENT_INFO },
+	[EVENT_DC_UNLOCKED] = { "dc_unlocked", EVENT_WARNING },
+	[EVENT_COUNTER_BAD] = { "counter_bad", EVENT_WARNING },
+	[EVENT_SLAVE_STATE] = { "slave_state", EVENT_NOTICE },
+	[EVENT_SLAVE_LOST] = { "slave_lost", EVENT_ERROR },
+	[EVENT_SLAVE_BACK] = { "slave_back", EVENT_NOTICE },
+	[EVENT_OUTPUT_SET] = { "output_set", EVENT_INFO },
+	[EVENT_OUTPUT_FAIL_SAFE] = { "output_fail_safe", EVENT_WARNING },
+	[EVENT_COMMAND_REFUSED] = { "command_refused", EVENT_NOTICE },
+	[EVENT_RT_DEGRADED] = { "rt_degraded", EVENT_WARNING },
+	[EVENT_SDO_ABORT] = { "sdo_abort", EVENT_NOTICE },
+	[EVENT_LINK] = { "link", EVENT_WARNING },
+	[EVENT_RECORD_STARTED] = { "record_started", EVENT_INFO },
+	[EVENT_RECORD_GAP] = { "record_gap", EVENT_ERROR },
+	[EVENT_RECORD_DISK_FULL] = { "record_disk_full", EVENT_ERROR },
+	[EVENT_RECORD_RESUMED] = { "record_resumed", EVENT_NOTICE },
+};
+
+const char *event_name(uint16_t id)
+{
+	return id < EVENT_COUNT ? kinds[id].name : "unknown";
+}
+
+enum event_severity event_severity(uint16_t id)
+{
+	return id < EVENT_COUNT ? kinds[id].severity : EVENT_ERROR;
+}
+
+static const char *al_name(int32_t state)
+{
+	switch (state & 0x0f) {
+	case 1:
+		return "INIT";
+	case 2:
+		return "PRE-OP";
+	case 3:
+		return "BOOT";
+	case 4:
+		return "SAFE-OP";
+	case 8:
+		return "OP";
+	default:
+		return "none";
+	}
+}
+
+int event_format(const struct event *ev, char *buf, size_t buf_len)
+{
+	const int32_t *a = ev->arg;
+	unsigned slave = ev->slave_pos;
+
+	switch ((enum event_id)ev->id) {
+	case EVENT_NONE:
+	case EVENT_COUNT:
+		break;
+	case EVENT_STARTED:
+		return snprintf(buf, buf_len, "started: %" PRId32 " slaves, period %" PRId64 " ns",
+				a[0], ev->value);
+	case EVENT_STOPPED:
+		return snprintf(buf, buf_len, "stopped after %" PRId64 " cycles", ev->value);
+	case EVENT_BUS_STATE:
+		return snprintf(buf, buf_len, "bus: %s -> %s", bus_state_to_str((uint32_t)a[0]),
+				bus_state_to_str((uint32_t)a[1]));
+	case EVENT_FRAME_LOST:
+		return snprintf(buf, buf_len, "cycle %" PRId64 ": frame lost (%" PRId32 " in a row)",
+				ev->value, a[0]);
+	case EVENT_FRAME_LATE:
+		return snprintf(buf, buf_len,
+				"cycle %" PRId64 ": frame came %" PRId32 " cycles late, thrown away",
+				ev->value, a[0]);
+	case EVENT_FRAME_DOUBLED:
+		return snprintf(buf, buf_len, "cycle %" PRId64 ": frame came twice", ev->value);
+	case EVENT_WKC_LOW:
+		return snprintf(buf, buf_len, "cycle %" PRId64 ": WKC %" PRId32 ", expected %" PRId32,
+				ev->value, a[0], a[1]);
+	case EVENT_WKC_OK:
+		return snprintf(buf, buf_len,
+				"cycle %" PRId64 ": WKC %" PRId32 " again after %" PRId32 " cycles",
+				ev->value, a[0], a[1]);
+	case EVENT_OVERRUN:
+		return snprintf(buf, buf_len,
+				"cycle %" PRId64 ": overrun, %" PRId32 " cycles skipped, %" PRId32
+				" ns late",
+				ev->value, a[0], a[1]);
+	case EVENT_NUMBERING_JUMP:
+		return snprintf(buf, buf_len,
+				"cycle numbers go on at %" PRId64 ", %" PRId32 " have no sample",
+				ev->value, a[0]);
+	case EVENT_DC_LOCKED:
+		return snprintf(buf, buf_len, "DC locked, phase error %" PRId32 " ns", a[0]);
+	case EVENT_DC_UNLOCKED:
+		return snprintf(buf, buf_len, "DC lock lost, phase error %" PRId32 " ns", a[0]);
+	case EVENT_COUNTER_BAD:
+		return snprintf(buf, buf_len,
+				"slave %u: cycle %" PRId64 ": counter %" PRId32 ", expected %" PRId32,
+				slave, ev->value, a[0], a[1]);
+	case EVENT_SLAVE_STATE:
+		return snprintf(buf, buf_len, "slave %u: %s%s -> %s%s, AL status code 0x%04" PRIx64,
+				slave, al_name(a[0]), a[0] & 0x10 ? "+ERROR" : "", al_name(a[1]),
+				a[1] & 0x10 ? "+ERROR" : "", (uint64_t)ev->value & 0xffff);
+	case EVENT_SLAVE_LOST:
+		return snprintf(buf, buf_len, "slave %u: lost", slave);
+	case EVENT_SLAVE_BACK:
+		return snprintf(buf, buf_len, "slave %u: back", slave);
+	case EVENT_OUTPUT_SET:
+		return snprintf(buf, buf_len, "slave %u: output channel %" PRId64 " set", slave,
+				ev->value);
+	case EVENT_OUTPUT_FAIL_SAFE:
+		return snprintf(buf, buf_len, "outputs go to fail-safe");
+	case EVENT_COMMAND_REFUSED:
+		return snprintf(buf, buf_len, "command refused, channel %" PRId64 ", error %" PRId32,
+				ev->value, a[0]);
+	case EVENT_RT_DEGRADED:
+		return snprintf(buf, buf_len, "real-time setting %" PRId32 " failed, error %" PRId32,
+				a[0], a[1]);
+	case EVENT_SDO_ABORT:
+		return snprintf(buf, buf_len,
+				"slave %u: SDO 0x%04" PRIx32 ":%02" PRIx32 " abort 0x%08" PRIx64, slave,
+				(uint32_t)a[0] >> 8, (uint32_t)a[0] & 0xff,
+				(uint64_t)ev->value & 0xffffffff);
+	case EVENT_LINK:
+		return snprintf(buf, buf_len, "link %s", a[0] ? "up" : "down");
+	case EVENT_RECORD_STARTED:
+		return snprintf(buf, buf_len, "recording from cycle %" PRId64, ev->value);
+	case EVENT_RECORD_GAP:
+		return snprintf(buf, buf_len,
+				"recording has a gap: %" PRId32 " cycles from %" PRId64, a[0],
+				ev->value);
+	case EVENT_RECORD_DISK_FULL:
+		return snprintf(buf, buf_len, "recording stopped: disk full, %" PRId64 " bytes free",
+				ev->value);
+	case EVENT_RECORD_RESUMED:
+		return snprintf(buf, buf_len, "recording again from cycle %" PRId64, ev->value);
+	}
+	return snprintf(buf, buf_len, "event %u", ev->id);
+}

@@ -1,0 +1,68 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * Something that happened, as a number and arguments: the cycle thread pushes it to the event ring
+ * (kind "event", payload struct event), text is made where it is read. One table (event.c) holds
+ * the name, severity and text of each.
+ */
+#ifndef BASE_EVENT_H
+#define BASE_EVENT_H
+
+#include <assert.h>
+#include <stddef.h>
+#include <stdint.h>
+
+enum event_id {
+	EVENT_NONE = 0,
+	EVENT_STARTED,           /* value: period_ns; arg: slaves */
+	EVENT_STOPPED,           /* value: cycles */
+	EVENT_BUS_STATE,         /* arg: enum bus_state, from, to */
+	EVENT_FRAME_LOST,        /* value: cycle; arg: frames lost in a row */
+	EVENT_FRAME_LATE,        /* value: cycle; arg: cycles late */
+	EVENT_FRAME_DOUBLED,     /* value: cycle */
+	EVENT_WKC_LOW,           /* value: cycle; arg: wkc, expected */
+	EVENT_WKC_OK,            /* value: cycle; arg: wkc; how many cycles it was low */
+	EVENT_OVERRUN,           /* value: cycle; arg: cycles skipped; late_ns clamped to int32 */
+	EVENT_NUMBERING_JUMP,    /* value: first cycle after; arg: cycles left out (clamped) */
+	EVENT_DC_LOCKED,         /* value: cycle; arg: phase error ns */
+	EVENT_DC_UNLOCKED,       /* value: cycle; arg: phase error ns */
+	EVENT_COUNTER_BAD,       /* slave; value: cycle; arg: counter seen, counter expected */
+	EVENT_SLAVE_STATE,       /* slave; arg: AL state from, to; value: AL status code */
+	EVENT_SLAVE_LOST,        /* slave */
+	EVENT_SLAVE_BACK,        /* slave */
+	EVENT_OUTPUT_SET,        /* slave; value: channel index; arg: writer */
+	EVENT_OUTPUT_FAIL_SAFE,  /* arg: reason */
+	EVENT_COMMAND_REFUSED,   /* value: channel index or -1; arg: errno */
+	EVENT_RT_DEGRADED,       /* arg: which of enum event_rt, errno */
+	EVENT_SDO_ABORT,         /* slave; arg: index << 8 | subindex; value: abort code */
+	EVENT_LINK,              /* arg: 1 up, 0 down */
+	EVENT_RECORD_STARTED,    /* value: first cycle */
+	EVENT_RECORD_GAP,        /* value: first cycle missing; arg: how many (clamped) */
+	EVENT_RECORD_DISK_FULL,  /* value: bytes free */
+	EVENT_RECORD_RESUMED,    /* value: cycle */
+	EVENT_COUNT,
+};
+
+enum event_severity { EVENT_INFO, EVENT_NOTICE, EVENT_WARNING, EVENT_ERROR };
+
+struct event {
+	int64_t mono_ns;    /* CLOCK_MONOTONIC */
+	int64_t tai_ns;     /* CLOCK_TAI */
+	uint64_t cycle;     /* cycle in which it was noticed */
+	int64_t value;
+	int32_t arg[2];
+	uint16_t id;        /* enum event_id */
+	uint16_t slave_pos; /* 0xffff: none */
+	uint32_t reserved;
+};
+
+static_assert(sizeof(struct event) == 48, "part of the ring's format");
+
+#define EVENT_NO_SLAVE UINT16_C(0xffff)
+
+/** The machine-readable name, "frame_lost"; "unknown" for a number out of range. */
+const char *event_name(uint16_t id);
+enum event_severity event_severity(uint16_t id);
+/** One line of text without a newline. Returns its length as snprintf does. */
+int event_format(const struct event *ev, char *buf, size_t buf_len);
+
+#endif

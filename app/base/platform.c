@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: MIT */
+#include "platform.h"
+
+#include <errno.h>
+#include <time.h>
+
+static int64_t read_clock(clockid_t id)
+{
+	struct timespec ts;
+
+	clock_gettime(id, &ts);
+	return ts.tv_sec * NS_PER_S + ts.tv_nsec;
+}
+
+static mono_t posix_now(void *ctx)
+{
+	(void)ctx;
+	return (mono_t){ read_clock(CLOCK_MONOTONIC) };
+}
+
+static int64_t posix_tai(void *ctx)
+{
+	(void)ctx;
+	return read_clock(CLOCK_TAI);
+}
+
+static int posix_sleep_until(void *ctx, mono_t deadline)
+{
+	struct timespec ts = { .tv_sec = deadline.ns / NS_PER_S, .tv_nsec = deadline.ns % NS_PER_S };
+	int r;
+
+	(void)ctx;
+	do {
+		r = clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &ts, NULL);
+	} while (r == EINTR);
+	return -r;
+}
+
+struct platform platform_posix(void)
+{
+	return (struct platform){
+		.now = posix_now,
+		.tai_ns = posix_tai,
+		.sleep_until = posix_sleep_until,
+		.ctx = NULL,
+	};
+}

@@ -1,0 +1,121 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * What a slot of the sample ring holds: one sample_header, then the process image (outputs first,
+ * inputs behind), exactly as it was on the wire in that cycle. Part of the installed interface:
+ * a change of layout is a new SAMPLE_VERSION.
+ *
+ * Cycle k belongs to the SYNC0 edge at dc_time_ns(k) = dc_time_ns(0) + k * period_ns. There is one
+ * sample for every k: a cycle that the master missed is there, too, flagged SAMPLE_SKIPPED.
+ */
+#ifndef BASE_SAMPLE_H
+#define BASE_SAMPLE_H
+
+#include <assert.h>
+#include <stdint.h>
+
+#define SAMPLE_VERSION 1u
+
+enum sample_flag {
+	SAMPLE_LOST = 1u << 0,       /* no frame came back before the receive deadline: inputs are stale */
+	SAMPLE_LATE = 1u << 1,       /* a frame of an earlier cycle came in this one and was thrown away */
+	SAMPLE_WKC_LOW = 1u << 2,    /* fewer slaves answered than expected: inputs are stale */
+	SAMPLE_NOT_OP = 1u << 3,     /* the bus is not in OP */
+	SAMPLE_FAIL_SAFE = 1u << 4,  /* outputs hold their fail-safe values */
+	SAMPLE_SKIPPED = 1u << 5,    /* the master overran: no frame was sent for this SYNC0 */
+	SAMPLE_BAD_COUNTER = 1u << 6,/* a slave's conversion counter did not advance as it must */
+	SAMPLE_DC_UNLOCKED = 1u << 7,/* the master's servo is not locked to the reference clock */
+	SAMPLE_DOUBLED = 1u << 8,    /* a frame came back twice; the second was thrown away */
+};
+
+struct sample_header {
+	uint64_t cycle;            /* index of the SYNC0 edge; one more in every sample */
+	int64_t dc_time_ns;        /* DC time of that edge, ns since 2000-01-01; 0 without DC */
+	int64_t wake_mono_ns;      /* CLOCK_MONOTONIC at the wake */
+	int64_t wake_tai_ns;       /* CLOCK_TAI at the wake, ns since 1970 */
+	int64_t frame_dc_ns;       /* DC time at which the frame passed the reference clock; 0: none */
+	int32_t wake_latency_ns;   /* wake minus deadline */
+	int32_t round_trip_ns;     /* frame out to frame back; -1: lost */
+	int32_t phase_error_ns;    /* frame against SYNC0 plus set point, as the servo saw it */
+	int32_t dc_diff_ns;        /* largest |0x092C| of the slaves, upper estimate; -1: not read */
+	uint32_t flags;            /* enum sample_flag */
+	uint16_t wkc;              /* working counter of the process data, sum over its datagrams */
+	uint16_t wkc_expected;
+	uint64_t slaves_bad;       /* bit n: the sample of slave n is not good */
+};
+
+static_assert(sizeof(struct sample_header) == 72, "part of the ring's format");
+
+enum channel_type {
+	CHANNEL_BOOL = 1, /* 1 bit */
+	CHANNEL_UINT = 2, /* 1 to 64 bits */
+	CHANNEL_INT = 3,  /* 1 to 64 bits, two's complement */
+	CHANNEL_FLOAT = 4,/* 32 or 64 bits, IEEE 754 */
+};
+
+enum channel_direction { CHANNEL_INPUT = 0, CHANNEL_OUTPUT = 1 }; /* from the master's side */
+
+/* One mapped variable. physical = raw * scale + offset, in @unit. */
+struct channel {
+	char name[64];       /* "piccolo0.adc": slave name, dot, entry name */
+	char unit[16];       /* "" where raw counts are all there is */
+	uint16_t slave_pos;  /* 0-based place on the ring */
+	uint16_t index;      /* CoE object, 0x6000 */
+	uint8_t subindex;
+	uint8_t type;        /* enum channel_type */
+	uint8_t direction;   /* enum channel_direction */
+	uint8_t bit_len;     /* 1 to 64 */
+	uint32_t bit_offset; /* from the start of the process image */
+	uint32_t reserved;
+	double scale;
+	double offset;
+};
+
+static_assert(sizeof(struct channel) == 112, "part of the ring's format");
+
+/* One slave of the segment, as found. */
+struct slave_info {
+	char name[32];   /* "piccolo0": configured, or made from the device name and position */
+	char device[64]; /* name in the slave's SII */
+	uint32_t vendor;
+	uint32_t product;
+	uint32_t revision;
+	uint32_t serial;
+	uint16_t slave_pos;
+	uint16_t station_addr;
+	uint16_t alias;
+	uint8_t has_dc;
+	uint8_t is_dc_reference;
+	int32_t dc_delay_ns;
+	int32_t counter_channel; /* index of its conversion counter in the channel table; -1: none */
+	uint32_t input_bits;
+	uint32_t output_bits;
+	uint64_t reserved;
+};
+
+static_assert(sizeof(struct slave_info) == 144, "part of the ring's format");
+
+/* The self-description in the sample ring's meta area: this, slave_count slave_info, channel_count channel. */
+struct sample_meta {
+	uint32_t version; /* SAMPLE_VERSION */
+	uint32_t slave_count;
+	uint32_t channel_count;
+	uint32_t image_bytes;  /* outputs and inputs */
+	uint32_t output_bytes; /* the first of them */
+	int32_t tai_offset_s;  /* TAI - UTC of the kernel at start; 0: unset, CLOCK_TAI is UTC */
+	uint64_t period_ns;
+	uint64_t session;      /* CLOCK_TAI at start: tells one run of the master from the next */
+};
+
+static_assert(sizeof(struct sample_meta) == 40, "part of the ring's format");
+
+static inline const struct slave_info *sample_meta_slaves(const struct sample_meta *meta)
+{
+	return (const struct slave_info *)(const void *)(meta + 1);
+}
+
+static inline const struct channel *sample_meta_channels(const struct sample_meta *meta)
+{
+	return (const struct channel *)(const void *)(sample_meta_slaves(meta) + meta->slave_count);
+}
+
+#endif

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: MIT
+# How a module, a program and a test of ecdaq are declared. One way each.
+
+set(ECDAQ_WARNINGS
+	-Wall -Wextra -Wshadow -Wconversion -Wswitch-enum -Wmissing-prototypes -Wstrict-prototypes
+	-Wcast-align -Wwrite-strings -Wundef -Wvla -Wformat=2 -Werror)
+
+add_library(ecdaq_options INTERFACE)
+target_compile_options(ecdaq_options INTERFACE ${ECDAQ_WARNINGS})
+target_compile_definitions(ecdaq_options INTERFACE _GNU_SOURCE ECDAQ_VERSION="${PROJECT_VERSION}")
+target_include_directories(ecdaq_options INTERFACE "${CMAKE_SOURCE_DIR}")
+
+if(ECDAQ_SANITIZE)
+	add_compile_options(-fsanitize=${ECDAQ_SANITIZE} -fno-omit-frame-pointer -g)
+	add_link_options(-fsanitize=${ECDAQ_SANITIZE})
+	if(ECDAQ_SANITIZE MATCHES "undefined")
+		add_compile_options(-fno-sanitize-recover=all)
+	endif()
+	if(ECDAQ_SANITIZE MATCHES "thread" AND CMAKE_C_COMPILER_ID STREQUAL "GNU")
+		add_compile_options(-Wno-tsan)
+	endif()
+endif()
+if(ECDAQ_FUZZ)
+	add_compile_options(-fsanitize=fuzzer-no-link)
+endif()
+
+# ecdaq_module(NAME SOURCES a.c b.c [DEPENDS module...] [LIBRARIES lib...])
+# A static library ecdaq_NAME. DEPENDS names other modules, LIBRARIES foreign ones.
+function(ecdaq_module name)
+	cmake_parse_arguments(M "" "" "SOURCES;DEPENDS;LIBRARIES" ${ARGN})
+	add_library(ecdaq_${name} STATIC ${M_SOURCES})
+	target_link_libraries(ecdaq_${name} PRIVATE ecdaq_options)
+	foreach(dep ${M_DEPENDS})
+		target_link_libraries(ecdaq_${name} PUBLIC ecdaq_${dep})
+	endforeach()
+	target_link_libraries(ecdaq_${name} PUBLIC ${M_LIBRARIES})
+endfunction()
+
+# ecdaq_program(NAME SOURCES a.c [DEPENDS module...] [LIBRARIES lib...])
+# An executable NAME, installed to bin.
+function(ecdaq_program name)
+	cmake_parse_arguments(P "" "" "SOURCES;DEPENDS;LIBRARIES" ${ARGN})
+	add_executable(${name} ${P_SOURCES})
+	target_link_libraries(${name} PRIVATE ecdaq_options)
+	foreach(dep ${P_DEPENDS})
+		target_link_libraries(${name} PRIVATE ecdaq_${dep})
+	endforeach()
+	target_link_libraries(${name} PRIVATE ${P_LIBRARIES})
+	install(TARGETS ${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+endfunction()
+
+# ecdaq_test(GROUP NAME SOURCES a.c [DEPENDS module...] [LIBRARIES lib...] [TIMEOUT s])
+# An executable GROUP_NAME on tests/harness; every TEST(module, sentence) in its sources becomes
+# one ctest test "module.sentence" with label GROUP.
+function(ecdaq_test group name)
+	cmake_parse_arguments(T "" "TIMEOUT" "SOURCES;DEPENDS;LIBRARIES" ${ARGN})
+	set(exe ${group}_${name})
+	add_executable(${exe} ${T_SOURCES})
+	target_link_libraries(${exe} PRIVATE ecdaq_options ecdaq_harness)
+	foreach(dep ${T_DEPENDS})
+		target_link_libraries(${exe} PRIVATE ecdaq_${dep})
+	endforeach()
+	target_link_libraries(${exe} PRIVATE ${T_LIBRARIES})
+	if(NOT T_TIMEOUT)
+		set(T_TIMEOUT 120)
+	endif()
+	foreach(source ${T_SOURCES})
+		set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${source})
+		file(STRINGS ${source} lines REGEX "^TEST\\([a-z0-9_]+, *[a-z0-9_]+\\)")
+		foreach(line ${lines})
+			string(REGEX REPLACE "^TEST\\(([a-z0-9_]+), *([a-z0-9_]+)\\).*" "\\1.\\2" full "${line}")
+			add_test(NAME ${full} COMMAND ${exe} ${full})
+			set_tests_properties(${full} PROPERTIES LABELS ${group} TIMEOUT ${T_TIMEOUT}
+				SKIP_RETURN_CODE 77)
+		endforeach()
+	endforeach()
+endfunction()
