@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The command board: how output values reach the cycle. One page per writer (local, program,
+ * remote), each a sequence-numbered set of values; the cycle takes the newest whole set at the
+ * cycle boundary and answers with the cycle in which it went on the wire. Plain memory or a
+ * shared page; one writer, one reader, nobody waits.
+ */
+#ifndef BASE_BOARD_H
+#define BASE_BOARD_H
+
+#include <stdatomic.h>
+#include <stdint.h>
+
+#define BOARD_MAGIC UINT64_C(0x3164726162716463) /* "cdqbard1" */
+
+enum { BOARD_OUTPUTS = 512 }; /* the n-th output channel of the channel table */
+
+struct board_output {
+	_Atomic uint64_t raw;    /* [writer] as it goes into the image */
+	_Atomic uint32_t is_set; /* [writer] 1 once it was written */
+	uint32_t reserved;
+};
+
+struct board {
+	uint64_t magic;
+	uint32_t bytes;
+	uint32_t reserved;
+	_Atomic uint64_t sequence;  /* [writer] odd: being written; even: set number * 2 */
+	_Atomic uint64_t beat;      /* [writer] counts up as a sign of life; for time-outs */
+	_Alignas(64) struct board_output output[BOARD_OUTPUTS];
+	_Alignas(64) _Atomic uint64_t taken_sequence; /* [cycle] newest set that is on the wire */
+	_Atomic uint64_t taken_cycle;                 /* [cycle] the cycle whose frame carried it first */
+};
+
+/* Plain values of one set, as the cycle sees them. */
+struct board_set {
+	uint64_t sequence;
+	uint64_t raw[BOARD_OUTPUTS];
+	uint8_t is_set[BOARD_OUTPUTS];
+};
+
+void board_init(struct board *board);
+/** Put one value into the next set; board_commit() makes it visible. Context: the writer. */
+void board_put(struct board *board, unsigned output, uint64_t raw);
+/** Begin (makes the page odd) and commit a set. Returns its sequence. Context: the writer. */
+void board_begin(struct board *board);
+uint64_t board_commit(struct board *board);
+
+/** 1 and a copy of the newest set if it is newer than @set->sequence and whole; else 0, @set untouched. RT-safe. */
+int board_take(const struct board *board, unsigned output_count, struct board_set *set);
+/** Say that the set with @sequence goes on the wire in @cycle. Context: the cycle. */
+void board_answer(struct board *board, uint64_t sequence, uint64_t cycle);
+
+#endif

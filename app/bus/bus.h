@@ -1,0 +1,90 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The master's service side: finds the slaves, compares them with what is expected, maps their
+ * process data, sets up distributed clocks, leads them to OP while the cycle runs, watches them, and
+ * stops them in order. Everything here blocks and belongs to the service thread; it reaches the wire
+ * through a line (link/line.h) that is direct at first and rides along once the cycle runs.
+ *
+ * Every call that fails writes one line, what and why, with position, vendor, product, register or
+ * AL status text, to @error (BUS_ERROR_BYTES) and returns -errno:
+ *   -ENODEV no slave, -ENXIO a slave too few or too many or the wrong one, -EPROTO mapping does not fit,
+ *   -ETIME a state or lock was not reached in time, -EIO the wire, -ENOTSUP, -E2BIG a limit.
+ */
+#ifndef BUS_BUS_H
+#define BUS_BUS_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/event.h"
+#include "base/sample.h"
+#include "base/status.h"
+#include "bus/exchange.h"
+#include "config/config.h"
+#include "link/line.h"
+#include "wire/al.h"
+
+enum { BUS_ERROR_BYTES = 256 };
+
+struct bus;
+
+/** @cfg and @line outlive the bus. Free with bus_destroy(). */
+int bus_create(const struct config *cfg, struct line *line, struct bus **ret_bus);
+void bus_destroy(struct bus *bus);
+
+/* --- bring-up, in this order --- */
+
+/** Find the slaves, to PRE-OP, SYNC0 of an earlier run stopped first (T09); names them. */
+int bus_scan(struct bus *bus, char *error);
+/** Found against configured slaves: position, vendor, product, revision, alias, count. */
+int bus_compare(const struct bus *bus, char *error);
+/** Start-up SDOs, SM and FMMU, PDO mapping (CoE or SII) into the channel table, watchdog (T08), exchange plan. */
+int bus_map(struct bus *bus, char *error);
+/** Filters, latch, delays, offsets, burst, check of 0x092C. Nothing to do without DC slaves. */
+int bus_dc_setup(struct bus *bus, char *error);
+
+/* The cycle runs from here on (line_ride_begin), FRMW and LRW go every period. */
+
+/**
+ * One common SYNC0 start for all slaves with cyclic SYNC0, at a multiple of the period after
+ * @dc_now_ns with margin; verified by 0x0984 and read back (T10), tried again if it was missed.
+ * One-shot slaves get 0x0980 = PDI. Call when the servo is locked.
+ */
+int bus_sync0_start(struct bus *bus, int64_t dc_now_ns, char *error);
+/** All slaves to @state (SAFE-OP, OP, PRE-OP, INIT), with AL errors named by slave, code and text. */
+int bus_request_state(struct bus *bus, enum al_state state, span_t timeout, char *error);
+/** SYNC0 off, all to INIT; goes on over errors. The cycle has put outputs to fail-safe before. */
+int bus_stop(struct bus *bus, char *error);
+
+/* --- in OP, a few times a second --- */
+
+struct bus_watch_report {
+	unsigned slaves_op;
+	unsigned slaves_lost;
+	int is_all_op;
+};
+
+/**
+ * Read AL state, error counters, DC difference of every slave into @page (its slave[] entries), emit events through
+ * @emit, acknowledge errors and lead slaves that fell back to SAFE-OP or PRE-OP or were power-cycled to OP again
+ * (with DC redone for a returned slave, T18), a step per call.
+ */
+int bus_watch(struct bus *bus, struct status_page *page,
+	      void (*emit)(void *ctx, const struct event *ev), void *emit_ctx,
+	      struct bus_watch_report *ret_report);
+
+/* --- what was found; valid after bus_map() (slaves: after bus_scan()) --- */
+
+const struct slave_info *bus_slaves(const struct bus *bus, size_t *ret_count);
+const struct channel *bus_channels(const struct bus *bus, size_t *ret_count);
+const struct exchange_plan *bus_plan(const struct bus *bus);
+
+/* --- mailbox and registers, in any state from PRE-OP on --- */
+
+/** @ret_abort is the SDO abort code or 0. Size in @len is updated by read. */
+int bus_sdo_read(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t subindex,
+		 uint8_t *ret_data, size_t *len, uint32_t *ret_abort);
+int bus_sdo_write(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t subindex,
+		  const uint8_t *data, size_t len, uint32_t *ret_abort);
+
+#endif

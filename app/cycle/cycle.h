@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * One millisecond (DESIGN 3): wake, send and wait, servo, check, outputs, sample. cycle_step() is one
+ * cycle; cycle_run() repeats it until cycle_stop(). After cycle_create() nothing here allocates,
+ * locks, logs, opens or blocks but the platform's sleep and the transport.
+ */
+#ifndef CYCLE_CYCLE_H
+#define CYCLE_CYCLE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/board.h"
+#include "base/platform.h"
+#include "base/ring.h"
+#include "base/sample.h"
+#include "base/status.h"
+#include "bus/exchange.h"
+#include "config/config.h"
+
+enum cycle_writer { CYCLE_WRITER_LOCAL, CYCLE_WRITER_PROGRAM, CYCLE_WRITER_REMOTE, CYCLE_WRITERS };
+
+/* Everything the cycle works on; all of it outlives the cycle. */
+struct cycle_spec {
+	const struct config *cfg;
+	struct platform platform;
+	struct exchange *exchange;
+	const struct exchange_plan *plan;
+	const struct slave_info *slaves;
+	size_t slave_count;
+	const struct channel *channels;
+	size_t channel_count;
+	struct ring *samples;
+	struct ring *events;
+	struct cycle_stats *stats;
+	struct board *boards[CYCLE_WRITERS]; /* NULL: no such writer */
+};
+
+struct cycle;
+
+/** 0 or -errno; -EINVAL with one line in @error for outputs that name no channel. */
+int cycle_create(const struct cycle_spec *spec, struct cycle **ret_cycle, char *error,
+		 size_t error_bytes);
+void cycle_destroy(struct cycle *cycle);
+
+/** One cycle. Context: the cycle thread. */
+void cycle_step(struct cycle *cycle);
+/** Steps until cycle_stop(); touches its stack first and counts its own page faults. 0 or -errno. */
+int cycle_run(struct cycle *cycle);
+/** Ask cycle_run() to return after the step it is in. Context: any, also a signal handler. */
+void cycle_stop(struct cycle *cycle);
+
+/*
+ * What the bus is in, as the service thread knows it. Outputs are real only in CYCLE_OP, samples are
+ * judged only in CYCLE_OP.
+ */
+enum cycle_phase {
+	CYCLE_CLOCKS, /* exchange and servo only */
+	CYCLE_SYNCED, /* SYNC0 runs */
+	CYCLE_OP,     /* all slaves are in OP */
+	CYCLE_SAFE,   /* on the way down: outputs at fail-safe */
+};
+/** Context: service thread; takes effect at the next cycle boundary. */
+void cycle_phase_set(struct cycle *cycle, enum cycle_phase phase);
+
+/** Push an event from the cycle's own thread only. RT-safe. */
+struct event;
+void cycle_emit(struct cycle *cycle, struct event *ev);
+
+/** The newest frame's DC time and the host time at which it was sent. 0 or -EAGAIN. Context: any. */
+int cycle_dc_now(const struct cycle *cycle, int64_t *ret_dc_ns);
+
+/** Which n-th output @channel is (its place on the boards); -ENOENT for an input. */
+int cycle_output_index(const struct cycle *cycle, size_t channel);
+
+#endif

@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * One EtherCAT line: a transport, and the rule who may use it.
+ *
+ * Direct: the service thread (SOEM's functions, through nicdrv.c) sends and receives itself; this is
+ * so from line_create() until line_ride_begin().
+ * Riding: the cycle thread owns the transport. A service frame waits in one slot; the cycle sends it
+ * when time is left in its cycle (line_ride_take) and gives the answer back (line_ride_answer).
+ * There is one service thread, so one slot is enough; it is handed over with acquire and release,
+ * nobody locks, the cycle never waits.
+ */
+#ifndef LINK_LINE_H
+#define LINK_LINE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/platform.h"
+
+struct line;
+
+/* How the service thread lets time pass while the cycle owns the transport. */
+struct line_waiter {
+	/**
+	 * Return at @until at the latest, sooner whenever something may have happened. On the
+	 * machine: a short sleep. On virtual time: run the next cycle.
+	 */
+	void (*wait)(void *ctx, mono_t until);
+	void *ctx;
+};
+
+/** Takes over @transport (destroyed with the line). Free with line_destroy(). */
+int line_create(struct platform platform, struct transport transport, struct line **ret_line);
+void line_destroy(struct line *line);
+
+const struct platform *line_platform(const struct line *line);
+/** The transport, for its owner: the cycle while riding, else the service thread. RT-safe. */
+const struct transport *line_transport(const struct line *line);
+
+/* --- service thread; blocking --- */
+
+/** SOEM's time, sleep and frames of this thread go to @line from here on (NULL: none). */
+void line_bind(struct line *line);
+struct line *line_bound(void);
+
+/**
+ * Send @frame and wait for its echo: same command and index in the first datagram, same length. Returns the answer's
+ * length, -ETIMEDOUT, or -errno of the transport. Other frames are thrown away and counted.
+ */
+int line_transact(struct line *line, const uint8_t *frame, size_t frame_len, uint8_t *ret_answer,
+		  size_t capacity, span_t timeout);
+
+/** Let @span pass; while riding the cycle goes on. */
+void line_sleep(struct line *line, span_t span);
+
+/** From now on the cycle owns the transport, and @waiter lets time pass. */
+void line_ride_begin(struct line *line, struct line_waiter waiter);
+/** The cycle has ended: back to direct. */
+void line_ride_end(struct line *line);
+
+/* --- cycle thread; RT-safe --- */
+
+/** The service frame that waits for a ride, NULL if none. It counts as sent from here on. */
+const uint8_t *line_ride_take(struct line *line, size_t *ret_len);
+/** Offer a received frame that is not the cycle's: 1 if it was the answer waited for, else 0. */
+int line_ride_answer(struct line *line, const uint8_t *frame, size_t frame_len);
+/** 1 while a service frame is out and its answer has not come. */
+int line_ride_is_out(const struct line *line);
+
+#endif
