@@ -121,8 +121,21 @@ int config_load(const char *path, struct config *cfg, char *error, size_t error_
 /** The same from memory; @name stands for the file in messages. */
 int config_parse(const char *name, const char *text, size_t text_len, struct config *cfg,
 		 char *error, size_t error_bytes);
-/** Set one option by its dotted name as the file would ("cycle.period=500us"). Same errors. */
+/**
+ * Set one option by its dotted name as the file would: "cycle.period=500us", "slaves[0].mode=oneshot" (one
+ * past the last makes a new item). Same errors, without FILE:LINE. How options must fit to each other is
+ * not looked at: call config_check() after the last one.
+ */
 int config_set(struct config *cfg, const char *assignment, char *error, size_t error_bytes);
+/** Do the options fit to each other? config_load() and config_parse() have asked already. 0 or -EINVAL. */
+int config_check(const struct config *cfg, char *error, size_t error_bytes);
+
+/* What stands in the run directory. */
+#define CONFIG_RUN_SAMPLES "samples"             /* ring of samples */
+#define CONFIG_RUN_EVENTS "events"               /* ring of events */
+#define CONFIG_RUN_STATUS "status"               /* struct status_page */
+#define CONFIG_RUN_RECORD_STATUS "record-status" /* struct record_status */
+#define CONFIG_RUN_ADMIN "admin"                 /* socket, admin/protocol.h */
 
 /** Where the run directory is: @cfg->run_dir, else $ECDAQ_RUN_DIR, else /run/ecdaq (root) or /dev/shm/ecdaq-UID. */
 int config_run_path(const struct config *cfg, const char *file, char *ret_path, size_t path_bytes);
