@@ -1,0 +1,230 @@
+#!/bin/bash
+# SPDX-License-Identifier: MIT
+# A simulated segment and the whole of ecdaq on it, in a network namespace of their own.
+# `./build.sh run` builds and then calls this.
+set -eu
+
+root=$(CDPATH='' cd -- "$(dirname -- "$0")/../.." && pwd)
+
+usage()
+{
+	cat <<'USAGE'
+usage: ./build.sh run [OPTION...]
+
+Brings a simulated segment to OP over a veth pair in a network namespace of its own, records every
+cycle and shows it live. Ctrl-C ends it in order (ecdaqd, recorder, segment) and prints a summary.
+It needs no privilege where the kernel grants users their own namespaces; real-time priority is then
+not to be had, and ecdaqd says so once.
+
+  --seconds N     end after N seconds (default: at Ctrl-C)
+  --slaves WHAT   1 to 64: so many FB1111+Piccolo slaves; or names, in order, from the folder of SII
+                  images: ek1100,el2828,el2889 (default: 2)
+  --sii DIR       folder of SII images for --slaves NAMES (default: $ECDAQ_SII)
+  --config FILE   ecdaq.yaml for ecdaqd and ecdaq-record (default: built-in defaults)
+  --record DIR    where recordings go (default: build/run/record)
+  --json          no live view; the last line printed is `ecdaq status --json --summary`
+
+environment:
+  ECDAQ_BIN      folder of the programs (default: build/stage/bin)
+  ECDAQ_RUN_DIR  run directory: rings, status, admin socket (default: a new one in /dev/shm, removed
+                 at the end). With it set, `ecdaq` in a second terminal reads what runs here.
+  ECDAQ_SII      as --sii
+USAGE
+}
+
+die()
+{
+	printf 'build.sh: run: %s\n' "$*" >&2
+	exit 1
+}
+
+note()
+{
+	printf -- '-- %s\n' "$*" >&2
+}
+
+seconds=
+slaves=2
+sii=${ECDAQ_SII:-}
+config=
+record=$root/build/run/record
+json=no
+mode=outside
+
+parse_options()
+{
+	while [ $# -gt 0 ]; do
+		case $1 in
+		--seconds | --slaves | --sii | --config | --record)
+			[ $# -ge 2 ] || die "$1 needs a value"
+			printf -v "${1#--}" '%s' "$2"
+			shift
+			;;
+		--json) json=yes ;;
+		--check) mode=check ;;
+		--inside) mode=inside ;;
+		--help)
+			usage
+			exit 0
+			;;
+		*) die "unknown option '$1' (see ./build.sh help run)" ;;
+		esac
+		shift
+	done
+}
+
+check_options()
+{
+	case $seconds in
+	*[!0-9]* | 0) die "--seconds: '$seconds' is no number of seconds above 0" ;;
+	esac
+	case $slaves in
+	'') die "--slaves: nothing given" ;;
+	*[!0-9]*)
+		[ -n "$sii" ] || die "--slaves $slaves: names need --sii DIR, the folder of their SII images"
+		[ -d "$sii" ] || die "--sii: $sii: no such folder"
+		;;
+	*)
+		if [ "${#slaves}" -gt 2 ] || [ "$slaves" -lt 1 ] || [ "$slaves" -gt 64 ]; then
+			die "--slaves: $slaves is not 1 to 64"
+		fi
+		;;
+	esac
+	[ -z "$config" ] || [ -r "$config" ] || die "--config: $config: cannot be read"
+}
+
+enter_namespace()
+{
+	local how=(unshare --net)
+
+	[ "$(id -u)" = 0 ] || how=(unshare --user --map-root-user --net)
+	"${how[@]}" true 2> /dev/null ||
+		die "this kernel grants no network namespace to user $(id -un): run it as root"
+	exec "${how[@]}" "$0" --inside "$@"
+}
+
+# Frames of type 0x88A4 only: no IPv6 chatter, no checksum or segmentation offload.
+make_wire()
+{
+	local nic
+
+	ip link add ecat0 type veth peer name ecsim0
+	for nic in ecat0 ecsim0; do
+		echo 1 > "/proc/sys/net/ipv6/conf/$nic/disable_ipv6" 2> /dev/null || true
+		if command -v ethtool > /dev/null; then
+			ethtool -K "$nic" rx off tx off sg off gso off gro off tso off > /dev/null 2>&1 || true
+		fi
+		ip link set "$nic" arp off multicast off up
+	done
+}
+
+declare -A pid=()
+
+# start NAME COMMAND...: in a session of its own, so that Ctrl-C reaches this script only; ended with
+# this script if it is killed.
+start()
+{
+	local name=$1
+
+	shift
+	setpriv --pdeathsig TERM setsid "$@" <&3 &
+	pid[$name]=$!
+}
+
+# stop NAME: end it by SIGTERM and wait. Its exit code is kept in failed if it is none of ours.
+stop()
+{
+	local name=$1 status=0
+
+	[ -n "${pid[$name]:-}" ] || return 0
+	kill -TERM "${pid[$name]}" 2> /dev/null || true
+	wait "${pid[$name]}" || status=$?
+	unset "pid[$name]"
+	case $status in
+	0 | 143) ;;
+	*)
+		note "$name ended with $status"
+		failed=1
+		;;
+	esac
+}
+
+failed=0
+interrupted=no
+
+end_in_order()
+{
+	stop view
+	stop timer
+	stop daemon
+	stop recorder
+	stop segment
+}
+
+clean_up()
+{
+	trap '' INT TERM
+	end_in_order
+	[ -z "${own_run_dir:-}" ] || rm -rf "$own_run_dir"
+}
+
+# Which of the children ended? Waits for the first.
+wait_for_end()
+{
+	local ended=
+
+	wait -n -p ended "${pid[@]}" || true
+	[ "$interrupted" = no ] || return 0
+	for name in "${!pid[@]}"; do
+		[ "${pid[$name]}" = "$ended" ] || continue
+		case $name in
+		timer | view) ;;
+		*)
+			note "$name ended by itself"
+			failed=1
+			;;
+		esac
+	done
+}
+
+run_inside()
+{
+	local set_options=(--set bus.interface=ecat0 --set "record.dir=$record")
+	local segment_options=(--interface ecsim0 --slaves "$slaves")
+
+	bin=${ECDAQ_BIN:-$root/build/stage/bin}
+	[ -z "$sii" ] || segment_options+=(--sii "$sii")
+	[ -z "$config" ] || set_options=(--config "$config" "${set_options[@]}")
+	if [ -z "${ECDAQ_RUN_DIR:-}" ]; then
+		own_run_dir=$(mktemp -d /dev/shm/ecdaq-run-XXXXXX)
+		export ECDAQ_RUN_DIR=$own_run_dir
+	fi
+	mkdir -p "$record" "$ECDAQ_RUN_DIR"
+	exec 3<&0
+	trap clean_up EXIT
+	trap 'interrupted=yes' INT TERM
+	make_wire
+	start segment "$bin/ecdaq-sim" "${segment_options[@]}"
+	start recorder "$bin/ecdaq-record" "${set_options[@]}"
+	start daemon "$bin/ecdaqd" "${set_options[@]}"
+	[ -z "$seconds" ] || start timer sleep "$seconds"
+	if [ "$json" = no ] && [ -t 1 ]; then
+		start view "$bin/ecdaq" top
+	fi
+	wait_for_end
+	end_in_order
+	if [ "$json" = yes ]; then
+		"$bin/ecdaq" status --json --summary || failed=1
+	else
+		"$bin/ecdaq" status --summary || failed=1
+	fi
+	exit "$failed"
+}
+
+parse_options "$@"
+check_options
+case $mode in
+check) ;;
+inside) run_inside ;;
+outside) enter_namespace "$@" ;;
+esac

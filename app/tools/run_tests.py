@@ -1,0 +1,359 @@
+# SPDX-License-Identifier: MIT
+"""Run groups of tests and add up what ctest, pytest and the fuzz targets report.
+
+Called by `build.sh test`, which has made the Python environment and named the groups. A group is a
+list of suites; a suite is one program that runs tests in one flavour of the build. The last line
+printed is "N passed, N failed, N skipped".
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import re
+import signal
+import subprocess
+import sys
+import time
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+BUILD = ROOT / "build"
+LOGS = BUILD / "test-logs"
+SUITE_SECONDS = 3000
+# What two threads share, and how they hand it over: these run under ThreadSanitizer.
+SHARED_STATE_TESTS = r"^(ring|line|board|handover|status|histogram)[._]"
+
+
+@dataclass
+class Outcome:
+    """What one suite, or all of them, reported."""
+
+    passed: int = 0
+    failures: list[str] = field(default_factory=list)
+    skips: list[str] = field(default_factory=list)
+    log: str = ""
+
+    @property
+    def ran(self) -> int:
+        return self.passed + len(self.failures)
+
+    def add(self, other: Outcome) -> None:
+        self.passed += other.passed
+        self.failures += other.failures
+        self.skips += other.skips
+
+    def totals(self) -> str:
+        return f"{self.passed} passed, {len(self.failures)} failed, {len(self.skips)} skipped"
+
+
+@dataclass(frozen=True)
+class Suite:
+    """One program that runs tests, in one flavour of the build."""
+
+    name: str
+    flavour: str
+    run: Callable[[Suite, argparse.Namespace], Outcome]
+    arguments: tuple[str, ...] = ()
+
+    @property
+    def build_dir(self) -> Path:
+        return BUILD / self.flavour
+
+    @property
+    def stage(self) -> Path:
+        return BUILD / "stage" if self.flavour == "release" else self.build_dir / "stage"
+
+
+def run_logged(command: Sequence[str | Path], log: Path, env: dict[str, str]) -> int:
+    """Run a command with its output in a file; ends it after SUITE_SECONDS with 124."""
+    log.parent.mkdir(parents=True, exist_ok=True)
+    with log.open("wb") as out:
+        process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=out,
+            stderr=out,
+            cwd=ROOT,
+            env=env,
+            start_new_session=True,
+        )
+        try:
+            return process.wait(SUITE_SECONDS)
+        except subprocess.TimeoutExpired:
+            end_group(process)
+            out.write(f"\nended after {SUITE_SECONDS} s\n".encode())
+            return 124
+        except BaseException:
+            end_group(process)
+            raise
+
+
+def end_group(process: subprocess.Popen[bytes]) -> None:
+    """End a suite with all that it started: it leads a process group of its own."""
+    os.killpg(process.pid, signal.SIGTERM)
+    try:
+        process.wait(20)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+def tail(text: str, lines: int) -> str:
+    return "\n".join(text.rstrip().splitlines()[-lines:])
+
+
+def environment(suite: Suite) -> dict[str, str]:
+    """What a test may rely on: where the programs, the build and the flavour are."""
+    return os.environ | {
+        "ECDAQ_BIN": str(suite.stage / "bin"),
+        "ECDAQ_STAGE": str(suite.stage),
+        "ECDAQ_BUILD": str(suite.build_dir),
+        "ECDAQ_FLAVOUR": suite.flavour,
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "ASAN_OPTIONS": "detect_leaks=1:strict_string_checks=1",
+        "UBSAN_OPTIONS": "print_stacktrace=1",
+        "TSAN_OPTIONS": "halt_on_error=1:second_deadlock_stack=1",
+    }
+
+
+def read_junit(path: Path, label: str) -> Outcome:
+    """Count the test cases of a JUnit file, as written by ctest or by pytest."""
+    outcome = Outcome()
+    for case in ET.parse(path).getroot().iter("testcase"):
+        where = case.get("classname", "")
+        name = case.get("name", "?")
+        if where and where != name:
+            name = f"{where}.{name}"
+        output = case.findtext("system-out") or ""
+        bad = [e for e in case if e.tag in ("failure", "error")]
+        skipped = case.find("skipped")
+        if bad:
+            text = output or bad[0].text or bad[0].get("message") or ""
+            outcome.failures.append(f"{label}: {name}\n{tail(text, 30)}")
+        elif skipped is not None:
+            why = skipped.get("message") or ""
+            if case.get("status") == "notrun" and why != "SKIP_RETURN_CODE=77":
+                outcome.failures.append(f"{label}: {name}\ncould not be run: {why}")
+                continue
+            said = re.search(r"^skipped: (.*)$", output, re.MULTILINE)
+            outcome.skips.append(f"{label}: {name}: {said.group(1) if said else why}")
+        else:
+            outcome.passed += 1
+    return outcome
+
+
+def finish(suite: Suite, junit: Path, log: Path, status: int, good: tuple[int, ...]) -> Outcome:
+    outcome = Outcome()
+    if junit.exists():
+        outcome = read_junit(junit, suite.name)
+    if status not in good and not outcome.failures:
+        text = log.read_text(errors="replace")
+        outcome.failures.append(f"{suite.name}: ended with {status}\n{tail(text, 30)}")
+    outcome.log = str(log.relative_to(ROOT))
+    return outcome
+
+
+def fixed_addresses() -> list[str]:
+    """ThreadSanitizer of gcc 12 cannot run where the kernel spreads addresses over 32 bits."""
+    wrapper = ["setarch", platform.machine(), "-R"]
+    works = subprocess.run([*wrapper, "true"], capture_output=True, check=False).returncode == 0
+    return wrapper if works else []
+
+
+def run_ctest(suite: Suite, options: argparse.Namespace) -> Outcome:
+    slug = suite.name.replace(" ", "-")
+    junit, log = LOGS / f"{slug}.xml", LOGS / f"{slug}.log"
+    junit.unlink(missing_ok=True)
+    command = fixed_addresses() if suite.flavour == "tsan" else []
+    command += ["ctest", "--test-dir", str(suite.build_dir), "--output-on-failure"]
+    command += ["--output-junit", str(junit), "--test-output-size-failed", "100000"]
+    command += ["-j", str(os.cpu_count() or 1), *suite.arguments]
+    if options.only and suite.flavour != "tsan":
+        command += ["-R", options.only]
+    status = run_logged(command, log, environment(suite))
+    return finish(suite, junit, log, status, (0, 8))
+
+
+def run_pytest(suite: Suite, options: argparse.Namespace) -> Outcome:
+    folder = ROOT / suite.arguments[0]
+    if not any(folder.glob("test_*.py")):
+        return Outcome()
+    slug = suite.name.replace(" ", "-")
+    junit, log = LOGS / f"{slug}.xml", LOGS / f"{slug}.log"
+    junit.unlink(missing_ok=True)
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-rs"]
+    command += [f"--junitxml={junit}", str(folder)]
+    if options.only:
+        command += ["-k", options.only]
+    status = run_logged(command, log, environment(suite))
+    return finish(suite, junit, log, status, (0, 1, 5))
+
+
+def run_fuzz_target(suite: Suite, target: Path, seconds: int) -> Outcome:
+    """The target's corpus must pass, then some seconds of search must find nothing.
+
+    The canary is the other way round: its planted fault must be found, or the search is blind.
+    """
+    outcome = Outcome()
+    name = target.name.removeprefix("fuzz_")
+    source = ROOT / "tests" / "fuzz" / name
+    found = suite.build_dir / "corpus" / name
+    artifacts = suite.build_dir / "artifacts" / name
+    for folder in (found, artifacts):
+        folder.mkdir(parents=True, exist_ok=True)
+    limits = ["-timeout=10", "-rss_limit_mb=2048", f"-artifact_prefix={artifacts}/"]
+    if (source / f"{name}.dict").exists():
+        limits.append(f"-dict={source / f'{name}.dict'}")
+    corpus = sorted((source / "corpus").glob("*"))
+    steps: list[tuple[str, list[str | Path], bool]] = [
+        ("corpus", [target, *limits, *corpus], False),
+        ("search", [target, *limits, f"-max_total_time={seconds}", found, source / "corpus"], False),
+    ]
+    if name == "canary":
+        steps = [("is found", [target, *limits, "-max_total_time=60"], True)]
+    elif not corpus:
+        outcome.failures.append(f"fuzz: {name}: tests/fuzz/{name}/corpus is empty")
+        return outcome
+    for step, command, must_fail in steps:
+        log = LOGS / f"fuzz-{name}-{step.replace(' ', '-')}.log"
+        status = run_logged(command, log, environment(suite))
+        if (status != 0) == must_fail:
+            outcome.passed += 1
+        else:
+            text = tail(log.read_text(errors="replace"), 40)
+            outcome.failures.append(f"fuzz: {name} {step}: ended with {status}\n{text}")
+    return outcome
+
+
+def run_fuzz(suite: Suite, options: argparse.Namespace) -> Outcome:
+    outcome = Outcome()
+    targets = [p for p in (suite.build_dir / "tests" / "fuzz").glob("**/fuzz_*") if p.is_file()]
+    for target in sorted(p for p in targets if os.access(p, os.X_OK)):
+        if options.only and not re.search(options.only, target.name):
+            continue
+        outcome.add(run_fuzz_target(suite, target, options.fuzz_seconds))
+    return outcome
+
+
+def ctest(group: str, flavour: str, *arguments: str) -> Suite:
+    return Suite(f"{group} {flavour}", flavour, run_ctest, ("-L", f"^{group}$", *arguments))
+
+
+def pytest(group: str, flavour: str) -> Suite:
+    return Suite(f"{group} python {flavour}", flavour, run_pytest, (f"tests/{group}",))
+
+
+# Fast groups first. Tests labelled "long" run in the release flavour only.
+GROUPS: dict[str, list[Suite]] = {
+    "unit": [
+        ctest("unit", "release"),
+        ctest("unit", "asan", "-LE", "^long$"),
+        ctest("unit", "tsan", "-R", SHARED_STATE_TESTS),
+    ],
+    "tidy": [pytest("tidy", "release")],
+    "cli": [
+        ctest("cli", "release"),
+        pytest("cli", "release"),
+        ctest("cli", "asan", "-LE", "^long$"),
+        pytest("cli", "asan"),
+    ],
+    "replay": [ctest("replay", "release"), pytest("replay", "release")],
+    "sim": [
+        ctest("sim", "release"),
+        pytest("sim", "release"),
+        ctest("sim", "asan", "-LE", "^long$"),
+    ],
+    "fuzz": [Suite("fuzz", "fuzz", run_fuzz)],
+    "live": [ctest("live", "release"), pytest("live", "release")],
+}
+LATER = ("dds", "control", "sync0", "recipes", "boot")
+
+
+class Builder:
+    """Builds each flavour when a suite first needs it, and remembers how that ended."""
+
+    def __init__(self) -> None:
+        self.failed: dict[str, str | None] = {}
+
+    def build(self, flavour: str) -> str | None:
+        """None, or the last lines of the failed build."""
+        if flavour not in self.failed:
+            started = time.monotonic()
+            log = LOGS / f"build-{flavour}.log"
+            script = ROOT / "app" / "tools" / "build-flavour.sh"
+            status = run_logged([script, flavour], log, dict(os.environ))
+            text = log.read_text(errors="replace")
+            self.failed[flavour] = None if status == 0 else tail(text, 40)
+            print(f"{'build ' + flavour:24} {time.monotonic() - started:7.1f} s", flush=True)
+        return self.failed[flavour]
+
+
+def run_group(group: str, builder: Builder, options: argparse.Namespace) -> Outcome:
+    total = Outcome()
+    for suite in GROUPS[group]:
+        problem = builder.build(suite.flavour)
+        started = time.monotonic()
+        if problem is not None:
+            outcome = Outcome(failures=[f"{suite.name}: the build failed\n{problem}"])
+        else:
+            outcome = suite.run(suite, options)
+        total.add(outcome)
+        if outcome.ran + len(outcome.skips) > 0:
+            spent = time.monotonic() - started
+            print(f"{suite.name:24} {spent:7.1f} s  {outcome.totals()}", flush=True)
+            for failure in outcome.failures:
+                print("FAILED " + failure.replace("\n", "\n    "), flush=True)
+        if outcome.failures and options.fail_fast:
+            return total
+    if total.ran == 0:
+        total.failures.append(f"{group}: the group ran no test")
+        print(f"FAILED {group}: the group ran no test", flush=True)
+    return total
+
+
+def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="build.sh test")
+    parser.add_argument("groups", nargs="*")
+    parser.add_argument("--keep-going", dest="fail_fast", action="store_false")
+    parser.add_argument("--fail-fast", dest="fail_fast", action="store_true")
+    parser.add_argument("--only", default="")
+    parser.add_argument(
+        "--fuzz-seconds", type=int, default=int(os.environ.get("ECDAQ_FUZZ_SECONDS", "5"))
+    )
+    parser.set_defaults(fail_fast=False)
+    return parser.parse_args(arguments)
+
+
+def main(arguments: Sequence[str]) -> int:
+    options = parse_arguments(arguments)
+    for group in options.groups:
+        if group not in GROUPS and group not in LATER:
+            known = " ".join([*GROUPS, *LATER])
+            print(f"build.sh: test: no group '{group}'; there are: {known}", file=sys.stderr)
+            return 2
+    total = Outcome()
+    for group in [g for g in options.groups if g in LATER]:
+        total.failures.append(f"{group}: not there yet")
+        print(f"FAILED {group}: not there yet")
+    wanted = [g for g in GROUPS if g in options.groups or not options.groups]
+    builder = Builder()
+    for group in wanted:
+        total.add(run_group(group, builder, options))
+        if total.failures and options.fail_fast:
+            break
+    if total.skips:
+        print("\nskipped, and why:\n  " + "\n  ".join(total.skips))
+    if total.failures:
+        heads = [failure.splitlines()[0] for failure in total.failures]
+        print("\nfailed:\n  " + "\n  ".join(heads) + f"\nlogs: {LOGS.relative_to(ROOT)}/")
+    print(f"\n{total.totals()}")
+    return 1 if total.failures or total.ran == 0 else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

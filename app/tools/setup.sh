@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: MIT
+# shellcheck shell=sh
+# Sourced by build.sh and the scripts beside this file: what has to be on the machine, the Python
+# environment, the SOEM sources, and the flavours of the build. Expects $root, the top of the tree.
+
+: "${root:?set it to the top of the tree}"
+cache=${XDG_CACHE_HOME:-$HOME/.cache}/ecdaq
+
+die()
+{
+	printf 'build.sh: %s\n' "$*" >&2
+	exit 1
+}
+
+note()
+{
+	printf -- '-- %s\n' "$*" >&2
+}
+
+# A Python of 3.11 or newer that can make environments; the machine's own if the first on PATH
+# (which may be anybody's) cannot.
+find_python()
+{
+	for candidate in ${PYTHON:-} python3 /usr/bin/python3; do
+		if "$candidate" -c 'import sys, ensurepip, venv; sys.exit(sys.version_info < (3, 11))' \
+			> /dev/null 2>&1; then
+			printf '%s\n' "$candidate"
+			return 0
+		fi
+	done
+	return 1
+}
+
+is_present()
+{
+	case $1 in
+	cmd:*) command -v "${1#cmd:}" > /dev/null 2>&1 ;;
+	hdr:*) printf '#include <%s>\n' "${1#hdr:}" | gcc -E - > /dev/null 2>&1 ;;
+	pymod:*) find_python > /dev/null ;;
+	fuzzer)
+		printf 'int LLVMFuzzerTestOneInput(const char *d, unsigned long n) { return !d || !n; }\n' |
+			clang -x c -fsanitize=fuzzer -o /dev/null - > /dev/null 2>&1
+		;;
+	*) die "app/tools/packages.txt: unknown check '$1'" ;;
+	esac
+}
+
+# Lines "PACKAGE WHY" of what is missing for the purposes given.
+missing_packages()
+{
+	grep -v '^#' "$root/app/tools/packages.txt" | while read -r package purpose check why; do
+		case " $* " in
+		*" $purpose "*) is_present "$check" || printf '%s\t%s\n' "$package" "$why" ;;
+		esac
+	done
+}
+
+is_supported_debian()
+{
+	[ -r /etc/os-release ] || return 1
+	# shellcheck disable=SC1091 # a file of the machine
+	( . /etc/os-release && [ "${ID:-}" = debian ] &&
+		{ [ "${VERSION_ID:-}" = 12 ] || [ "${VERSION_ID:-}" = 13 ]; } )
+}
+
+as_root()
+{
+	if [ "$(id -u)" = 0 ]; then
+		"$@"
+	elif [ -t 0 ]; then
+		sudo "$@"
+	else
+		sudo -n "$@"
+	fi
+}
+
+say_missing()
+{
+	printf 'build.sh: %s; missing:\n' "$2" >&2
+	printf '%s\n' "$1" | while read -r package why; do
+		printf '  %-16s %s\n' "$package" "$why" >&2
+	done
+	exit 1
+}
+
+# need_packages PURPOSE...: install what is missing, or say plainly what it is.
+need_packages()
+{
+	missing=$(missing_packages "$@")
+	[ -n "$missing" ] || return 0
+	is_supported_debian ||
+		say_missing "$missing" "this is not Debian 12 or 13, install the like of these yourself"
+	if [ "$(id -u)" != 0 ] && ! command -v sudo > /dev/null 2>&1; then
+		say_missing "$missing" "neither root nor sudo, have these Debian packages installed"
+	fi
+	names=$(printf '%s\n' "$missing" | cut -f 1 | tr '\n' ' ')
+	note "installing $names"
+	log=$(mktemp)
+	# shellcheck disable=SC2086 # a list of names
+	if ! { as_root apt-get update -q && as_root env DEBIAN_FRONTEND=noninteractive apt-get install \
+		-q -y --no-install-recommends -o DPkg::Lock::Timeout=300 $names; } > "$log" 2>&1; then
+		tail -n 5 "$log" >&2
+		rm -f "$log"
+		say_missing "$missing" "apt-get failed (its last lines stand above)"
+	fi
+	rm -f "$log"
+	missing=$(missing_packages "$@")
+	[ -z "$missing" ] || say_missing "$missing" "installed, and still not found"
+}
+
+# need_venv: sets $venv to an environment with tests/requirements.txt, made once for its contents.
+need_venv()
+{
+	base_python=$(find_python) || die "no Python 3.11 or newer with venv and ensurepip"
+	key=$( { "$base_python" -c 'import sys; print(sys.version, sys.base_prefix)'
+		cat "$root/tests/requirements.txt"; } | sha256sum | cut -c 1-12)
+	venv=$cache/venv-$key
+	if [ ! -f "$venv/.complete" ]; then
+		mkdir -p "$cache"
+		(
+			flock 9
+			[ -f "$venv/.complete" ] || make_venv
+		) 9> "$cache/venv.lock" || exit 1
+	fi
+	export PYTHON="$venv/bin/python"
+	PATH=$venv/bin:$PATH
+}
+
+make_venv()
+{
+	note "making the Python environment $venv"
+	rm -rf "$venv"
+	"$base_python" -m venv "$venv" || die "cannot make $venv"
+	"$venv/bin/python" -m pip install --quiet --disable-pip-version-check \
+		--requirement "$root/tests/requirements.txt" ||
+		die "pip cannot install tests/requirements.txt (its reason stands above)"
+	touch "$venv/.complete"
+}
+
+need_soem()
+{
+	"$root/app/third_party/fetch-soem.sh" || exit 1
+}
+
+# configure_flavour NAME: sets $build_dir and configures it.
+configure_flavour()
+{
+	build_dir=$root/build/$1
+	compiler=gcc
+	flags='-O2 -g'
+	set -- "$1" -DCMAKE_BUILD_TYPE=Release
+	case $1 in
+	release) ;;
+	asan)
+		flags='-O1 -g'
+		set -- "$@" -DECDAQ_SANITIZE=address,undefined
+		;;
+	tsan)
+		flags='-O1 -g'
+		set -- "$@" -DECDAQ_SANITIZE=thread
+		;;
+	fuzz)
+		compiler=clang
+		flags='-O1 -g'
+		set -- "$@" -DECDAQ_FUZZ=ON -DECDAQ_SANITIZE=address,undefined
+		;;
+	clang) compiler=clang ;;
+	*) die "no flavour '$1': release, asan, tsan, fuzz or clang" ;;
+	esac
+	shift
+	if command -v ccache > /dev/null 2>&1; then
+		set -- "$@" -DCMAKE_C_COMPILER_LAUNCHER=ccache
+	fi
+	# Assertions stay on in every flavour: the flags carry no NDEBUG.
+	mkdir -p "$build_dir"
+	if ! cmake -S "$root/app" -B "$build_dir" -G Ninja -DCMAKE_C_COMPILER="$compiler" \
+		-DCMAKE_C_FLAGS_RELEASE="$flags" "$@" > "$build_dir/configure.log" 2>&1; then
+		cat "$build_dir/configure.log" >&2
+		die "cannot configure $build_dir (cmake's reason stands above)"
+	fi
+}
+
+# build_flavour NAME: configure, build, install into $stage.
+build_flavour()
+{
+	configure_flavour "$1"
+	cmake --build "$build_dir" -- --quiet >&2
+	case $1 in
+	release) stage=$root/build/stage ;;
+	*) stage=$build_dir/stage ;;
+	esac
+	cmake --install "$build_dir" --prefix "$stage" > "$build_dir/install.log"
+}
