@@ -49,11 +49,11 @@ function(ecdaq_program name)
 	install(TARGETS ${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 endfunction()
 
-# ecdaq_test(GROUP NAME SOURCES a.c [DEPENDS module...] [LIBRARIES lib...] [TIMEOUT s])
+# ecdaq_test(GROUP NAME SOURCES a.c [DEPENDS module...] [LIBRARIES lib...] [TIMEOUT s] [LABELS long])
 # An executable GROUP_NAME on tests/harness; every TEST(module, sentence) in its sources becomes
-# one ctest test "module.sentence" with label GROUP.
+# one ctest test "module.sentence" with label GROUP. LABELS long: not under the sanitizers.
 function(ecdaq_test group name)
-	cmake_parse_arguments(T "" "TIMEOUT" "SOURCES;DEPENDS;LIBRARIES" ${ARGN})
+	cmake_parse_arguments(T "" "TIMEOUT" "SOURCES;DEPENDS;LIBRARIES;LABELS" ${ARGN})
 	set(exe ${group}_${name})
 	add_executable(${exe} ${T_SOURCES})
 	target_link_libraries(${exe} PRIVATE ecdaq_options ecdaq_harness)
@@ -70,7 +70,7 @@ function(ecdaq_test group name)
 		foreach(line ${lines})
 			string(REGEX REPLACE "^TEST\\(([a-z0-9_]+), *([a-z0-9_]+)\\).*" "\\1.\\2" full "${line}")
 			add_test(NAME ${full} COMMAND ${exe} ${full})
-			set_tests_properties(${full} PROPERTIES LABELS ${group} TIMEOUT ${T_TIMEOUT}
+			set_tests_properties(${full} PROPERTIES LABELS "${group};${T_LABELS}" TIMEOUT ${T_TIMEOUT}
 				SKIP_RETURN_CODE 77)
 		endforeach()
 	endforeach()

@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: MIT
+# What others use, beside the programs: the library and headers with which a user's own program reads
+# the rings (pkg-config name: ecdaq), the licence texts, and what SOEM's licence asks to hand on.
+
+# The include paths of the headers are those of the source tree: "base/ring.h", "image/image.h".
+add_library(ecdaq_client STATIC $<TARGET_OBJECTS:ecdaq_base> $<TARGET_OBJECTS:ecdaq_image>)
+set_target_properties(ecdaq_client PROPERTIES OUTPUT_NAME ecdaq LINKER_LANGUAGE C)
+install(TARGETS ecdaq_client ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(FILES base/event.h base/ring.h base/sample.h base/timemap.h
+	DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq/base)
+install(FILES image/image.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq/image)
+
+file(RELATIVE_PATH ECDAQ_PC_TO_PREFIX "/${CMAKE_INSTALL_LIBDIR}/pkgconfig" "/")
+configure_file(cmake/ecdaq.pc.in ecdaq.pc @ONLY)
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/ecdaq.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+
+install(DIRECTORY examples/ DESTINATION ${CMAKE_INSTALL_DATADIR}/ecdaq/examples)
+install(FILES ../LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/ecdaq/licenses)
+install(DIRECTORY ../LICENSES/ DESTINATION ${CMAKE_INSTALL_DATADIR}/ecdaq/licenses)
+install(FILES third_party/soem.lock third_party/fetch-soem.sh
+	DESTINATION ${CMAKE_INSTALL_DATADIR}/ecdaq/soem)
+install(DIRECTORY third_party/patches DESTINATION ${CMAKE_INSTALL_DATADIR}/ecdaq/soem)
