@@ -49,6 +49,19 @@ enum event_severity event_severity(uint16_t id)
 	return id < EVENT_COUNT ? kinds[id].severity : EVENT_ERROR;
 }
 
+const char *event_rt_to_str(uint32_t which)
+{
+	static const char *const names[EVENT_RT_COUNT] = {
+		[EVENT_RT_PRIORITY] = "real-time priority",
+		[EVENT_RT_CPU] = "core of the cycle thread",
+		[EVENT_RT_MEMORY] = "memory lock",
+		[EVENT_RT_DMA_LATENCY] = "CPU sleep limit",
+		[EVENT_RT_RING_DISK] = "ring in memory",
+	};
+
+	return which < EVENT_RT_COUNT ? names[which] : "unknown";
+}
+
 static const char *al_name(int32_t state)
 {
 	switch (state & 0x0f) {
@@ -126,16 +139,16 @@ int event_format(const struct event *ev, char *buf, size_t buf_len)
 	case EVENT_SLAVE_BACK:
 		return snprintf(buf, buf_len, "slave %u: back", slave);
 	case EVENT_OUTPUT_SET:
-		return snprintf(buf, buf_len, "slave %u: output channel %" PRId64 " set", slave,
-				ev->value);
+		return snprintf(buf, buf_len, "slave %u: output channel %" PRId64
+				" set by user %" PRId32, slave, ev->value, a[1]);
 	case EVENT_OUTPUT_FAIL_SAFE:
 		return snprintf(buf, buf_len, "outputs go to fail-safe");
 	case EVENT_COMMAND_REFUSED:
-		return snprintf(buf, buf_len, "command refused, channel %" PRId64 ", error %" PRId32,
-				ev->value, a[0]);
+		return snprintf(buf, buf_len, "command of user %" PRId32 " refused, channel %" PRId64
+				", error %" PRId32, a[1], ev->value, a[0]);
 	case EVENT_RT_DEGRADED:
-		return snprintf(buf, buf_len, "real-time setting %" PRId32 " failed, error %" PRId32,
-				a[0], a[1]);
+		return snprintf(buf, buf_len, "degraded: no %s, error %" PRId32,
+				event_rt_to_str((uint32_t)a[0]), a[1]);
 	case EVENT_SDO_ABORT:
 		return snprintf(buf, buf_len,
 				"slave %u: SDO 0x%04" PRIx32 ":%02" PRIx32 " abort 0x%08" PRIx64, slave,

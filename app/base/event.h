@@ -29,9 +29,9 @@ enum event_id {
 	EVENT_SLAVE_STATE,       /* slave; arg: AL state from, to; value: AL status code */
 	EVENT_SLAVE_LOST,        /* slave */
 	EVENT_SLAVE_BACK,        /* slave */
-	EVENT_OUTPUT_SET,        /* slave; value: channel index; arg: writer */
+	EVENT_OUTPUT_SET,        /* slave; value: channel index; arg: writer, user id */
 	EVENT_OUTPUT_FAIL_SAFE,  /* arg: reason */
-	EVENT_COMMAND_REFUSED,   /* value: channel index or -1; arg: errno */
+	EVENT_COMMAND_REFUSED,   /* value: channel index or -1; arg: errno, user id */
 	EVENT_RT_DEGRADED,       /* arg: which of enum event_rt, errno */
 	EVENT_SDO_ABORT,         /* slave; arg: index << 8 | subindex; value: abort code */
 	EVENT_LINK,              /* arg: 1 up, 0 down */
@@ -40,6 +40,16 @@ enum event_id {
 	EVENT_RECORD_DISK_FULL,  /* value: bytes free */
 	EVENT_RECORD_RESUMED,    /* value: cycle */
 	EVENT_COUNT,
+};
+
+/* What ecdaqd asked of the machine and did not get (arg[0] of EVENT_RT_DEGRADED; bit in rt_degraded). */
+enum event_rt {
+	EVENT_RT_PRIORITY,    /* SCHED_FIFO */
+	EVENT_RT_CPU,         /* the cycle thread on its own core */
+	EVENT_RT_MEMORY,      /* mlockall */
+	EVENT_RT_DMA_LATENCY, /* /dev/cpu_dma_latency */
+	EVENT_RT_RING_DISK,   /* the run directory is not on a tmpfs */
+	EVENT_RT_COUNT,
 };
 
 enum event_severity { EVENT_INFO, EVENT_NOTICE, EVENT_WARNING, EVENT_ERROR };
@@ -62,6 +72,8 @@ static_assert(sizeof(struct event) == 48, "part of the ring's format");
 /** The machine-readable name, "frame_lost"; "unknown" for a number out of range. */
 const char *event_name(uint16_t id);
 enum event_severity event_severity(uint16_t id);
+/** "real-time priority", "core of the cycle thread", ...; "unknown" for a number out of range. */
+const char *event_rt_to_str(uint32_t which);
 /** One line of text without a newline. Returns its length as snprintf does. */
 int event_format(const struct event *ev, char *buf, size_t buf_len);
 

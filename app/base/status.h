@@ -36,7 +36,7 @@ struct cycle_stats {
 	_Atomic uint64_t cycle_number;    /* of the newest sample */
 	_Atomic uint64_t frames_sent;
 	_Atomic uint64_t frames_lost;     /* not back before the deadline, whether they came later or not */
-	_Atomic uint64_t frames_late;     /* of those: came in a later cycle, thrown away */
+	_Atomic uint64_t frames_late;     /* came in a later cycle, or passed the slaves outside its window: not taken */
 	_Atomic uint64_t frames_doubled;  /* came a second time, thrown away */
 	_Atomic uint64_t frames_foreign;  /* not ours, or damaged, thrown away */
 	_Atomic uint64_t wkc_low;         /* cycles with a short working counter */

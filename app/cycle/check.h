@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * Is the sample of each slave good? It is, if its frame was fresh and its conversion counter went on by
+ * as many as there were SYNC0 edges since the last fresh one. Context: cycle thread, RT-safe.
+ */
+#ifndef CYCLE_CHECK_H
+#define CYCLE_CHECK_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/limits.h"
+#include "base/sample.h"
+#include "config/config.h"
+
+struct check_slave {
+	const struct channel *counter; /* NULL: it has none */
+	int is_oneshot;                /* the counter goes on only when a shot was armed */
+	int has_last;
+	uint64_t last;
+	uint64_t last_cycle;
+};
+
+struct check {
+	struct check_slave slave[LIMIT_SLAVES];
+	size_t slave_count;
+};
+
+/* What was wrong with one slave's counter. */
+struct check_fault {
+	uint16_t slave_pos;
+	uint64_t seen;
+	uint64_t expected;
+};
+
+void check_init(struct check *check, const struct config *cfg, const struct slave_info *slaves,
+		size_t slave_count, const struct channel *channels);
+/** Take the next fresh sample as it is: entering OP, or after one that was wrong. */
+void check_restart(struct check *check);
+/**
+ * Judge a fresh image of @cycle. Returns a bit for each bad slave; the first of them is described in
+ * @ret_fault.
+ */
+uint64_t check_image(struct check *check, const uint8_t *image, uint64_t cycle,
+		     struct check_fault *ret_fault);
+
+#endif

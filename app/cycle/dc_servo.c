@@ -1,0 +1,119 @@
+/* SPDX-License-Identifier: MIT */
+#include "cycle/dc_servo.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "base/clock.h"
+
+/* Two crystals of +-100 ppm against each other, and some room. */
+#define INTEGRAL_LIMIT_PPM 300.0
+#define FILTER_SHARE (1.0 / 16.0)
+
+enum {
+	LOSS_CYCLES = 200,  /* so long out of the window, far off or without a measurement is lost */
+	LEAK_CYCLES = 2,    /* what one cycle in the wrong place takes back */
+	CLAMP_LIMITS = 5,   /* one frame counts for at most so many lock limits */
+};
+
+void dc_servo_init(struct dc_servo *servo, const struct dc_servo_spec *spec)
+{
+	*servo = (struct dc_servo){ .spec = *spec, .state = DC_ACQUIRING };
+}
+
+static double clamp(double v, double limit)
+{
+	return fmax(-limit, fmin(limit, v));
+}
+
+/* Leaky: one cycle in the right place counts one up, one in the wrong place LEAK_CYCLES down. */
+static uint32_t leak(uint32_t count, int is_in)
+{
+	if (is_in) {
+		return count + 1;
+	}
+	return count > LEAK_CYCLES ? count - LEAK_CYCLES : 0;
+}
+
+static struct dc_servo_result apply(struct dc_servo *servo, double error_ns, double correction_ns)
+{
+	double whole;
+
+	servo->remainder_ns += correction_ns;
+	whole = floor(servo->remainder_ns);
+	servo->remainder_ns -= whole;
+	return (struct dc_servo_result){ .error_ns = (int64_t)error_ns,
+					 .correction_ns = (int64_t)whole };
+}
+
+/* Deadlines only ever move back in a jump: moving forward could land in the past. */
+static struct dc_servo_result jump(struct dc_servo *servo, int64_t error_ns)
+{
+	servo->has_jumped = 1;
+	servo->filtered_ns = 0;
+	servo->far_off = 0;
+	servo->in_window = 0;
+	return (struct dc_servo_result){
+		.error_ns = error_ns,
+		.correction_ns = mod_floor(-error_ns, servo->spec.period_ns),
+	};
+}
+
+/* Lock is won by the smoothed error, which one wild frame does not move, and lost by the raw one. */
+static void judge(struct dc_servo *servo, int64_t error_ns)
+{
+	const struct dc_servo_spec *spec = &servo->spec;
+
+	servo->in_window =
+		leak(servo->in_window, fabs(servo->filtered_ns) < (double)spec->lock_limit_ns);
+	servo->out_window = leak(servo->out_window, llabs(error_ns) > spec->unlock_limit_ns);
+	if (servo->state != DC_LOCKED && servo->in_window >= spec->lock_cycles) {
+		servo->state = DC_LOCKED;
+		servo->out_window = 0;
+	} else if (servo->state == DC_LOCKED && servo->out_window >= LOSS_CYCLES) {
+		servo->state = DC_LOST;
+		servo->in_window = 0;
+	}
+}
+
+struct dc_servo_result dc_servo_update(struct dc_servo *servo, int64_t frame_dc_ns,
+				       int64_t send_latency_ns)
+{
+	const struct dc_servo_spec *spec = &servo->spec;
+	int64_t error_ns = fold_ns(frame_dc_ns - send_latency_ns - spec->set_point_ns, spec->period_ns);
+	double clamp_ns = (double)(CLAMP_LIMITS * spec->lock_limit_ns);
+	double used_ns = clamp((double)error_ns, clamp_ns);
+	double integral_limit_ns = INTEGRAL_LIMIT_PPM * 1e-6 * (double)spec->period_ns;
+	double correction_ns;
+
+	servo->coasted = 0;
+	if (!servo->has_jumped) {
+		return jump(servo, error_ns);
+	}
+	servo->far_off = leak(servo->far_off, llabs(error_ns) > spec->period_ns / 8);
+	if (servo->far_off >= LOSS_CYCLES) {
+		servo->state = servo->state == DC_LOCKED ? DC_LOST : servo->state;
+		return jump(servo, error_ns);
+	}
+	servo->filtered_ns += FILTER_SHARE * (used_ns - servo->filtered_ns);
+	/* A clamped error says where to go, not how fast the clocks differ. */
+	if (fabs((double)error_ns) < clamp_ns) {
+		servo->integral_ns =
+			clamp(servo->integral_ns - spec->ki * used_ns, integral_limit_ns);
+	}
+	judge(servo, error_ns);
+	correction_ns = clamp(servo->integral_ns - spec->kp * used_ns, (double)spec->slew_ns);
+	return apply(servo, (double)error_ns, correction_ns);
+}
+
+struct dc_servo_result dc_servo_coast(struct dc_servo *servo)
+{
+	if (servo->coasted < LOSS_CYCLES) {
+		servo->coasted++;
+	} else if (servo->state == DC_LOCKED) {
+		servo->state = DC_LOST;
+		servo->in_window = 0;
+		servo->has_jumped = 0;
+	}
+	return apply(servo, 0, servo->has_jumped ? servo->integral_ns : 0);
+}

@@ -1,0 +1,150 @@
+/* SPDX-License-Identifier: MIT */
+#include "cycle/outputs.h"
+
+#include <errno.h>
+#include <float.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "image/image.h"
+
+static const enum cycle_writer writer_of[] = {
+	[CONFIG_OWNER_LOCAL] = CYCLE_WRITER_LOCAL,
+	[CONFIG_OWNER_PROGRAM] = CYCLE_WRITER_PROGRAM,
+	[CONFIG_OWNER_REMOTE] = CYCLE_WRITER_REMOTE,
+};
+
+static int refuse(char *error, size_t error_bytes, const struct config *cfg,
+		  const struct config_output *wanted, const char *why)
+{
+	snprintf(error, error_bytes, "%s:%d: outputs: %s: %s",
+		 cfg->path[0] != '\0' ? cfg->path : "configuration", wanted->line, wanted->channel, why);
+	return -EINVAL;
+}
+
+static struct output *find(struct outputs *outputs, const char *name)
+{
+	for (size_t i = 0; i < outputs->output_count; i++) {
+		if (strncmp(outputs->output[i].channel->name, name, LIMIT_NAME_BYTES) == 0) {
+			return &outputs->output[i];
+		}
+	}
+	return NULL;
+}
+
+static int configure(struct outputs *outputs, const struct cycle_spec *spec,
+		     const struct config_output *wanted, char *error, size_t error_bytes)
+{
+	struct output *out = find(outputs, wanted->channel);
+
+	if (out == NULL) {
+		return refuse(error, error_bytes, spec->cfg, wanted, "no such output channel");
+	}
+	if (image_physical_to_raw(out->channel, wanted->fail_safe, &out->fail_safe_raw) < 0) {
+		return refuse(error, error_bytes, spec->cfg, wanted,
+			      "the channel cannot hold its fail_safe value");
+	}
+	out->min = wanted->min;
+	out->max = wanted->max;
+	/* A limit the channel cannot reach is none. */
+	if (image_physical_to_raw(out->channel, wanted->min, &out->min_raw) < 0) {
+		out->min = -DBL_MAX;
+	}
+	if (image_physical_to_raw(out->channel, wanted->max, &out->max_raw) < 0) {
+		out->max = DBL_MAX;
+	}
+	out->owner = writer_of[wanted->owner];
+	out->timeout_cycles = (uint64_t)(wanted->timeout_ns / spec->cfg->cycle_period_ns);
+	return 0;
+}
+
+int outputs_init(struct outputs *outputs, const struct cycle_spec *spec, char *error,
+		 size_t error_bytes)
+{
+	memset(outputs, 0, sizeof(*outputs));
+	for (size_t i = 0; i < spec->channel_count; i++) {
+		if (spec->channels[i].direction != CHANNEL_OUTPUT) {
+			continue;
+		}
+		if (outputs->output_count == BOARD_OUTPUTS) {
+			snprintf(error, error_bytes, "more than BOARD_OUTPUTS = %d output channels",
+				 BOARD_OUTPUTS);
+			return -E2BIG;
+		}
+		outputs->output[outputs->output_count++] = (struct output){
+			.channel = &spec->channels[i],
+			.owner = CYCLE_WRITER_LOCAL,
+			.min = -DBL_MAX,
+			.max = DBL_MAX,
+		};
+	}
+	memcpy(outputs->board, spec->boards, sizeof(outputs->board));
+	for (size_t i = 0; i < spec->cfg->output_count; i++) {
+		int r = configure(outputs, spec, &spec->cfg->output[i], error, error_bytes);
+
+		if (r < 0) {
+			return r;
+		}
+	}
+	return 0;
+}
+
+static void take_boards(struct outputs *outputs)
+{
+	for (unsigned w = 0; w < CYCLE_WRITERS; w++) {
+		struct board *board = outputs->board[w];
+		uint64_t beat;
+
+		if (board == NULL) {
+			continue;
+		}
+		beat = atomic_load_explicit(&board->beat, memory_order_relaxed);
+		outputs->silent_cycles[w] =
+			beat == outputs->beat[w] ? outputs->silent_cycles[w] + 1 : 0;
+		outputs->beat[w] = beat;
+		if (board_take(board, (unsigned)outputs->output_count, &outputs->set[w])) {
+			outputs->silent_cycles[w] = 0;
+		}
+	}
+}
+
+static uint64_t limited(const struct output *out, uint64_t raw)
+{
+	double physical = image_raw_to_physical(out->channel, raw);
+
+	if (physical < out->min) {
+		return out->min_raw;
+	}
+	return physical > out->max ? out->max_raw : raw;
+}
+
+unsigned outputs_choose(struct outputs *outputs, uint8_t *image, int is_live)
+{
+	unsigned timed_out = 0;
+
+	take_boards(outputs);
+	for (size_t i = 0; i < outputs->output_count; i++) {
+		const struct output *out = &outputs->output[i];
+		const struct board_set *set = &outputs->set[out->owner];
+		int is_silent = out->timeout_cycles > 0 &&
+				outputs->silent_cycles[out->owner] > out->timeout_cycles;
+		uint64_t raw = out->fail_safe_raw;
+
+		if (is_live && set->is_set[i] && !is_silent) {
+			raw = limited(out, set->raw[i]);
+		}
+		timed_out += is_live && set->is_set[i] && is_silent;
+		image_set_raw(image, out->channel, raw);
+	}
+	return timed_out;
+}
+
+void outputs_sent(struct outputs *outputs, uint64_t cycle)
+{
+	for (unsigned w = 0; w < CYCLE_WRITERS; w++) {
+		if (outputs->board[w] != NULL && outputs->set[w].sequence != outputs->answered[w]) {
+			outputs->answered[w] = outputs->set[w].sequence;
+			board_answer(outputs->board[w], outputs->answered[w], cycle);
+		}
+	}
+}

@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: MIT */
+#include "base/board.h"
+
+#include <pthread.h>
+
+#include "harness/test.h"
+
+static struct board board;
+static struct board_set set;
+
+TEST(board, a_set_is_taken_once_and_only_when_it_is_whole)
+{
+	uint64_t sequence;
+
+	board_init(&board);
+	memset(&set, 0, sizeof(set));
+	CHECK(!board_take(&board, 8, &set));
+	board_begin(&board);
+	board_put(&board, 3, 77);
+	CHECK(!board_take(&board, 8, &set));
+	sequence = board_commit(&board);
+	CHECK(board_take(&board, 8, &set));
+	CHECK_EQ(set.raw[3], 77);
+	CHECK_EQ(set.is_set[3], 1);
+	CHECK_EQ(set.is_set[2], 0);
+	CHECK_EQ(set.sequence, sequence);
+	CHECK(!board_take(&board, 8, &set));
+	board_answer(&board, sequence, 1234);
+	CHECK_EQ(board.taken_sequence, sequence);
+	CHECK_EQ(board.taken_cycle, 1234);
+}
+
+TEST(board, an_output_beyond_the_page_is_not_written)
+{
+	board_init(&board);
+	memset(&set, 0, sizeof(set));
+	board_begin(&board);
+	board_put(&board, BOARD_OUTPUTS, 1);
+	board_commit(&board);
+	CHECK(board_take(&board, BOARD_OUTPUTS, &set));
+	CHECK_EQ(set.is_set[BOARD_OUTPUTS - 1], 0);
+}
+
+static void *write_sets(void *arg)
+{
+	(void)arg;
+	for (uint64_t i = 1; i <= 50000; i++) {
+		board_begin(&board);
+		for (unsigned k = 0; k < 16; k++) {
+			board_put(&board, k, i * 16 + k);
+		}
+		board_commit(&board);
+	}
+	return NULL;
+}
+
+TEST(board, the_cycle_never_takes_half_a_set)
+{
+	pthread_t thread;
+	uint64_t taken = 0;
+
+	board_init(&board);
+	memset(&set, 0, sizeof(set));
+	CHECK_EQ(pthread_create(&thread, NULL, write_sets, NULL), 0);
+	while (set.sequence < 100000) {
+		if (board_take(&board, 16, &set)) {
+			for (unsigned k = 0; k < 16; k++) {
+				CHECK_EQ(set.raw[k], set.raw[0] + k);
+			}
+			taken++;
+		}
+	}
+	pthread_join(thread, NULL);
+	CHECK(taken > 0);
+	CHECK_EQ(set.raw[0], 50000 * 16);
+}

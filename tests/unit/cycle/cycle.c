@@ -1,0 +1,443 @@
+/* SPDX-License-Identifier: MIT */
+/* The whole cycle against a scripted exchange: what it does with what the bus says. */
+#include "cycle/cycle.h"
+
+#include <unistd.h>
+
+#include "base/event.h"
+#include "harness/test.h"
+
+#define PERIOD_NS 1000000
+
+/* Image: output byte, then a 16-bit counter of each of two slaves. */
+enum { IMAGE_BYTES = 5, OUTPUT_BYTES = 1 };
+
+static struct {
+	mono_t now;
+	int64_t late_ns;          /* of the next wake */
+	uint16_t counter[2];
+	enum exchange_status status;
+	int64_t dc_offset_ns;     /* DC time minus host time */
+	int64_t transit_ns;
+	unsigned late;
+	unsigned doubled;
+	uint8_t seen_output;
+	uint64_t conversions_from_dc; /* 1: counters follow the DC time as real slaves do */
+} world;
+
+static struct cycle_stats stats;
+static struct config cfg;
+static struct board board;
+
+struct exchange_result exchange_run(struct exchange *ex, uint8_t *image, mono_t deadline)
+{
+	struct exchange_result res = {
+		.status = world.status,
+		.wkc = world.status == EXCHANGE_OK ? 4 : 0,
+		.wkc_expected = 4,
+		.sent = world.now,
+		.round_trip = { world.status == EXCHANGE_NO_FRAME ? -1 : world.transit_ns },
+		.late = world.late,
+		.late_by = world.late,
+		.doubled = world.doubled,
+		.dc_diff_ns = -1,
+	};
+
+	(void)ex;
+	world.seen_output = image[0];
+	if (world.status == EXCHANGE_NO_FRAME) {
+		world.now = deadline;
+		return res;
+	}
+	world.now.ns += world.transit_ns;
+	res.dc_time_ns = world.now.ns + world.dc_offset_ns;
+	if (world.conversions_from_dc) {
+		world.counter[0] = (uint16_t)(res.dc_time_ns / PERIOD_NS);
+		world.counter[1] = (uint16_t)(world.counter[0] + 100);
+	}
+	if (world.status == EXCHANGE_OK) {
+		image[1] = (uint8_t)world.counter[0];
+		image[2] = (uint8_t)(world.counter[0] >> 8);
+		image[3] = (uint8_t)world.counter[1];
+		image[4] = (uint8_t)(world.counter[1] >> 8);
+	}
+	return res;
+}
+
+int exchange_ride(struct exchange *ex, mono_t deadline)
+{
+	(void)ex;
+	(void)deadline;
+	return 0;
+}
+
+static mono_t world_now(void *ctx)
+{
+	(void)ctx;
+	return world.now;
+}
+
+static int64_t world_tai(void *ctx)
+{
+	(void)ctx;
+	return world.now.ns;
+}
+
+static int world_sleep(void *ctx, mono_t deadline)
+{
+	(void)ctx;
+	if (world.now.ns < deadline.ns) {
+		world.now = deadline;
+	}
+	world.now.ns += world.late_ns;
+	world.late_ns = 0;
+	return 0;
+}
+
+static const struct channel channels[] = {
+	{ .name = "a.led", .direction = CHANNEL_OUTPUT, .type = CHANNEL_BOOL, .bit_len = 1, .scale = 1 },
+	{ .name = "a.counter", .type = CHANNEL_UINT, .bit_len = 16, .bit_offset = 8, .scale = 1 },
+	{ .name = "b.counter", .type = CHANNEL_UINT, .bit_len = 16, .bit_offset = 24, .scale = 1 },
+};
+static const struct slave_info slaves[] = {
+	{ .name = "a", .slave_pos = 0, .counter_channel = 1 },
+	{ .name = "b", .slave_pos = 1, .counter_channel = 2 },
+};
+static struct exchange_plan plan;
+static struct ring *samples;
+static struct ring *events;
+static struct ring_reader *reader;
+static struct ring_reader *event_reader;
+static struct cycle *cy;
+
+static struct ring *make_ring(const char *kind, uint32_t payload_bytes, struct ring_reader **ret)
+{
+	struct ring *ring;
+	char path[64];
+	struct ring_spec spec = { .path = path, .kind = kind, .payload_bytes = payload_bytes,
+				  .slot_count = 8192, .period_ns = PERIOD_NS, .file_mode = 0600 };
+
+	snprintf(path, sizeof(path), "/dev/shm/ecdaq-test-%s-%d", kind, (int)getpid());
+	CHECK_EQ(ring_create(&spec, &ring), 0);
+	CHECK_EQ(ring_reader_open(path, ret), 0);
+	unlink(path);
+	return ring;
+}
+
+static void start(void)
+{
+	char error[256] = "";
+	struct cycle_spec spec;
+
+	memset(&world, 0, sizeof(world));
+	memset(&stats, 0, sizeof(stats));
+	world.now.ns = 7000000000 + 123456;
+	world.dc_offset_ns = 5000000000;
+	world.transit_ns = 20000;
+	world.conversions_from_dc = 1;
+	cfg.cycle_period_ns = PERIOD_NS;
+	cfg.cycle_phase_percent = 50;
+	cfg.cycle_receive_percent = 40;
+	cfg.dc_lock_limit_ns = 10000;
+	cfg.dc_lock_cycles = 200;
+	cfg.dc_unlock_limit_ns = 50000;
+	cfg.dc_slew_ns = 20000;
+	cfg.dc_kp = 0.02;
+	cfg.dc_ki = 0.0001;
+	plan = (struct exchange_plan){ .image_bytes = IMAGE_BYTES, .output_bytes = OUTPUT_BYTES,
+				       .chunk_count = 1, .wkc_expected = 4, .slave_count = 2,
+				       .dc_reference = 0x1001 };
+	board_init(&board);
+	samples = make_ring("sample", sizeof(struct sample_header) + IMAGE_BYTES, &reader);
+	events = make_ring("event", sizeof(struct event), &event_reader);
+	spec = (struct cycle_spec){
+		.cfg = &cfg,
+		.platform = { .now = world_now, .tai_ns = world_tai, .sleep_until = world_sleep },
+		.plan = &plan,
+		.slaves = slaves,
+		.slave_count = 2,
+		.channels = channels,
+		.channel_count = 3,
+		.samples = samples,
+		.events = events,
+		.stats = &stats,
+		.boards = { [CYCLE_WRITER_LOCAL] = &board },
+	};
+	CHECK_EQ(cycle_create(&spec, &cy, error, sizeof(error)), 0);
+}
+
+static void steps(unsigned n)
+{
+	for (unsigned i = 0; i < n; i++) {
+		cycle_step(cy);
+	}
+}
+
+static void start_in_op(void)
+{
+	start();
+	steps(1000);
+	CHECK_EQ(stats.dc_state, DC_LOCKED);
+	cycle_phase_set(cy, CYCLE_SYNCED);
+	steps(10);
+	cycle_phase_set(cy, CYCLE_OP);
+	steps(10);
+	CHECK_EQ(stats.samples_bad, 0);
+	CHECK_EQ(stats.samples_good, 20);
+	ring_seek(reader, ring_newest(reader));
+}
+
+struct got {
+	struct sample_header h;
+	uint8_t image[IMAGE_BYTES];
+	uint8_t rest[8];
+};
+
+static struct got next_sample(void)
+{
+	struct got got;
+	uint64_t lost;
+
+	CHECK_EQ(ring_read(reader, &got, &lost), RING_OK);
+	return got;
+}
+
+TEST(cycle, every_sample_is_numbered_by_its_sync0_edge_and_good)
+{
+	uint64_t first = 0;
+
+	start_in_op();
+	steps(100);
+	for (unsigned i = 0; i < 100; i++) {
+		struct got s = next_sample();
+
+		first = i == 0 ? s.h.cycle : first;
+		CHECK_EQ(s.h.cycle, first + i);
+		CHECK_EQ(s.h.dc_time_ns % PERIOD_NS, 0);
+		CHECK_EQ((uint16_t)(s.h.dc_time_ns / PERIOD_NS), s.image[1] | s.image[2] << 8);
+		CHECK_EQ(s.h.slaves_bad, 0);
+		CHECK_EQ(s.h.flags & ~(uint32_t)SAMPLE_FAIL_SAFE, 0);
+		CHECK(llabs(s.h.frame_dc_ns - s.h.dc_time_ns - PERIOD_NS / 2) < 25000);
+	}
+}
+
+TEST(cycle, a_lost_frame_costs_one_bad_sample_a_slave_and_no_overrun)
+{
+	struct got s;
+
+	start_in_op();
+	world.status = EXCHANGE_NO_FRAME;
+	steps(1);
+	world.status = EXCHANGE_OK;
+	steps(5);
+	CHECK_EQ(stats.frames_lost, 1);
+	CHECK_EQ(stats.samples_bad, 2);
+	CHECK_EQ(stats.samples_bad_unexplained, 0);
+	CHECK_EQ(stats.overruns, 0);
+	CHECK_EQ(stats.cycles_skipped, 0);
+	s = next_sample();
+	CHECK_EQ(s.h.flags & SAMPLE_LOST, SAMPLE_LOST);
+	CHECK_EQ(s.h.slaves_bad, 3);
+	CHECK_EQ(s.h.round_trip_ns, -1);
+	CHECK_EQ(next_sample().h.slaves_bad, 0);
+}
+
+TEST(cycle, a_wake_three_periods_late_leaves_three_skipped_samples_and_goes_on_in_step)
+{
+	uint64_t cycle;
+
+	start_in_op();
+	steps(1);
+	cycle = next_sample().h.cycle;
+	world.late_ns = 3 * PERIOD_NS + 100000;
+	steps(3);
+	for (unsigned i = 1; i <= 6; i++) {
+		struct got s = next_sample();
+
+		CHECK_EQ(s.h.cycle, cycle + i);
+		CHECK_EQ((s.h.flags & SAMPLE_SKIPPED) != 0, i <= 3);
+		CHECK_EQ(s.h.slaves_bad, i <= 3 ? 3 : 0);
+	}
+	CHECK_EQ(stats.overruns, 1);
+	CHECK_EQ(stats.cycles_skipped, 3);
+	CHECK_EQ(stats.samples_bad, 6);
+	CHECK_EQ(stats.samples_bad_unexplained, 0);
+}
+
+TEST(cycle, a_stall_too_long_for_placeholders_jumps_the_numbers_by_exactly_the_stall)
+{
+	uint64_t cycle;
+	struct event ev;
+	uint64_t lost;
+	int jumps = 0;
+
+	start_in_op();
+	steps(1);
+	cycle = next_sample().h.cycle;
+	world.late_ns = 5000 * (int64_t)PERIOD_NS;
+	steps(2);
+	CHECK_EQ(next_sample().h.cycle, cycle + 5001);
+	CHECK_EQ(next_sample().h.slaves_bad, 0);
+	while (ring_read(event_reader, &ev, &lost) == RING_OK) {
+		jumps += ev.id == EVENT_NUMBERING_JUMP && ev.arg[0] == 5000;
+	}
+	CHECK_EQ(jumps, 1);
+}
+
+TEST(cycle, a_counter_that_stands_still_is_a_bad_sample_of_that_slave_alone)
+{
+	struct got s;
+
+	start_in_op();
+	world.conversions_from_dc = 0;
+	world.counter[0]++;
+	steps(1);
+	s = next_sample();
+	CHECK_EQ(s.h.slaves_bad, 2);
+	CHECK_EQ(s.h.flags & SAMPLE_BAD_COUNTER, SAMPLE_BAD_COUNTER);
+	CHECK_EQ(stats.samples_bad_unexplained, 1);
+	CHECK_EQ(stats.slave_bad[1], 1);
+	CHECK_EQ(stats.slave_bad[0], 0);
+	world.counter[0]++;
+	world.counter[1]++;
+	steps(1);
+	CHECK_EQ(next_sample().h.slaves_bad, 0);
+}
+
+TEST(cycle, a_late_or_doubled_frame_is_counted_and_flagged)
+{
+	struct got s;
+
+	start_in_op();
+	world.late = 1;
+	world.doubled = 1;
+	steps(1);
+	s = next_sample();
+	CHECK_EQ(s.h.flags & SAMPLE_LATE, SAMPLE_LATE);
+	CHECK_EQ(s.h.flags & SAMPLE_DOUBLED, SAMPLE_DOUBLED);
+	CHECK_EQ(stats.frames_late, 1);
+	CHECK_EQ(stats.frames_doubled, 1);
+	CHECK_EQ(s.h.slaves_bad, 0);
+}
+
+TEST(cycle, a_frame_that_passes_while_the_slaves_convert_is_not_taken)
+{
+	struct got s;
+
+	start_in_op();
+	world.transit_ns = 540000;
+	steps(1);
+	world.transit_ns = 20000;
+	CHECK_EQ(next_sample().h.flags & SAMPLE_SKIPPED, SAMPLE_SKIPPED);
+	s = next_sample();
+	CHECK_EQ(s.h.flags & SAMPLE_LATE, SAMPLE_LATE);
+	CHECK_EQ(s.h.slaves_bad, 3);
+	CHECK_EQ(stats.samples_bad_unexplained, 0);
+	steps(1);
+	CHECK_EQ(next_sample().h.slaves_bad, 0);
+}
+
+TEST(cycle, a_low_working_counter_is_bad_and_not_explained_away)
+{
+	start_in_op();
+	world.status = EXCHANGE_WKC_LOW;
+	steps(2);
+	world.status = EXCHANGE_OK;
+	steps(1);
+	CHECK_EQ(stats.wkc_low, 2);
+	CHECK_EQ(stats.samples_bad, 4);
+	CHECK_EQ(stats.samples_bad_unexplained, 4);
+	CHECK_EQ(next_sample().h.flags & SAMPLE_WKC_LOW, SAMPLE_WKC_LOW);
+}
+
+TEST(cycle, an_output_goes_out_in_op_only_and_is_answered_with_its_cycle)
+{
+	uint64_t sequence;
+	struct got s;
+
+	start();
+	steps(1000);
+	board_begin(&board);
+	board_put(&board, 0, 1);
+	sequence = board_commit(&board);
+	steps(5);
+	CHECK_EQ(world.seen_output & 1, 0);
+	cycle_phase_set(cy, CYCLE_OP);
+	steps(2);
+	CHECK_EQ(world.seen_output & 1, 1);
+	CHECK_EQ(board.taken_sequence, sequence);
+	board_begin(&board);
+	board_put(&board, 0, 0);
+	board_commit(&board);
+	ring_seek(reader, ring_newest(reader));
+	steps(3);
+	do {
+		s = next_sample();
+	} while (s.image[0] & 1);
+	CHECK_EQ(board.taken_cycle, s.h.cycle);
+	board_begin(&board);
+	board_put(&board, 0, 1);
+	board_commit(&board);
+	steps(2);
+	CHECK_EQ(world.seen_output & 1, 1);
+	cycle_phase_set(cy, CYCLE_SAFE);
+	steps(2);
+	CHECK_EQ(world.seen_output & 1, 0);
+	CHECK_EQ(stats.is_fail_safe, 1);
+}
+
+TEST(cycle, an_output_that_is_not_there_is_one_clear_line)
+{
+	char error[256] = "";
+	struct cycle_spec spec = { .cfg = &cfg, .plan = &plan, .channels = channels,
+				   .channel_count = 3, .slaves = slaves, .slave_count = 2 };
+
+	start();
+	cfg.output_count = 1;
+	cfg.output[0] = (struct config_output){ .channel = "a.lamp", .line = 12 };
+	snprintf(cfg.path, sizeof(cfg.path), "x.yaml");
+	CHECK_EQ(cycle_create(&spec, &cy, error, sizeof(error)), -22);
+	CHECK_STR(error, "x.yaml:12: outputs: a.lamp: no such output channel");
+	cfg.output[0] = (struct config_output){ .channel = "a.led", .fail_safe = 3, .line = 13 };
+	CHECK_EQ(cycle_create(&spec, &cy, error, sizeof(error)), -22);
+	CHECK_STR(error, "x.yaml:13: outputs: a.led: the channel cannot hold its fail_safe value");
+}
+
+TEST(cycle, a_silent_owner_loses_its_output_after_its_timeout_in_cycles)
+{
+	unsigned cycles = 0;
+
+	cfg.output_count = 1;
+	cfg.output[0] = (struct config_output){ .channel = "a.led", .min = 0, .max = 1,
+						.timeout_ns = 20 * PERIOD_NS };
+	start();
+	cfg.output_count = 0;
+	steps(300);
+	cycle_phase_set(cy, CYCLE_OP);
+	board_begin(&board);
+	board_put(&board, 0, 1);
+	board_commit(&board);
+	steps(3);
+	CHECK_EQ(world.seen_output & 1, 1);
+	while (world.seen_output & 1) {
+		steps(1);
+		CHECK(++cycles < 30);
+	}
+	CHECK(cycles >= 18 && cycles <= 22);
+}
+
+TEST(cycle, events_of_one_kind_are_limited_but_the_counters_are_not)
+{
+	struct event ev;
+	uint64_t lost;
+	unsigned count = 0;
+
+	start_in_op();
+	world.late = 1;
+	steps(500);
+	while (ring_read(event_reader, &ev, &lost) == RING_OK) {
+		count += ev.id == EVENT_FRAME_LATE;
+	}
+	CHECK_EQ(stats.frames_late, 500);
+	CHECK(count >= 20 && count <= 40);
+}
