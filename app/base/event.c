@@ -37,6 +37,7 @@ static const struct {
 	[EVENT_RECORD_GAP] = { "record_gap", EVENT_ERROR },
 	[EVENT_RECORD_DISK_FULL] = { "record_disk_full", EVENT_ERROR },
 	[EVENT_RECORD_RESUMED] = { "record_resumed", EVENT_NOTICE },
+	[EVENT_COMMAND] = { "command", EVENT_NOTICE },
 };
 
 const char *event_name(uint16_t id)
@@ -78,6 +79,16 @@ static const char *al_name(int32_t state)
 	default:
 		return "none";
 	}
+}
+
+/* NOLINTNEXTLINE(readability-function-size): a table, one text an event */
+/* enum admin_verb, which base does not see. */
+static const char *command_name(int32_t verb)
+{
+	static const char *const names[] = { "none", "ping", "set", "oneshot",
+					     "SDO read", "SDO write", "stop", "clear" };
+
+	return verb >= 0 && verb < (int32_t)(sizeof(names) / sizeof(names[0])) ? names[verb] : "unknown";
 }
 
 int event_format(const struct event *ev, char *buf, size_t buf_len)

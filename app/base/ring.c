@@ -100,7 +100,7 @@ static int map_new_file(const char *path, unsigned mode, uint64_t bytes, void **
 	if (fd < 0) {
 		return -errno;
 	}
-	/* posix_fallocate, not ftruncate: a full tmpfs must fail here and not by SIGBUS in the cycle. */
+	/* Not ftruncate: a full tmpfs must fail here and not by SIGBUS in the cycle. */
 	r = fchmod(fd, mode) < 0 ? errno : posix_fallocate(fd, 0, (off_t)bytes);
 	if (r != 0) {
 		close(fd);
@@ -123,7 +123,7 @@ int ring_create(const struct ring_spec *spec, struct ring **ret_ring)
 	struct ring_header header = { .magic = 0 };
 	struct ring *ring;
 	char temporary[4096];
-	void *map;
+	void *map = NULL;
 	int r;
 
 	if (snprintf(temporary, sizeof(temporary), "%s.new", spec->path) >= (int)sizeof(temporary)) {
@@ -174,7 +174,7 @@ void ring_destroy(struct ring *ring)
 	free(ring);
 }
 
-/* Bytes to words: the last word of @bytes may be part of the next piece, hence the cursor in bytes. */
+/* Bytes to words: the last word of @bytes may be part of the next piece: a cursor in bytes. */
 struct word_writer {
 	_Atomic uint64_t *word;
 	uint64_t pending;
@@ -339,7 +339,7 @@ enum ring_result ring_read(struct ring_reader *reader, void *payload, uint64_t *
 {
 	uint64_t oldest;
 
-	/* The state is read before the head: what was pushed before the close is then never missed. */
+	/* The state is read before the head: what was pushed before the close is never missed. */
 	uint32_t state = atomic_load_explicit(&reader->header->state, memory_order_acquire);
 
 	if (reader->cursor >= ring_newest(reader)) {

@@ -105,6 +105,7 @@ void status_unmap(const void *page, uint32_t bytes)
 	}
 }
 
+/* NOLINTNEXTLINE(readability-non-const-parameter): the atomic store writes through it */
 void status_text_set(_Atomic uint64_t *sequence, char *field, uint32_t field_bytes, const char *text)
 {
 	size_t len = strnlen(text, field_bytes - 1);
@@ -119,7 +120,7 @@ void status_text_set(_Atomic uint64_t *sequence, char *field, uint32_t field_byt
 void status_text_get(const _Atomic uint64_t *sequence, const char *field, uint32_t field_bytes,
 		     char *ret_text)
 {
-	/* A writer that died half way leaves the sequence odd: give up after a while and take what is there. */
+	/* A writer that died half way leaves the sequence odd: take what is there after a while. */
 	for (int tries = 0; tries < 1000; tries++) {
 		uint64_t before = atomic_load_explicit(sequence, memory_order_acquire);
 
