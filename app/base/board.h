@@ -25,11 +25,11 @@ struct board {
 	uint64_t magic;
 	uint32_t bytes;
 	uint32_t reserved;
-	_Atomic uint64_t sequence;  /* [writer] odd: being written; even: set number * 2 */
-	_Atomic uint64_t beat;      /* [writer] counts up as a sign of life; for time-outs */
+	_Atomic uint64_t sequence; /* [writer] odd: being written; even: set number * 2 */
+	_Atomic uint64_t beat;     /* [writer] counts up as a sign of life; for time-outs */
 	_Alignas(64) struct board_output output[BOARD_OUTPUTS];
 	_Alignas(64) _Atomic uint64_t taken_sequence; /* [cycle] newest set that is on the wire */
-	_Atomic uint64_t taken_cycle;                 /* [cycle] the cycle whose frame carried it first */
+	_Atomic uint64_t taken_cycle; /* [cycle] the cycle whose frame carried it first */
 };
 
 /* Plain values of one set, as the cycle sees them. */
@@ -46,7 +46,7 @@ void board_put(struct board *board, unsigned output, uint64_t raw);
 void board_begin(struct board *board);
 uint64_t board_commit(struct board *board);
 
-/** 1 and a copy of the newest set if it is newer than @set->sequence and whole; else 0, @set untouched. RT-safe. */
+/** 1 and a copy of the newest set if newer than @set->sequence and whole; else 0. RT-safe. */
 int board_take(const struct board *board, unsigned output_count, struct board_set *set);
 /** Say that the set with @sequence goes on the wire in @cycle. Context: the cycle. */
 void board_answer(struct board *board, uint64_t sequence, uint64_t cycle);

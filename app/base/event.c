@@ -81,16 +81,17 @@ static const char *al_name(int32_t state)
 	}
 }
 
-/* NOLINTNEXTLINE(readability-function-size): a table, one text an event */
 /* enum admin_verb, which base does not see. */
 static const char *command_name(int32_t verb)
 {
-	static const char *const names[] = { "none", "ping", "set", "oneshot",
+	static const char *const names[] = { "none",     "ping",      "set",  "oneshot",
 					     "SDO read", "SDO write", "stop", "clear" };
 
-	return verb >= 0 && verb < (int32_t)(sizeof(names) / sizeof(names[0])) ? names[verb] : "unknown";
+	return verb >= 0 && verb < (int32_t)(sizeof(names) / sizeof(names[0])) ? names[verb]
+									       : "unknown";
 }
 
+/* NOLINTNEXTLINE(readability-function-size): a table, one text an event */
 int event_format(const struct event *ev, char *buf, size_t buf_len)
 {
 	const int32_t *a = ev->arg;
@@ -109,17 +110,20 @@ int event_format(const struct event *ev, char *buf, size_t buf_len)
 		return snprintf(buf, buf_len, "bus: %s -> %s", bus_state_to_str((uint32_t)a[0]),
 				bus_state_to_str((uint32_t)a[1]));
 	case EVENT_FRAME_LOST:
-		return snprintf(buf, buf_len, "cycle %" PRId64 ": frame lost (%" PRId32 " in a row)",
-				ev->value, a[0]);
+		return snprintf(buf, buf_len,
+				"cycle %" PRId64 ": frame lost (%" PRId32 " in a row)", ev->value,
+				a[0]);
 	case EVENT_FRAME_LATE:
 		return snprintf(buf, buf_len,
-				"cycle %" PRId64 ": frame came %" PRId32 " cycles late, thrown away",
+				"cycle %" PRId64 ": frame came %" PRId32
+				" cycles late, thrown away",
 				ev->value, a[0]);
 	case EVENT_FRAME_DOUBLED:
 		return snprintf(buf, buf_len, "cycle %" PRId64 ": frame came twice", ev->value);
 	case EVENT_WKC_LOW:
-		return snprintf(buf, buf_len, "cycle %" PRId64 ": WKC %" PRId32 ", expected %" PRId32,
-				ev->value, a[0], a[1]);
+		return snprintf(buf, buf_len,
+				"cycle %" PRId64 ": WKC %" PRId32 ", expected %" PRId32, ev->value,
+				a[0], a[1]);
 	case EVENT_WKC_OK:
 		return snprintf(buf, buf_len,
 				"cycle %" PRId64 ": WKC %" PRId32 " again after %" PRId32 " cycles",
@@ -139,7 +143,8 @@ int event_format(const struct event *ev, char *buf, size_t buf_len)
 		return snprintf(buf, buf_len, "DC lock lost, phase error %" PRId32 " ns", a[0]);
 	case EVENT_COUNTER_BAD:
 		return snprintf(buf, buf_len,
-				"slave %u: cycle %" PRId64 ": counter %" PRId32 ", expected %" PRId32,
+				"slave %u: cycle %" PRId64 ": counter %" PRId32
+				", expected %" PRId32,
 				slave, ev->value, a[0], a[1]);
 	case EVENT_SLAVE_STATE:
 		return snprintf(buf, buf_len, "slave %u: %s%s -> %s%s, AL status code 0x%04" PRIx64,
@@ -150,20 +155,26 @@ int event_format(const struct event *ev, char *buf, size_t buf_len)
 	case EVENT_SLAVE_BACK:
 		return snprintf(buf, buf_len, "slave %u: back", slave);
 	case EVENT_OUTPUT_SET:
-		return snprintf(buf, buf_len, "slave %u: output channel %" PRId64
-				" set by user %" PRId32, slave, ev->value, a[1]);
+		return snprintf(buf, buf_len,
+				"slave %u: output channel %" PRId64 " set by user %" PRId32, slave,
+				ev->value, a[1]);
 	case EVENT_OUTPUT_FAIL_SAFE:
 		return snprintf(buf, buf_len, "outputs go to fail-safe");
 	case EVENT_COMMAND_REFUSED:
-		return snprintf(buf, buf_len, "command of user %" PRId32 " refused, channel %" PRId64
-				", error %" PRId32, a[1], ev->value, a[0]);
+		return snprintf(buf, buf_len,
+				"command of user %" PRId32 " refused, channel %" PRId64
+				", error %" PRId32,
+				a[1], ev->value, a[0]);
+	case EVENT_COMMAND:
+		return snprintf(buf, buf_len, "slave %u: %s by user %" PRId32 ", 0x%" PRIx64, slave,
+				command_name(a[0]), a[1], (uint64_t)ev->value);
 	case EVENT_RT_DEGRADED:
 		return snprintf(buf, buf_len, "degraded: no %s, error %" PRId32,
 				event_rt_to_str((uint32_t)a[0]), a[1]);
 	case EVENT_SDO_ABORT:
 		return snprintf(buf, buf_len,
-				"slave %u: SDO 0x%04" PRIx32 ":%02" PRIx32 " abort 0x%08" PRIx64, slave,
-				(uint32_t)a[0] >> 8, (uint32_t)a[0] & 0xff,
+				"slave %u: SDO 0x%04" PRIx32 ":%02" PRIx32 " abort 0x%08" PRIx64,
+				slave, (uint32_t)a[0] >> 8, (uint32_t)a[0] & 0xff,
 				(uint64_t)ev->value & 0xffffffff);
 	case EVENT_LINK:
 		return snprintf(buf, buf_len, "link %s", a[0] ? "up" : "down");
@@ -174,8 +185,8 @@ int event_format(const struct event *ev, char *buf, size_t buf_len)
 				"recording has a gap: %" PRId32 " cycles from %" PRId64, a[0],
 				ev->value);
 	case EVENT_RECORD_DISK_FULL:
-		return snprintf(buf, buf_len, "recording stopped: disk full, %" PRId64 " bytes free",
-				ev->value);
+		return snprintf(buf, buf_len,
+				"recording stopped: disk full, %" PRId64 " bytes free", ev->value);
 	case EVENT_RECORD_RESUMED:
 		return snprintf(buf, buf_len, "recording again from cycle %" PRId64, ev->value);
 	}

@@ -13,36 +13,38 @@
 
 enum event_id {
 	EVENT_NONE = 0,
-	EVENT_STARTED,           /* value: period_ns; arg: slaves */
-	EVENT_STOPPED,           /* value: cycles */
-	EVENT_BUS_STATE,         /* arg: enum bus_state, from, to */
-	EVENT_FRAME_LOST,        /* value: cycle; arg: frames lost in a row */
-	EVENT_FRAME_LATE,        /* value: cycle; arg: cycles late */
-	EVENT_FRAME_DOUBLED,     /* value: cycle */
-	EVENT_WKC_LOW,           /* value: cycle; arg: wkc, expected */
-	EVENT_WKC_OK,            /* value: cycle; arg: wkc; how many cycles it was low */
-	EVENT_OVERRUN,           /* value: cycle; arg: cycles skipped; late_ns clamped to int32 */
-	EVENT_NUMBERING_JUMP,    /* value: first cycle after; arg: cycles left out (clamped) */
-	EVENT_DC_LOCKED,         /* value: cycle; arg: phase error ns */
-	EVENT_DC_UNLOCKED,       /* value: cycle; arg: phase error ns */
-	EVENT_COUNTER_BAD,       /* slave; value: cycle; arg: counter seen, counter expected */
-	EVENT_SLAVE_STATE,       /* slave; arg: AL state from, to; value: AL status code */
-	EVENT_SLAVE_LOST,        /* slave */
-	EVENT_SLAVE_BACK,        /* slave */
-	EVENT_OUTPUT_SET,        /* slave; value: channel index; arg: writer, user id */
-	EVENT_OUTPUT_FAIL_SAFE,  /* arg: reason */
-	EVENT_COMMAND_REFUSED,   /* value: channel index or -1; arg: errno, user id */
-	EVENT_RT_DEGRADED,       /* arg: which of enum event_rt, errno */
-	EVENT_SDO_ABORT,         /* slave; arg: index << 8 | subindex; value: abort code */
-	EVENT_LINK,              /* arg: 1 up, 0 down */
-	EVENT_RECORD_STARTED,    /* value: first cycle */
-	EVENT_RECORD_GAP,        /* value: first cycle missing; arg: how many (clamped) */
-	EVENT_RECORD_DISK_FULL,  /* value: bytes free */
-	EVENT_RECORD_RESUMED,    /* value: cycle */
+	EVENT_STARTED,          /* value: period_ns; arg: slaves */
+	EVENT_STOPPED,          /* value: cycles */
+	EVENT_BUS_STATE,        /* arg: enum bus_state, from, to */
+	EVENT_FRAME_LOST,       /* value: cycle; arg: frames lost in a row */
+	EVENT_FRAME_LATE,       /* value: cycle; arg: cycles late */
+	EVENT_FRAME_DOUBLED,    /* value: cycle */
+	EVENT_WKC_LOW,          /* value: cycle; arg: wkc, expected */
+	EVENT_WKC_OK,           /* value: cycle; arg: wkc; how many cycles it was low */
+	EVENT_OVERRUN,          /* value: cycle; arg: cycles skipped; late_ns clamped to int32 */
+	EVENT_NUMBERING_JUMP,   /* value: first cycle after; arg: cycles left out (clamped) */
+	EVENT_DC_LOCKED,        /* value: cycle; arg: phase error ns */
+	EVENT_DC_UNLOCKED,      /* value: cycle; arg: phase error ns */
+	EVENT_COUNTER_BAD,      /* slave; value: cycle; arg: counter seen, counter expected */
+	EVENT_SLAVE_STATE,      /* slave; arg: AL state from, to; value: AL status code */
+	EVENT_SLAVE_LOST,       /* slave */
+	EVENT_SLAVE_BACK,       /* slave */
+	EVENT_OUTPUT_SET,       /* slave; value: channel index; arg: writer, user id */
+	EVENT_OUTPUT_FAIL_SAFE, /* arg: reason */
+	EVENT_COMMAND_REFUSED,  /* value: channel index or -1; arg: errno, user id */
+	EVENT_RT_DEGRADED,      /* arg: which of enum event_rt, errno */
+	EVENT_SDO_ABORT,        /* slave; arg: index << 8 | subindex; value: abort code */
+	EVENT_LINK,             /* arg: 1 up, 0 down */
+	EVENT_RECORD_STARTED,   /* value: first cycle */
+	EVENT_RECORD_GAP,       /* value: first cycle missing; arg: how many (clamped) */
+	EVENT_RECORD_DISK_FULL, /* value: bytes free */
+	EVENT_RECORD_RESUMED,   /* value: cycle */
+	EVENT_COMMAND, /* slave; value: its object or time; arg: enum admin_verb, user id */
 	EVENT_COUNT,
 };
 
-/* What ecdaqd asked of the machine and did not get (arg[0] of EVENT_RT_DEGRADED; bit in rt_degraded). */
+/* What ecdaqd asked of the machine and did not get (arg[0] of EVENT_RT_DEGRADED; bit in
+ * rt_degraded). */
 enum event_rt {
 	EVENT_RT_PRIORITY,    /* SCHED_FIFO */
 	EVENT_RT_CPU,         /* the cycle thread on its own core */
@@ -55,9 +57,9 @@ enum event_rt {
 enum event_severity { EVENT_INFO, EVENT_NOTICE, EVENT_WARNING, EVENT_ERROR };
 
 struct event {
-	int64_t mono_ns;    /* CLOCK_MONOTONIC */
-	int64_t tai_ns;     /* CLOCK_TAI */
-	uint64_t cycle;     /* cycle in which it was noticed */
+	int64_t mono_ns; /* CLOCK_MONOTONIC */
+	int64_t tai_ns;  /* CLOCK_TAI */
+	uint64_t cycle;  /* cycle in which it was noticed */
 	int64_t value;
 	int32_t arg[2];
 	uint16_t id;        /* enum event_id */

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A histogram of ns values that never allocates: 32 buckets an octave (3 % wide), values 0 to 2^40 ns.
- * One writer, any number of readers, also across processes (it stands in the status page): every
- * field is a relaxed atomic. Context of histogram_add(): RT-safe; of the rest: any.
+ * A histogram of ns values that never allocates: 32 buckets an octave (3 % wide), values 0 to 2^40
+ * ns. One writer, any number of readers, also across processes (it stands in the status page):
+ * every field is a relaxed atomic. Context of histogram_add(): RT-safe; of the rest: any.
  */
 #ifndef BASE_HISTOGRAM_H
 #define BASE_HISTOGRAM_H
@@ -14,14 +14,14 @@ enum { HISTOGRAM_SUB_BITS = 5, HISTOGRAM_OCTAVES = 36 };
 enum { HISTOGRAM_BUCKETS = HISTOGRAM_OCTAVES << HISTOGRAM_SUB_BITS };
 
 struct histogram {
-	_Atomic uint64_t count;   /* [writer] */
-	_Atomic int64_t min_ns;   /* [writer] signed, as added */
-	_Atomic int64_t max_ns;   /* [writer] signed, as added */
-	_Atomic int64_t sum_ns;   /* [writer] signed, as added */
+	_Atomic uint64_t count;                     /* [writer] */
+	_Atomic int64_t min_ns;                     /* [writer] signed, as added */
+	_Atomic int64_t max_ns;                     /* [writer] signed, as added */
+	_Atomic int64_t sum_ns;                     /* [writer] signed, as added */
 	_Atomic uint32_t bucket[HISTOGRAM_BUCKETS]; /* [writer] by magnitude */
 };
 
-/** Count @value_ns; buckets go by its magnitude, so percentiles of a signed error are of |error|. */
+/** Count @value_ns; buckets go by magnitude: percentiles of a signed error are of |error|. */
 void histogram_add(struct histogram *h, int64_t value_ns);
 
 /**

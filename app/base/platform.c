@@ -26,7 +26,8 @@ static int64_t posix_tai(void *ctx)
 
 static int posix_sleep_until(void *ctx, mono_t deadline)
 {
-	struct timespec ts = { .tv_sec = deadline.ns / NS_PER_S, .tv_nsec = deadline.ns % NS_PER_S };
+	struct timespec ts = { .tv_sec = deadline.ns / NS_PER_S,
+			       .tv_nsec = deadline.ns % NS_PER_S };
 	int r;
 
 	(void)ctx;

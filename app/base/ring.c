@@ -126,7 +126,8 @@ int ring_create(const struct ring_spec *spec, struct ring **ret_ring)
 	void *map = NULL;
 	int r;
 
-	if (snprintf(temporary, sizeof(temporary), "%s.new", spec->path) >= (int)sizeof(temporary)) {
+	if (snprintf(temporary, sizeof(temporary), "%s.new", spec->path) >=
+	    (int)sizeof(temporary)) {
 		return -ENAMETOOLONG;
 	}
 	fill_header(&header, spec);
@@ -233,12 +234,14 @@ uint64_t ring_pushed(const struct ring *ring)
 
 static int header_is_sane(const struct ring_header *h, uint64_t file_bytes)
 {
-	return h->magic == RING_MAGIC && h->version == RING_VERSION && h->total_bytes == file_bytes &&
-	       h->slot_count >= 2 && (h->slot_count & (h->slot_count - 1)) == 0 &&
+	return h->magic == RING_MAGIC && h->version == RING_VERSION &&
+	       h->total_bytes == file_bytes && h->slot_count >= 2 &&
+	       (h->slot_count & (h->slot_count - 1)) == 0 &&
 	       h->slot_bytes >= WORD_BYTES + h->payload_bytes && h->slot_bytes % WORD_BYTES == 0 &&
 	       h->meta_offset == PAGE_BYTES && h->slots_offset <= file_bytes &&
-	       h->meta_bytes <= h->slots_offset - h->meta_offset && h->slots_offset % PAGE_BYTES == 0 &&
-	       h->slot_bytes <= file_bytes && h->slot_count <= file_bytes &&
+	       h->meta_bytes <= h->slots_offset - h->meta_offset &&
+	       h->slots_offset % PAGE_BYTES == 0 && h->slot_bytes <= file_bytes &&
+	       h->slot_count <= file_bytes &&
 	       h->slot_count <= (file_bytes - h->slots_offset) / h->slot_bytes &&
 	       memchr(h->kind, 0, sizeof(h->kind)) != NULL;
 }
@@ -315,8 +318,8 @@ void ring_reader_destroy(struct ring_reader *reader)
 
 static int copy_slot(const struct ring_reader *reader, uint64_t sequence, void *payload)
 {
-	const _Atomic uint64_t *slot =
-		reader->slots + (sequence & (reader->slot_count - 1)) * reader->slot_words;
+	const _Atomic uint64_t *slot = reader->slots +
+				       (sequence & (reader->slot_count - 1)) * reader->slot_words;
 	uint8_t *out = payload;
 	size_t left = reader->header->payload_bytes;
 
@@ -402,7 +405,8 @@ int ring_is_replaced(const struct ring_reader *reader)
 
 int ring_is_orphaned(const struct ring_reader *reader)
 {
-	return atomic_load_explicit(&reader->header->state, memory_order_acquire) == RING_STATE_OPEN &&
+	return atomic_load_explicit(&reader->header->state, memory_order_acquire) ==
+		       RING_STATE_OPEN &&
 	       kill((pid_t)reader->header->producer_pid, 0) < 0 && errno == ESRCH;
 }
 

@@ -27,8 +27,8 @@ struct ring_spec {
 	uint64_t slot_count;    /* rounded up to a power of two */
 	const void *meta;
 	size_t meta_bytes;
-	uint64_t period_ns;     /* time between two pushes; 0: none */
-	unsigned file_mode;     /* 0640 */
+	uint64_t period_ns; /* time between two pushes; 0: none */
+	unsigned file_mode; /* 0640 */
 };
 
 /**
@@ -51,9 +51,10 @@ void ring_push(struct ring *ring, const void *head, size_t head_bytes, const voi
 uint64_t ring_pushed(const struct ring *ring);
 
 enum ring_result {
-	RING_OK,     /* a slot was copied, the cursor is one further */
-	RING_EMPTY,  /* nothing new yet */
-	RING_LOST,   /* the cursor was overrun: *ret_lost slots are gone, the cursor is at the oldest safe one */
+	RING_OK,    /* a slot was copied, the cursor is one further */
+	RING_EMPTY, /* nothing new yet */
+	RING_LOST,  /* the cursor was overrun: *ret_lost slots are gone, the cursor is at the oldest
+		       safe one */
 	RING_CLOSED, /* nothing new, and nothing will follow */
 };
 

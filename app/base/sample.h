@@ -16,50 +16,50 @@
 #define SAMPLE_VERSION 1u
 
 enum sample_flag {
-	SAMPLE_LOST = 1u << 0,       /* no frame came back before the receive deadline: inputs are stale */
-	SAMPLE_LATE = 1u << 1,       /* a frame of an earlier cycle came in this one and was thrown away */
-	SAMPLE_WKC_LOW = 1u << 2,    /* fewer slaves answered than expected: inputs are stale */
-	SAMPLE_NOT_OP = 1u << 3,     /* the bus is not in OP */
-	SAMPLE_FAIL_SAFE = 1u << 4,  /* outputs hold their fail-safe values */
-	SAMPLE_SKIPPED = 1u << 5,    /* the master overran: no frame was sent for this SYNC0 */
-	SAMPLE_BAD_COUNTER = 1u << 6,/* a slave's conversion counter did not advance as it must */
-	SAMPLE_DC_UNLOCKED = 1u << 7,/* the master's servo is not locked to the reference clock */
-	SAMPLE_DOUBLED = 1u << 8,    /* a frame came back twice; the second was thrown away */
+	SAMPLE_LOST = 1u << 0,    /* no frame back before the receive deadline: inputs are stale */
+	SAMPLE_LATE = 1u << 1,    /* a frame of an earlier cycle came, and was thrown away */
+	SAMPLE_WKC_LOW = 1u << 2, /* fewer slaves answered than expected: inputs are stale */
+	SAMPLE_NOT_OP = 1u << 3,  /* the bus is not in OP */
+	SAMPLE_FAIL_SAFE = 1u << 4,   /* outputs hold their fail-safe values */
+	SAMPLE_SKIPPED = 1u << 5,     /* the master overran: no frame was sent for this SYNC0 */
+	SAMPLE_BAD_COUNTER = 1u << 6, /* a slave's conversion counter did not advance as it must */
+	SAMPLE_DC_UNLOCKED = 1u << 7, /* the master's servo is not locked to the reference clock */
+	SAMPLE_DOUBLED = 1u << 8,     /* a frame came back twice; the second was thrown away */
 };
 
 struct sample_header {
-	uint64_t cycle;            /* index of the SYNC0 edge; one more in every sample */
-	int64_t dc_time_ns;        /* DC time of that edge, ns since 2000-01-01; 0 without DC */
-	int64_t wake_mono_ns;      /* CLOCK_MONOTONIC at the wake */
-	int64_t wake_tai_ns;       /* CLOCK_TAI at the wake, ns since 1970 */
-	int64_t frame_dc_ns;       /* DC time at which the frame passed the reference clock; 0: none */
-	int32_t wake_latency_ns;   /* wake minus deadline */
-	int32_t round_trip_ns;     /* frame out to frame back; -1: lost */
-	int32_t phase_error_ns;    /* frame against SYNC0 plus set point, as the servo saw it */
-	int32_t dc_diff_ns;        /* largest |0x092C| of the slaves, upper estimate; -1: not read */
-	uint32_t flags;            /* enum sample_flag */
-	uint16_t wkc;              /* working counter of the process data, sum over its datagrams */
+	uint64_t cycle;       /* index of the SYNC0 edge; one more in every sample */
+	int64_t dc_time_ns;   /* DC time of that edge, ns since 2000-01-01; 0 without DC */
+	int64_t wake_mono_ns; /* CLOCK_MONOTONIC at the wake */
+	int64_t wake_tai_ns;  /* CLOCK_TAI at the wake, ns since 1970 */
+	int64_t frame_dc_ns;  /* DC time at which the frame passed the reference clock; 0: none */
+	int32_t wake_latency_ns; /* wake minus deadline */
+	int32_t round_trip_ns;   /* frame out to frame back; -1: lost */
+	int32_t phase_error_ns;  /* frame against SYNC0 plus set point, as the servo saw it */
+	int32_t dc_diff_ns;      /* largest |0x092C| of the slaves, upper estimate; -1: not read */
+	uint32_t flags;          /* enum sample_flag */
+	uint16_t wkc;            /* working counter of the process data, sum over its datagrams */
 	uint16_t wkc_expected;
-	uint64_t slaves_bad;       /* bit n: the sample of slave n is not good */
+	uint64_t slaves_bad; /* bit n: the sample of slave n is not good */
 };
 
 static_assert(sizeof(struct sample_header) == 72, "part of the ring's format");
 
 enum channel_type {
-	CHANNEL_BOOL = 1, /* 1 bit */
-	CHANNEL_UINT = 2, /* 1 to 64 bits */
-	CHANNEL_INT = 3,  /* 1 to 64 bits, two's complement */
-	CHANNEL_FLOAT = 4,/* 32 or 64 bits, IEEE 754 */
+	CHANNEL_BOOL = 1,  /* 1 bit */
+	CHANNEL_UINT = 2,  /* 1 to 64 bits */
+	CHANNEL_INT = 3,   /* 1 to 64 bits, two's complement */
+	CHANNEL_FLOAT = 4, /* 32 or 64 bits, IEEE 754 */
 };
 
 enum channel_direction { CHANNEL_INPUT = 0, CHANNEL_OUTPUT = 1 }; /* from the master's side */
 
 /* One mapped variable. physical = raw * scale + offset, in @unit. */
 struct channel {
-	char name[64];       /* "piccolo0.adc": slave name, dot, entry name */
-	char unit[16];       /* "" where raw counts are all there is */
-	uint16_t slave_pos;  /* 0-based place on the ring */
-	uint16_t index;      /* CoE object, 0x6000 */
+	char name[64];      /* "piccolo0.adc": slave name, dot, entry name */
+	char unit[16];      /* "" where raw counts are all there is */
+	uint16_t slave_pos; /* 0-based place on the ring */
+	uint16_t index;     /* CoE object, 0x6000 */
 	uint8_t subindex;
 	uint8_t type;        /* enum channel_type */
 	uint8_t direction;   /* enum channel_direction */
@@ -86,7 +86,7 @@ struct slave_info {
 	uint8_t has_dc;
 	uint8_t is_dc_reference;
 	int32_t dc_delay_ns;
-	int32_t counter_channel; /* index of its conversion counter in the channel table; -1: none */
+	int32_t counter_channel; /* its conversion counter in the channel table; -1: none */
 	uint32_t input_bits;
 	uint32_t output_bits;
 	uint64_t reserved;
@@ -94,7 +94,7 @@ struct slave_info {
 
 static_assert(sizeof(struct slave_info) == 144, "part of the ring's format");
 
-/* The self-description in the sample ring's meta area: this, slave_count slave_info, channel_count channel. */
+/* The meta area of the sample ring: this, slave_count slave_info, channel_count channel. */
 struct sample_meta {
 	uint32_t version; /* SAMPLE_VERSION */
 	uint32_t slave_count;
@@ -103,7 +103,7 @@ struct sample_meta {
 	uint32_t output_bytes; /* the first of them */
 	int32_t tai_offset_s;  /* TAI - UTC of the kernel at start; 0: unset, CLOCK_TAI is UTC */
 	uint64_t period_ns;
-	uint64_t session;      /* CLOCK_TAI at start: tells one run of the master from the next */
+	uint64_t session; /* CLOCK_TAI at start: tells one run of the master from the next */
 };
 
 static_assert(sizeof(struct sample_meta) == 40, "part of the ring's format");

@@ -9,8 +9,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static const char *const bus_names[] = { "DOWN", "SCANNING", "PREOP", "SAFEOP", "OP", "RECOVERING",
-					 "STOPPED", "FAILED" };
+static const char *const bus_names[] = { "DOWN", "SCANNING",   "PREOP",   "SAFEOP",
+					 "OP",   "RECOVERING", "STOPPED", "FAILED" };
 static const char *const dc_names[] = { "off", "acquiring", "locked", "lost" };
 static const char *const record_names[] = { "waiting", "running", "disk full", "ended", "failed" };
 
@@ -106,7 +106,8 @@ void status_unmap(const void *page, uint32_t bytes)
 }
 
 /* NOLINTNEXTLINE(readability-non-const-parameter): the atomic store writes through it */
-void status_text_set(_Atomic uint64_t *sequence, char *field, uint32_t field_bytes, const char *text)
+void status_text_set(_Atomic uint64_t *sequence, char *field, uint32_t field_bytes,
+		     const char *text)
 {
 	size_t len = strnlen(text, field_bytes - 1);
 

@@ -32,54 +32,55 @@ enum dc_state { DC_OFF = 0, DC_ACQUIRING, DC_LOCKED, DC_LOST };
 
 /* The cycle thread's figures. [cycle] writes all of it. */
 struct cycle_stats {
-	_Atomic uint64_t cycles;          /* exchanges made */
-	_Atomic uint64_t cycle_number;    /* of the newest sample */
+	_Atomic uint64_t cycles;       /* exchanges made */
+	_Atomic uint64_t cycle_number; /* of the newest sample */
 	_Atomic uint64_t frames_sent;
-	_Atomic uint64_t frames_lost;     /* not back before the deadline, whether they came later or not */
-	_Atomic uint64_t frames_late;     /* came in a later cycle, or passed the slaves outside its window: not taken */
-	_Atomic uint64_t frames_doubled;  /* came a second time, thrown away */
-	_Atomic uint64_t frames_foreign;  /* not ours, or damaged, thrown away */
-	_Atomic uint64_t wkc_low;         /* cycles with a short working counter */
-	_Atomic uint64_t overruns;        /* times the work passed one or more deadlines */
-	_Atomic uint64_t cycles_skipped;  /* deadlines passed over */
-	_Atomic uint64_t samples_good;    /* slave samples in OP: fresh and counter right */
-	_Atomic uint64_t samples_bad;     /* slave samples in OP that are not */
+	_Atomic uint64_t frames_lost;    /* not back before the deadline, come later or not */
+	_Atomic uint64_t frames_late;    /* came in a later cycle, or passed the slaves outside its
+					    window: not taken */
+	_Atomic uint64_t frames_doubled; /* came a second time, thrown away */
+	_Atomic uint64_t frames_foreign; /* not ours, or damaged, thrown away */
+	_Atomic uint64_t wkc_low;        /* cycles with a short working counter */
+	_Atomic uint64_t overruns;       /* times the work passed one or more deadlines */
+	_Atomic uint64_t cycles_skipped; /* deadlines passed over */
+	_Atomic uint64_t samples_good;   /* slave samples in OP: fresh and counter right */
+	_Atomic uint64_t samples_bad;    /* slave samples in OP that are not */
 	_Atomic uint64_t samples_bad_unexplained; /* of those: the cycle had a fresh frame */
-	_Atomic uint64_t page_faults;     /* of the cycle thread since its start */
-	_Atomic uint64_t rides;           /* service frames that rode along */
-	_Atomic int64_t dc_time_ns;       /* of the newest cycle */
-	_Atomic int64_t correction_ppb;   /* what the servo does to the host's period */
-	_Atomic int64_t dc_lock_ns;       /* time from the servo's start to its first lock; 0: not yet */
-	_Atomic uint64_t dc_unlocks;      /* times that lock was lost */
-	_Atomic int64_t dc_diff_max_ns;   /* largest |0x092C| since lock */
-	_Atomic uint32_t dc_state;        /* enum dc_state */
+	_Atomic uint64_t page_faults;             /* of the cycle thread since its start */
+	_Atomic uint64_t rides;                   /* service frames that rode along */
+	_Atomic int64_t dc_time_ns;               /* of the newest cycle */
+	_Atomic int64_t correction_ppb;           /* what the servo does to the host's period */
+	_Atomic int64_t dc_lock_ns;  /* time from the servo's start to its first lock; 0: not yet */
+	_Atomic uint64_t dc_unlocks; /* times that lock was lost */
+	_Atomic int64_t dc_diff_max_ns; /* largest |0x092C| since lock */
+	_Atomic uint32_t dc_state;      /* enum dc_state */
 	_Atomic uint32_t is_fail_safe;
 	_Atomic uint64_t slave_good[LIMIT_SLAVES];
 	_Atomic uint64_t slave_bad[LIMIT_SLAVES];
 	struct histogram wake_latency;
 	struct histogram round_trip;
-	struct histogram phase;           /* signed phase error, from lock on */
-	struct histogram work;            /* wake to end of work */
+	struct histogram phase; /* signed phase error, from lock on */
+	struct histogram work;  /* wake to end of work */
 };
 
 /* One slave as the service thread last saw it. [service] */
 struct slave_status {
 	struct slave_info info;
-	_Atomic uint32_t al_state;        /* enum al_state, bit 4: error */
+	_Atomic uint32_t al_state; /* enum al_state, bit 4: error */
 	_Atomic uint32_t al_status_code;
 	_Atomic uint32_t is_lost;
 	_Atomic int32_t dc_diff_ns;
-	_Atomic uint32_t rx_errors[4];    /* 0x0300.., per port, as last read */
-	_Atomic uint32_t lost_links[4];   /* 0x0310.. */
+	_Atomic uint32_t rx_errors[4];  /* 0x0300.., per port, as last read */
+	_Atomic uint32_t lost_links[4]; /* 0x0310.. */
 };
 
 struct status_page {
 	uint64_t magic;
-	uint32_t bytes;                   /* sizeof(struct status_page): the layout's version */
-	uint32_t is_simulated;            /* the segment is ecdaq-sim, as far as the daemon was told */
+	uint32_t bytes;        /* sizeof(struct status_page): the layout's version */
+	uint32_t is_simulated; /* the segment is ecdaq-sim, as far as the daemon was told */
 	int64_t pid;
 	int64_t start_tai_ns;
-	uint64_t session;                 /* same as in the ring's meta */
+	uint64_t session; /* same as in the ring's meta */
 	uint64_t period_ns;
 	char version[32];
 	char interface[32];               /* NIC name */
@@ -103,32 +104,38 @@ struct record_status {
 	uint32_t reserved;
 	int64_t pid;
 	_Atomic uint64_t text_sequence;
-	char path[512];                   /* file being written */
+	char path[512]; /* file being written */
 	char message[256];
-	_Atomic uint32_t state;           /* enum record_state */
+	_Atomic uint32_t state; /* enum record_state */
 	_Atomic uint64_t session;
 	_Atomic uint64_t recorded_cycles; /* samples written in this session of the master */
 	_Atomic uint64_t recorded_gaps;   /* gaps in the cycle number */
 	_Atomic uint64_t cycles_missing;  /* sum over the gaps */
 	_Atomic uint64_t first_cycle;
 	_Atomic uint64_t last_cycle;
-	_Atomic uint64_t synced_cycle;    /* last cycle that an fdatasync covers */
+	_Atomic uint64_t synced_cycle; /* last cycle that an fdatasync covers */
 	_Atomic uint64_t bytes_written;
 	_Atomic uint64_t files;
-	_Atomic uint64_t bytes_free;      /* of the file system */
-	_Atomic uint64_t lag_cycles;      /* slots behind the producer */
+	_Atomic uint64_t bytes_free; /* of the file system */
+	_Atomic uint64_t lag_cycles; /* slots behind the producer */
 	_Atomic uint64_t heartbeat;
 };
 
-enum record_state { RECORD_WAITING = 0, RECORD_RUNNING, RECORD_DISK_FULL, RECORD_ENDED, RECORD_FAILED };
+enum record_state {
+	RECORD_WAITING = 0,
+	RECORD_RUNNING,
+	RECORD_DISK_FULL,
+	RECORD_ENDED,
+	RECORD_FAILED
+};
 
 const char *bus_state_to_str(uint32_t state);
 const char *dc_state_to_str(uint32_t state);
 const char *record_state_to_str(uint32_t state);
 
 /**
- * Make a page of @bytes at @path (any size that starts with magic and bytes) and map it for writing;
- * the caller fills it. NULL with errno. Unmap with status_unmap(). Context: blocking.
+ * Make a page of @bytes at @path (any size that starts with magic and bytes) and map it for
+ * writing; the caller fills it. NULL with errno. Unmap with status_unmap(). Context: blocking.
  */
 void *status_create(const char *path, uint64_t magic, uint32_t bytes, unsigned file_mode);
 /** Map the page at @path for reading; NULL with errno: ENOENT, EPROTO (other version). */
@@ -136,7 +143,8 @@ const void *status_open(const char *path, uint64_t magic, uint32_t bytes);
 void status_unmap(const void *page, uint32_t bytes);
 
 /** Write @text into a guarded text field. Context: the page's writer. */
-void status_text_set(_Atomic uint64_t *sequence, char *field, uint32_t field_bytes, const char *text);
+void status_text_set(_Atomic uint64_t *sequence, char *field, uint32_t field_bytes,
+		     const char *text);
 /** Copy a guarded text field; always ends in zero. Context: any. */
 void status_text_get(const _Atomic uint64_t *sequence, const char *field, uint32_t field_bytes,
 		     char *ret_text);

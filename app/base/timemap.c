@@ -9,12 +9,12 @@
 enum { BLOCKS = 40, PAIRS = 63, SLOPES = BLOCKS * (BLOCKS - 1) / 2 };
 
 #define BLOCK_NS (NS_PER_S / 4)
-#define PAIR_NS (BLOCK_NS / PAIRS) /* pairs closer than this are left out */
+#define PAIR_NS (BLOCK_NS / PAIRS)   /* pairs closer than this are left out */
 #define BLOCK_GAP_NS (10 * NS_PER_S) /* no pair for so long: the window is stale */
-#define SLEW_TIME_NS 2e9           /* an error is worn off over so long */
-#define SLEW_LIMIT 2e-3            /* never faster than this */
-#define RATE_LIMIT 1e-3            /* quartz is far better: a larger slope is noise */
-#define RATE_BLOCKS 8              /* a slope over less is noise */
+#define SLEW_TIME_NS 2e9             /* an error is worn off over so long */
+#define SLEW_LIMIT 2e-3              /* never faster than this */
+#define RATE_LIMIT 1e-3              /* quartz is far better: a larger slope is noise */
+#define RATE_BLOCKS 8                /* a slope over less is noise */
 
 /* One block's median: at dc_ns, UTC minus DC was offset_ns. */
 struct block {
@@ -25,18 +25,18 @@ struct block {
 struct timemap {
 	struct timemap_state state;
 	int is_ready;
-	double rate;             /* state.rate_ppb, unrounded */
-	double rate_fit;         /* the newest trusted slope: it outlives a step */
+	double rate;     /* state.rate_ppb, unrounded */
+	double rate_fit; /* the newest trusted slope: it outlives a step */
 	int32_t tai_offset_next_s;
-	struct block pair[PAIRS];/* of the block being filled */
+	struct block pair[PAIRS]; /* of the block being filled */
 	int64_t latency_ns[PAIRS];
 	size_t pair_count;
 	int64_t block_start_ns;
 	struct block block[BLOCKS];
 	size_t block_count;
-	struct block suspect;    /* a block away from the map: a second one makes it a step */
+	struct block suspect; /* a block away from the map: a second one makes it a step */
 	int has_suspect;
-	double slope[SLOPES];    /* scratch */
+	double slope[SLOPES]; /* scratch */
 };
 
 struct timemap *timemap_create(int32_t tai_offset_s)
@@ -177,7 +177,8 @@ static double fit_rate(struct timemap *map)
 	return map->rate_fit;
 }
 
-/* UTC minus DC at @dc_ns by the fit; *ret_scatter_ns is the median of the blocks' distances to it. */
+/* UTC minus DC at @dc_ns by the fit; *ret_scatter_ns is the median of the blocks' distances to it.
+ */
 static int64_t fit_offset(struct timemap *map, double rate, int64_t dc_ns, int64_t *ret_scatter_ns)
 {
 	int64_t residual[BLOCKS];
@@ -208,9 +209,9 @@ static void slew_to_fit(struct timemap *map, int64_t dc_ns, int64_t latency_ns)
 
 	slew = slew > SLEW_LIMIT ? SLEW_LIMIT : slew < -SLEW_LIMIT ? -SLEW_LIMIT : slew;
 	set_state(map, dc_ns, utc_ns, rate + slew);
-	/* 4.5 median deviations are 3 sigma of normal scatter; what is still to be slewed counts, too. */
-	map->state.uncertainty_ns =
-		latency_ns + scatter_ns * 9 / 2 + magnitude(wanted_ns - utc_ns);
+	/* 4.5 median deviations are 3 sigma of normal scatter; what is still to be slewed counts,
+	 * too. */
+	map->state.uncertainty_ns = latency_ns + scatter_ns * 9 / 2 + magnitude(wanted_ns - utc_ns);
 }
 
 /* The clock was set: forget the window, start at the two blocks that say so. */
@@ -222,7 +223,8 @@ static enum timemap_news take_step(struct timemap *map, struct block b, int64_t 
 
 	map->block_count = 0;
 	map->has_suspect = 0;
-	if (offset_change_ns != 0 && magnitude(step_ns - offset_change_ns) < TIMEMAP_STEP_LIMIT_NS) {
+	if (offset_change_ns != 0 &&
+	    magnitude(step_ns - offset_change_ns) < TIMEMAP_STEP_LIMIT_NS) {
 		map->state.tai_offset_s = map->tai_offset_next_s;
 		b.offset_ns -= offset_change_ns;
 		add_block(map, b);

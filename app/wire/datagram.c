@@ -52,8 +52,7 @@ size_t ecat_frame_end(struct ecat_frame_builder *fb)
 	size_t datagrams = fb->len - DATAGRAMS_OFFSET;
 
 	assert(fb->last_header != NULL);
-	put_le16(fb->buf + ECAT_ETHERNET_BYTES,
-		 (uint16_t)(datagrams | FRAME_TYPE_DATAGRAMS << 12));
+	put_le16(fb->buf + ECAT_ETHERNET_BYTES, (uint16_t)(datagrams | FRAME_TYPE_DATAGRAMS << 12));
 	if (fb->len < ECAT_FRAME_MIN_BYTES) {
 		memset(fb->buf + fb->len, 0, ECAT_FRAME_MIN_BYTES - fb->len);
 		fb->len = ECAT_FRAME_MIN_BYTES;

@@ -30,11 +30,11 @@ enum ecat_cmd {
 enum ecat_size {
 	ECAT_ETHERTYPE = 0x88a4,
 	ECAT_ETHERNET_BYTES = 14,
-	ECAT_FRAME_HEADER_BYTES = 2,   /* length in bits 0..10, type 1 in bits 12..15 */
+	ECAT_FRAME_HEADER_BYTES = 2, /* length in bits 0..10, type 1 in bits 12..15 */
 	ECAT_DATAGRAM_HEADER_BYTES = 10,
 	ECAT_WKC_BYTES = 2,
 	ECAT_FRAME_MAX_BYTES = 1514,
-	ECAT_FRAME_MIN_BYTES = 60,     /* shorter ones are padded with zeros */
+	ECAT_FRAME_MIN_BYTES = 60, /* shorter ones are padded with zeros */
 	ECAT_DATAGRAM_MAX_BYTES = 1486,
 };
 
@@ -75,7 +75,8 @@ uint8_t *ecat_frame_add(struct ecat_frame_builder *fb, enum ecat_cmd cmd, uint8_
 /** Write the EtherCAT header, pad to 60 bytes. Returns the frame's length. */
 size_t ecat_frame_end(struct ecat_frame_builder *fb);
 
-/** 1 if @frame is an Ethernet frame (untagged) of type 0x88A4 with EtherCAT type 1 and whole header. */
+/** 1 if @frame is an Ethernet frame (untagged) of type 0x88A4 with EtherCAT type 1 and whole
+ * header. */
 int ecat_frame_is_valid(const uint8_t *frame, size_t frame_len);
 
 /**

@@ -29,7 +29,8 @@ void test_skip(const char *why) __attribute__((noreturn));
 	static void test_##module##_##sentence(void);                                              \
 	__attribute__((constructor)) static void test_register_##module##_##sentence(void)         \
 	{                                                                                          \
-		static struct test t = { #module "." #sentence, test_##module##_##sentence, NULL }; \
+		static struct test t = { #module "." #sentence, test_##module##_##sentence,        \
+					 NULL };                                                   \
 		test_register(&t);                                                                 \
 	}                                                                                          \
 	static void test_##module##_##sentence(void)
@@ -46,8 +47,8 @@ void test_skip(const char *why) __attribute__((noreturn));
 		long long got_ = (long long)(got);                                                 \
 		long long wanted_ = (long long)(wanted);                                           \
 		if (got_ != wanted_) {                                                             \
-			test_fail(__FILE__, __LINE__, "%s is %lld (0x%llx), wanted %s = %lld", #got,  \
-				  got_, (unsigned long long)got_, #wanted, wanted_);               \
+			test_fail(__FILE__, __LINE__, "%s is %lld (0x%llx), wanted %s = %lld",     \
+				  #got, got_, (unsigned long long)got_, #wanted, wanted_);         \
 		}                                                                                  \
 	} while (0)
 
