@@ -1,0 +1,385 @@
+/* SPDX-License-Identifier: MIT */
+#include "admin/command.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "image/image.h"
+
+/* Of a slave with a one-shot mode: the DC time at which its SYNC0 shall fire (DESIGN 5). */
+#define ONESHOT_ENTRY "oneshot_time"
+enum { MODE_INDEX = 0x8000, MODE_SUBINDEX = 1 };
+
+/* One item of a set, resolved. */
+struct placed {
+	size_t channel;
+	unsigned output; /* its place on the board */
+	uint64_t raw;
+};
+
+void admin_reply_refuse(struct admin_reply *reply, int result, const char *format, ...)
+{
+	va_list args;
+
+	reply->result = result;
+	va_start(args, format);
+	vsnprintf(reply->text, sizeof(reply->text), format, args);
+	va_end(args);
+}
+
+static void emit(const struct admin_target *t, enum event_id id, uint16_t slave_pos, int64_t value,
+		 int32_t arg0, int32_t arg1)
+{
+	struct event ev = {
+		.id = (uint16_t)id,
+		.slave_pos = slave_pos,
+		.value = value,
+		.arg = { arg0, arg1 },
+	};
+
+	t->emit(t->ctx, &ev);
+}
+
+static int has_op(const struct admin_target *t, struct admin_reply *reply)
+{
+	if (t->board == NULL || !t->is_op) {
+		admin_reply_refuse(reply, -EAGAIN, "the bus is not in OP");
+		return 0;
+	}
+	return 1;
+}
+
+static const struct config_output *output_config(const struct config *cfg, const char *channel)
+{
+	for (size_t i = 0; i < cfg->output_count; i++) {
+		if (strncmp(cfg->output[i].channel, channel, LIMIT_NAME_BYTES) == 0) {
+			return &cfg->output[i];
+		}
+	}
+	return NULL;
+}
+
+/* Its place on the board: the n-th output of the channel table (base/board.h). */
+static unsigned output_index(const struct admin_target *t, size_t channel)
+{
+	unsigned n = 0;
+
+	for (size_t i = 0; i < channel; i++) {
+		n += t->channels[i].direction == CHANNEL_OUTPUT;
+	}
+	return n;
+}
+
+static const char *owner_name(enum config_owner owner)
+{
+	switch (owner) {
+	case CONFIG_OWNER_LOCAL:
+		return "local";
+	case CONFIG_OWNER_PROGRAM:
+		return "program";
+	case CONFIG_OWNER_REMOTE:
+		return "remote";
+	}
+	return "unknown";
+}
+
+/* May the local writer put @raw on @channel? 0, or the refusal in @reply. */
+static int check_output(const struct admin_target *t, size_t channel, uint64_t raw,
+			struct admin_reply *reply)
+{
+	const struct channel *ch = &t->channels[channel];
+	const struct config_output *out = output_config(t->cfg, ch->name);
+	double physical;
+
+	if (ch->direction != CHANNEL_OUTPUT) {
+		admin_reply_refuse(reply, -EPERM, "%s: an input, not an output", ch->name);
+		return reply->result;
+	}
+	if (out != NULL && out->owner != CONFIG_OWNER_LOCAL) {
+		admin_reply_refuse(reply, -EPERM, "%s: owned by %s, not local (outputs[].owner)",
+				   ch->name, owner_name(out->owner));
+		return reply->result;
+	}
+	if (ch->bit_len < 64 && raw >> ch->bit_len != 0) {
+		admin_reply_refuse(reply, -ERANGE, "%s: %" PRIu64 " does not fit in %u bits",
+				   ch->name, raw, ch->bit_len);
+		return reply->result;
+	}
+	physical = image_raw_to_physical(ch, raw);
+	/* A NaN is in no range. */
+	if (out != NULL && !(physical >= out->min && physical <= out->max)) {
+		admin_reply_refuse(reply, -ERANGE, "%s: %g is outside %g to %g (outputs[])",
+				   ch->name, physical, out->min, out->max);
+		return reply->result;
+	}
+	return 0;
+}
+
+static int place_item(const struct admin_target *t, const struct admin_item *item,
+		      struct placed *ret_placed, struct admin_reply *reply)
+{
+	int channel = image_channel_find(t->channels, t->channel_count, item->channel);
+	int r;
+
+	if (channel < 0) {
+		admin_reply_refuse(reply, -ENOENT, "%s: no such channel", item->channel);
+		return reply->result;
+	}
+	r = check_output(t, (size_t)channel, item->raw, reply);
+	if (r < 0) {
+		return r;
+	}
+	*ret_placed = (struct placed){
+		.channel = (size_t)channel,
+		.output = output_index(t, (size_t)channel),
+		.raw = item->raw,
+	};
+	return 0;
+}
+
+static uint64_t put_all(const struct admin_target *t, const struct placed *placed, size_t count)
+{
+	board_begin(t->board);
+	for (size_t i = 0; i < count; i++) {
+		board_put(t->board, placed[i].output, placed[i].raw);
+	}
+	return board_commit(t->board);
+}
+
+static enum admin_outcome run_set(const struct admin_target *t, const struct admin_request *rq,
+				  uint32_t uid, struct admin_reply *reply, uint64_t *ret_sequence)
+{
+	struct placed placed[ADMIN_ITEMS];
+
+	if (!has_op(t, reply)) {
+		emit(t, EVENT_COMMAND_REFUSED, EVENT_NO_SLAVE, -1, reply->result, (int32_t)uid);
+		return ADMIN_DONE;
+	}
+	/* All or nothing: the board is touched when every item has been found good. */
+	for (size_t i = 0; i < rq->count; i++) {
+		if (place_item(t, &rq->item[i], &placed[i], reply) < 0) {
+			int channel = image_channel_find(t->channels, t->channel_count,
+							 rq->item[i].channel);
+
+			emit(t, EVENT_COMMAND_REFUSED, EVENT_NO_SLAVE, channel < 0 ? -1 : channel,
+			     reply->result, (int32_t)uid);
+			return ADMIN_DONE;
+		}
+	}
+	*ret_sequence = put_all(t, placed, rq->count);
+	for (size_t i = 0; i < rq->count; i++) {
+		emit(t, EVENT_OUTPUT_SET, t->channels[placed[i].channel].slave_pos,
+		     (int64_t)placed[i].channel, 0, (int32_t)uid);
+	}
+	return ADMIN_DEFERRED;
+}
+
+/* --- one-shot --- */
+
+static int is_oneshot(const struct config *cfg, uint16_t slave_pos)
+{
+	if (slave_pos < cfg->slave_count && cfg->slave[slave_pos].mode != CONFIG_MODE_UNSET) {
+		return cfg->slave[slave_pos].mode == CONFIG_MODE_ONESHOT;
+	}
+	for (size_t i = 0; i < cfg->sdo_count; i++) {
+		const struct config_sdo *sdo = &cfg->sdo[i];
+
+		if (sdo->slave_pos == slave_pos && sdo->index == MODE_INDEX &&
+		    sdo->subindex == MODE_SUBINDEX && sdo->value == 1) {
+			return 1;
+		}
+	}
+	return 0;
+}
+
+static int find_oneshot(const struct admin_target *t, uint16_t slave_pos)
+{
+	for (size_t i = 0; i < t->channel_count; i++) {
+		const struct channel *ch = &t->channels[i];
+		const char *entry = strrchr(ch->name, '.');
+
+		if (ch->slave_pos == slave_pos && ch->direction == CHANNEL_OUTPUT && entry != NULL &&
+		    strcmp(entry + 1, ONESHOT_ENTRY) == 0) {
+			return (int)i;
+		}
+	}
+	return -ENOENT;
+}
+
+/* The absolute time asked for, if it can still be reached; else the refusal. */
+static int oneshot_time(const struct admin_target *t, const struct admin_request *rq,
+			int64_t *ret_time_ns, struct admin_reply *reply)
+{
+	int64_t margin_ns = ADMIN_ONESHOT_MARGIN_CYCLES * t->cfg->cycle_period_ns;
+	int64_t now_ns;
+	int64_t at_ns = rq->dc_time_ns;
+
+	if (t->dc_now(t->ctx, &now_ns) < 0) {
+		admin_reply_refuse(reply, -EAGAIN, "the DC time is not known yet");
+		return reply->result;
+	}
+	if (rq->is_relative && __builtin_add_overflow(now_ns, rq->dc_time_ns, &at_ns)) {
+		admin_reply_refuse(reply, -ERANGE, "the time is out of range");
+		return reply->result;
+	}
+	if (at_ns <= now_ns) {
+		admin_reply_refuse(reply, -ETIME, "the time is in the past (DC time is %" PRId64 " ns)",
+				   now_ns);
+		return reply->result;
+	}
+	if (at_ns - now_ns < margin_ns) {
+		admin_reply_refuse(reply, -ETIME, "only %" PRId64 " ns ahead, at least %" PRId64
+				   " ns are needed", at_ns - now_ns, margin_ns);
+		return reply->result;
+	}
+	*ret_time_ns = at_ns;
+	return 0;
+}
+
+static int place_oneshot(const struct admin_target *t, const struct admin_request *rq,
+			 struct placed *ret_placed, struct admin_reply *reply)
+{
+	int channel;
+	int64_t at_ns;
+	int r;
+
+	if (!has_op(t, reply)) {
+		return reply->result;
+	}
+	if (rq->slave_pos >= t->slave_count) {
+		admin_reply_refuse(reply, -ENODEV, "slave %u: there are %zu slaves", rq->slave_pos,
+				   t->slave_count);
+		return reply->result;
+	}
+	channel = find_oneshot(t, rq->slave_pos);
+	if (channel < 0) {
+		admin_reply_refuse(reply, -EOPNOTSUPP, "%s: has no output " ONESHOT_ENTRY,
+				   t->slaves[rq->slave_pos].name);
+		return reply->result;
+	}
+	if (!is_oneshot(t->cfg, rq->slave_pos)) {
+		admin_reply_refuse(reply, -EOPNOTSUPP,
+				   "%s: is in periodic mode (slaves[%u].mode: oneshot)",
+				   t->slaves[rq->slave_pos].name, rq->slave_pos);
+		return reply->result;
+	}
+	r = oneshot_time(t, rq, &at_ns, reply);
+	if (r < 0) {
+		return r;
+	}
+	r = check_output(t, (size_t)channel, (uint64_t)at_ns, reply);
+	if (r < 0) {
+		return r;
+	}
+	reply->dc_time_ns = at_ns;
+	*ret_placed = (struct placed){
+		.channel = (size_t)channel,
+		.output = output_index(t, (size_t)channel),
+		.raw = (uint64_t)at_ns,
+	};
+	return 0;
+}
+
+static enum admin_outcome run_oneshot(const struct admin_target *t, const struct admin_request *rq,
+				      uint32_t uid, struct admin_reply *reply,
+				      uint64_t *ret_sequence)
+{
+	struct placed placed;
+
+	if (place_oneshot(t, rq, &placed, reply) < 0) {
+		emit(t, EVENT_COMMAND_REFUSED, rq->slave_pos, -1, reply->result, (int32_t)uid);
+		return ADMIN_DONE;
+	}
+	*ret_sequence = put_all(t, &placed, 1);
+	emit(t, EVENT_COMMAND, rq->slave_pos, reply->dc_time_ns, ADMIN_ONESHOT, (int32_t)uid);
+	return ADMIN_DEFERRED;
+}
+
+/* --- SDO --- */
+
+static void sdo_result(const struct admin_target *t, const struct admin_request *rq, int r,
+		       struct admin_reply *reply)
+{
+	const char *what = rq->verb == ADMIN_SDO_READ ? "read" : "write";
+	int32_t object = (int32_t)((uint32_t)rq->index << 8 | rq->subindex);
+
+	if (r == 0) {
+		return;
+	}
+	if (reply->sdo_abort != 0) {
+		emit(t, EVENT_SDO_ABORT, rq->slave_pos, reply->sdo_abort, object, 0);
+		admin_reply_refuse(reply, r, "slave %u: SDO %s of 0x%04x:%02x: abort code 0x%08x",
+				   rq->slave_pos, what, rq->index, rq->subindex, reply->sdo_abort);
+		return;
+	}
+	admin_reply_refuse(reply, r, "slave %u: SDO %s of 0x%04x:%02x: no answer (error %d)",
+			   rq->slave_pos, what, rq->index, rq->subindex, -r);
+}
+
+static void run_sdo(const struct admin_target *t, const struct admin_request *rq, uint32_t uid,
+		    struct admin_reply *reply)
+{
+	size_t len = ADMIN_DATA_BYTES;
+	int r;
+
+	if (t->sdo_read == NULL || t->sdo_write == NULL || t->slave_count == 0) {
+		admin_reply_refuse(reply, -EAGAIN, "the bus is down");
+		return;
+	}
+	if (rq->slave_pos >= t->slave_count) {
+		admin_reply_refuse(reply, -ENODEV, "slave %u: there are %zu slaves", rq->slave_pos,
+				   t->slave_count);
+		return;
+	}
+	if (rq->verb == ADMIN_SDO_READ) {
+		r = t->sdo_read(t->ctx, rq, reply->data, &len, &reply->sdo_abort);
+		reply->data_len = r == 0 ? (uint32_t)len : 0;
+	} else {
+		emit(t, EVENT_COMMAND, rq->slave_pos, (int64_t)rq->index << 8 | rq->subindex,
+		     ADMIN_SDO_WRITE, (int32_t)uid);
+		r = t->sdo_write(t->ctx, rq, &reply->sdo_abort);
+	}
+	sdo_result(t, rq, r, reply);
+}
+
+enum admin_outcome admin_command_run(const struct admin_target *target,
+				     const struct admin_request *request, uint32_t uid,
+				     struct admin_reply *reply, uint64_t *ret_sequence)
+{
+	*reply = (struct admin_reply){ .magic = ADMIN_MAGIC };
+	switch ((enum admin_verb)request->verb) {
+	case ADMIN_PING:
+		return ADMIN_DONE;
+	case ADMIN_SET:
+		return run_set(target, request, uid, reply, ret_sequence);
+	case ADMIN_ONESHOT:
+		return run_oneshot(target, request, uid, reply, ret_sequence);
+	case ADMIN_SDO_READ:
+	case ADMIN_SDO_WRITE:
+		run_sdo(target, request, uid, reply);
+		return ADMIN_DONE;
+	case ADMIN_STOP:
+		emit(target, EVENT_COMMAND, EVENT_NO_SLAVE, 0, ADMIN_STOP, (int32_t)uid);
+		target->stop(target->ctx);
+		return ADMIN_DONE;
+	case ADMIN_CLEAR:
+		emit(target, EVENT_COMMAND, EVENT_NO_SLAVE, 0, ADMIN_CLEAR, (int32_t)uid);
+		target->clear(target->ctx);
+		return ADMIN_DONE;
+	}
+	admin_reply_refuse(reply, -EINVAL, "unknown verb %u", request->verb);
+	return ADMIN_DONE;
+}
+
+int admin_reply_finish(const struct board *board, uint64_t sequence, struct admin_reply *reply)
+{
+	/* Sequences only grow: a newer set on the wire holds the values of this one, too. */
+	if (atomic_load_explicit(&board->taken_sequence, memory_order_acquire) < sequence) {
+		return 0;
+	}
+	reply->cycle = atomic_load_explicit(&board->taken_cycle, memory_order_relaxed);
+	return 1;
+}

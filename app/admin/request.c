@@ -1,0 +1,108 @@
+/* SPDX-License-Identifier: MIT */
+#include "admin/command.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+
+static int refuse(char *why, int result, const char *text)
+{
+	snprintf(why, ADMIN_TEXT_BYTES, "%s", text);
+	return result;
+}
+
+/* A name that can be printed in a line: it comes back in messages. */
+static int is_name(const char *name)
+{
+	size_t len = strnlen(name, LIMIT_NAME_BYTES);
+
+	if (len == 0 || len == LIMIT_NAME_BYTES) {
+		return 0;
+	}
+	for (size_t i = 0; i < len; i++) {
+		if (name[i] <= ' ' || name[i] > '~') {
+			return 0;
+		}
+	}
+	return 1;
+}
+
+static int check_items(const struct admin_request *rq, char *why)
+{
+	if (rq->count == 0 || rq->count > ADMIN_ITEMS) {
+		snprintf(why, ADMIN_TEXT_BYTES, "%u items: a request sets 1 to ADMIN_ITEMS = %d",
+			 rq->count, ADMIN_ITEMS);
+		return -EINVAL;
+	}
+	for (uint32_t i = 0; i < rq->count; i++) {
+		if (!is_name(rq->item[i].channel)) {
+			snprintf(why, ADMIN_TEXT_BYTES, "item %u has no valid channel name", i);
+			return -EINVAL;
+		}
+	}
+	return 0;
+}
+
+static int check_slave(const struct admin_request *rq, char *why)
+{
+	if (rq->slave_pos >= LIMIT_SLAVES) {
+		snprintf(why, ADMIN_TEXT_BYTES, "slave %u: positions go from 0 to %d",
+			 rq->slave_pos, LIMIT_SLAVES - 1);
+		return -EINVAL;
+	}
+	return 0;
+}
+
+static int check_verb(const struct admin_request *rq, char *why)
+{
+	switch ((enum admin_verb)rq->verb) {
+	case ADMIN_PING:
+	case ADMIN_STOP:
+	case ADMIN_CLEAR:
+		return 0;
+	case ADMIN_SET:
+		return check_items(rq, why);
+	case ADMIN_ONESHOT:
+		if (rq->is_relative > 1) {
+			return refuse(why, -EINVAL, "is_relative is neither 0 nor 1");
+		}
+		return check_slave(rq, why);
+	case ADMIN_SDO_READ:
+		return check_slave(rq, why);
+	case ADMIN_SDO_WRITE:
+		if (rq->data_len == 0 || rq->data_len > ADMIN_DATA_BYTES) {
+			snprintf(why, ADMIN_TEXT_BYTES,
+				 "%u bytes of data: an SDO takes 1 to ADMIN_DATA_BYTES = %d",
+				 rq->data_len, ADMIN_DATA_BYTES);
+			return -EINVAL;
+		}
+		return check_slave(rq, why);
+	}
+	snprintf(why, ADMIN_TEXT_BYTES, "unknown verb %u", rq->verb);
+	return -EINVAL;
+}
+
+int admin_request_parse(const void *message, size_t len, struct admin_request *ret_request,
+			char *why)
+{
+	struct admin_request rq;
+	int r;
+
+	if (len != sizeof(rq)) {
+		snprintf(why, ADMIN_TEXT_BYTES, "a request has %zu bytes, not %zu", sizeof(rq), len);
+		return -EMSGSIZE;
+	}
+	memcpy(&rq, message, sizeof(rq));
+	if (rq.magic != ADMIN_MAGIC) {
+		return refuse(why, -EPROTO, "not a request of this version");
+	}
+	if (rq.reserved != 0) {
+		return refuse(why, -EINVAL, "the reserved field is not zero");
+	}
+	r = check_verb(&rq, why);
+	if (r < 0) {
+		return r;
+	}
+	*ret_request = rq;
+	return 0;
+}

@@ -1,0 +1,40 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The admin socket: SOCK_SEQPACKET, up to ADMIN_CLIENTS of them, driven from the service thread by
+ * polling; it never blocks on a client. Who may connect is ruled by the socket's mode and group.
+ */
+#ifndef ADMIN_SERVER_H
+#define ADMIN_SERVER_H
+
+#include <stddef.h>
+#include <sys/types.h>
+
+#include "admin/command.h"
+#include "base/clock.h"
+
+enum { ADMIN_CLIENTS = 16 };
+/* So long the cycle has to answer a set of outputs. */
+#define ADMIN_ANSWER_TIMEOUT_NS (1 * NS_PER_S)
+
+struct admin_server;
+
+/**
+ * Listen at @path, mode 0660; a socket left by an earlier run is replaced. @group (gid_t)-1: leave.
+ * 0 or -errno with one line in @error. Free with admin_server_destroy(). Context: blocking.
+ */
+int admin_server_create(const char *path, gid_t group, struct admin_server **ret_server, char *error,
+			size_t error_bytes);
+/** Closes all clients and removes the socket. NULL is fine. */
+void admin_server_destroy(struct admin_server *server);
+
+/** A descriptor that polls readable when admin_server_service() has something to do. */
+int admin_server_fd(const struct admin_server *server);
+
+/**
+ * One pass: new clients, requests, answers that have become due at @now. Returns how many replies
+ * still wait for the cycle. Context: service thread; blocks only for SDO requests.
+ */
+unsigned admin_server_service(struct admin_server *server, const struct admin_target *target,
+			      mono_t now);
+
+#endif
