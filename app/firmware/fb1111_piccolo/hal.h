@@ -1,0 +1,39 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * What the firmware needs of the board, and nothing else. On the F28069 these are SPI-A in mode 3
+ * (CPOL = 1, CPHA = 1) at 10 Mbit/s, GPIO for chip select, EEPROM_LOADED and LED, the ADC with XINT2
+ * (wired to the ET1100's SYNC0) as start-of-conversion trigger, CPU timer 0, and the global interrupt
+ * mask. In the simulator they are sim/devices/fb1111_piccolo.c.
+ */
+#ifndef FB1111_PICCOLO_HAL_H
+#define FB1111_PICCOLO_HAL_H
+
+#include "octet.h"
+
+struct piccolo_hal {
+	void *ctx; /* handed back in every call */
+
+	/** Chip select of the ET1100 low, high. */
+	void (*spi_select)(void *ctx);
+	void (*spi_deselect)(void *ctx);
+	/** Clock one octet out and one in, MSB first. */
+	octet_t (*spi_transfer)(void *ctx, octet_t out);
+	/** Level of EEPROM_LOADED: 0 means that the ET1100's PDI does not answer yet. */
+	int (*eeprom_loaded)(void *ctx);
+
+	/** From now on every SYNC0 edge starts one conversion, in hardware, without the CPU. */
+	void (*adc_start)(void *ctx);
+	/** Result of the last conversion, 0..4095; waits for its end. */
+	uint16_t (*adc_read)(void *ctx);
+	/** Nonzero if a conversion ended before the last one was read (ADCINTOVF); clears it. */
+	int (*adc_overrun)(void *ctx);
+
+	void (*led)(void *ctx, int on);
+	/** Free-running microseconds, wraps at 2^32; only differences are used. */
+	uint32_t (*time_us)(void *ctx);
+	/** Mask and unmask the SYNC0 interrupt; never nested. A masked edge stays pending. */
+	void (*interrupts_off)(void *ctx);
+	void (*interrupts_on)(void *ctx);
+};
+
+#endif

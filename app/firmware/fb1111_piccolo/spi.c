@@ -1,0 +1,101 @@
+/* SPDX-License-Identifier: MIT */
+#include "spi.h"
+
+enum spi_command {
+	SPI_NOP = 0,              /* two address octets, no data */
+	SPI_READ_WAIT_STATE = 3,  /* one 0xff between address and data */
+	SPI_WRITE = 4,
+	SPI_ADDRESS_EXTENSION = 6 /* a third address octet follows */
+};
+
+enum { SPI_WAIT_STATE = 0xff, SPI_MORE = 0x00, SPI_LAST = 0xff };
+
+static octet_t transfer(struct piccolo *p, unsigned out)
+{
+	return OCTET(p->hal.spi_transfer(p->hal.ctx, OCTET(out)));
+}
+
+/* The first two address octets bring 0x0220:0x0221 back. */
+static void begin(struct piccolo *p, uint16_t address, enum spi_command command)
+{
+	unsigned event;
+
+	p->hal.spi_select(p->hal.ctx);
+	event = transfer(p, (unsigned)address >> 5);
+	event |= (unsigned)transfer(p, ((unsigned)address & 0x1fu) << 3 |
+					(unsigned)(command == SPI_NOP ? SPI_NOP : SPI_ADDRESS_EXTENSION))
+		 << 8;
+	if (command != SPI_NOP) {
+		(void)transfer(p, ((unsigned)address >> 13) << 5 | (unsigned)command << 2);
+	}
+	p->al_event = (uint16_t)event;
+	p->accessed_us = p->hal.time_us(p->hal.ctx);
+}
+
+/* The master's 0xff with the last octet keeps the ET1100 from fetching one more. */
+void piccolo_spi_read(struct piccolo *p, uint16_t address, octet_t *data, uint16_t len)
+{
+	uint16_t i;
+
+	begin(p, address, SPI_READ_WAIT_STATE);
+	(void)transfer(p, SPI_WAIT_STATE);
+	for (i = 0; i < len; i++) {
+		data[i] = transfer(p, i + 1u == len ? SPI_LAST : SPI_MORE);
+	}
+	p->hal.spi_deselect(p->hal.ctx);
+}
+
+void piccolo_spi_write(struct piccolo *p, uint16_t address, const octet_t *data, uint16_t len)
+{
+	uint16_t i;
+
+	begin(p, address, SPI_WRITE);
+	for (i = 0; i < len; i++) {
+		(void)transfer(p, data[i]);
+	}
+	p->hal.spi_deselect(p->hal.ctx);
+}
+
+void piccolo_spi_poll(struct piccolo *p)
+{
+	begin(p, 0, SPI_NOP);
+	p->hal.spi_deselect(p->hal.ctx);
+}
+
+void piccolo_esc_read(struct piccolo *p, uint16_t address, octet_t *data, uint16_t len)
+{
+	p->hal.interrupts_off(p->hal.ctx);
+	piccolo_spi_read(p, address, data, len);
+	p->hal.interrupts_on(p->hal.ctx);
+}
+
+void piccolo_esc_write(struct piccolo *p, uint16_t address, const octet_t *data, uint16_t len)
+{
+	p->hal.interrupts_off(p->hal.ctx);
+	piccolo_spi_write(p, address, data, len);
+	p->hal.interrupts_on(p->hal.ctx);
+}
+
+octet_t piccolo_esc_read8(struct piccolo *p, uint16_t address)
+{
+	octet_t data[1];
+
+	piccolo_esc_read(p, address, data, 1);
+	return data[0];
+}
+
+uint16_t piccolo_esc_read16(struct piccolo *p, uint16_t address)
+{
+	octet_t data[2];
+
+	piccolo_esc_read(p, address, data, 2);
+	return octets_get16(data);
+}
+
+void piccolo_esc_write16(struct piccolo *p, uint16_t address, uint16_t value)
+{
+	octet_t data[2];
+
+	octets_put16(data, value);
+	piccolo_esc_write(p, address, data, 2);
+}
