@@ -140,6 +140,7 @@ int ring_create(const struct ring_spec *spec, struct ring **ret_ring)
 		free(ring);
 		return r;
 	}
+	assert(map != NULL);
 	memcpy(map, &header, sizeof(header));
 	if (spec->meta_bytes > 0) {
 		memcpy((char *)map + header.meta_offset, spec->meta, spec->meta_bytes);

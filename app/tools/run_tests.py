@@ -212,7 +212,11 @@ def run_fuzz_target(suite: Suite, target: Path, seconds: int) -> Outcome:
     corpus = sorted((source / "corpus").glob("*"))
     steps: list[tuple[str, list[str | Path], bool]] = [
         ("corpus", [target, *limits, *corpus], False),
-        ("search", [target, *limits, f"-max_total_time={seconds}", found, source / "corpus"], False),
+        (
+            "search",
+            [target, *limits, f"-max_total_time={seconds}", found, source / "corpus"],
+            False,
+        ),
     ]
     if name == "canary":
         steps = [("is found", [target, *limits, "-max_total_time=60"], True)]
