@@ -31,6 +31,7 @@ environment of every verb:
   XDG_CACHE_HOME      where ecdaq/ keeps its downloads and Python environment (default: ~/.cache)
   ECDAQ_SOEM_ARCHIVE  the archive that app/third_party/soem.lock names, where no registry is reached
   PIP_*, pip.conf     the machine's own pip configuration holds
+  ECDAQ_OS_RELEASE    what says which system this is (default: /etc/os-release)
 USAGE
 }
 

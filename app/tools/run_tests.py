@@ -150,7 +150,10 @@ def read_junit(path: Path, label: str) -> Outcome:
 def finish(suite: Suite, junit: Path, log: Path, status: int, good: tuple[int, ...]) -> Outcome:
     outcome = Outcome()
     if junit.exists():
-        outcome = read_junit(junit, suite.name)
+        try:
+            outcome = read_junit(junit, suite.name)
+        except ET.ParseError as error:
+            outcome.failures.append(f"{suite.name}: {junit.name} cannot be read: {error}")
     if status not in good and not outcome.failures:
         text = log.read_text(errors="replace")
         outcome.failures.append(f"{suite.name}: ended with {status}\n{tail(text, 30)}")

@@ -57,9 +57,10 @@ missing_packages()
 
 is_supported_debian()
 {
-	[ -r /etc/os-release ] || return 1
-	# shellcheck disable=SC1091 # a file of the machine
-	( . /etc/os-release && [ "${ID:-}" = debian ] &&
+	release=${ECDAQ_OS_RELEASE:-/etc/os-release}
+	[ -r "$release" ] || return 1
+	# shellcheck disable=SC1090 # a file of the machine
+	( . "$release" && [ "${ID:-}" = debian ] &&
 		{ [ "${VERSION_ID:-}" = 12 ] || [ "${VERSION_ID:-}" = 13 ]; } )
 }
 

@@ -31,7 +31,7 @@ INCLUDE_TABLE: dict[str, set[str]] = {
     "record": READERS,
     "publish": READERS,
     "sync0": READERS,
-    "cli": READERS | {"record/log.h"},
+    "cli": READERS | {"record/log.h", "wire/al.h"},
     "firmware": {"base", "wire"},
     "sim": {"base", "wire", "firmware"},
     "examples": {"base/ring.h", "base/sample.h", "base/event.h", "base/timemap.h", "image/image.h"},
@@ -86,7 +86,9 @@ FUNCTION_LINES = 70
 FILE_LINES = 400
 # Files that are tables, or a subject that does not fall into two; 800 lines at most. Each with why.
 LONG_FILE_LINES = 800
-LONG_FILES: dict[str, str] = {}
+LONG_FILES: dict[str, str] = {
+    "app/config/options.c": "the option table, a line a property",
+}
 # Files whose one function is a table of texts.
 LONG_FUNCTIONS: dict[tuple[str, str], str] = {
     ("app/base/event.c", "event_format"): "one text an event",

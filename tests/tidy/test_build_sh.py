@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: MIT
+"""build.sh explains itself, and says in one line what is wrong with a call."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+from project import ROOT
+
+VERBS = ["run", "test", "build", "sim", "fuzz", "lint", "clean", "image", "boot", "help"]
+
+
+def build_sh(*arguments: str, **env: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [ROOT / "build.sh", *arguments],
+        env=os.environ | env,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_is_explained(verb: str) -> None:
+    assert re.search(rf"^  {verb} ", build_sh("help").stdout, re.MULTILINE)
+    explained = build_sh("help", verb)
+    assert explained.returncode == 0
+    assert "usage: ./build.sh" in explained.stdout
+
+
+@pytest.mark.parametrize("verb", ["run", "test", "lint", "clean"])
+def test_every_option_is_documented(verb: str) -> None:
+    text = (ROOT / "build.sh").read_text()
+    if verb == "run":
+        body = (ROOT / "app/tools/run-segment.sh").read_text()
+        body = body[body.index("parse_options()") : body.index("check_options()")]
+        known = set(re.findall(r"(--[a-z-]+)(?= \||\))", body)) - {"--check", "--inside", "--help"}
+    elif verb == "test":
+        body = (ROOT / "app/tools/run_tests.py").read_text()
+        known = set(re.findall(r'add_argument\(\s*"(--[a-z-]+)"', body))
+    else:
+        body = text[text.index(f"do_{verb}()") :]
+        known = set(re.findall(r"^\t(--[a-z-]+)\)", body[: body.index("\n}")], re.MULTILINE))
+    assert known
+    explained = build_sh("help", verb).stdout
+    assert not [option for option in known if f" {option} " not in explained]
+
+
+def test_every_variable_is_documented() -> None:
+    scripts = ["build.sh", "app/tools/setup.sh", "app/tools/run-segment.sh"]
+    read = {
+        name
+        for script in scripts
+        for name in re.findall(r"\$\{(ECDAQ_\w+|PYTHON|XDG_\w+):-", (ROOT / script).read_text())
+    }
+    explained = "".join(build_sh("help", verb).stdout for verb in ("help", "test", "run"))
+    assert read
+    assert not [name for name in read if name not in explained]
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (["fly"], "no verb 'fly'"),
+        (["help", "fly"], "no verb 'fly'"),
+        (["run", "--seconds", "0"], "--seconds: '0'"),
+        (["run", "--seconds", "1m"], "--seconds: '1m'"),
+        (["run", "--seconds"], "--seconds needs a value"),
+        (["run", "--slaves", "65"], "--slaves: 65 is not 1 to 64"),
+        (["run", "--slaves", "0"], "--slaves: 0 is not 1 to 64"),
+        (["run", "--slaves", "ek1100", "--sii", ""], "names need --sii DIR"),
+        (["run", "--slaves", "ek1100", "--sii", "/nowhere"], "/nowhere: no such folder"),
+        (["run", "--config", "/nowhere.yaml"], "/nowhere.yaml: cannot be read"),
+        (["run", "--fast"], "unknown option '--fast'"),
+        (["clean", "everything"], "unknown option 'everything'"),
+        (["fuzz", "nothing"], "no target 'nothing'"),
+        (["fuzz", "canary", "long"], "'long' is no number"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else None,
+)
+def test_a_wrong_call_gets_one_line(call: list[str], message: str) -> None:
+    result = build_sh(*call)
+    assert result.returncode == 1
+    assert result.stderr.count("\n") == 1, result.stderr
+    assert message in result.stderr
+
+
+@pytest.mark.parametrize("verb", ["image", "boot"])
+def test_what_is_not_there_yet_is_said(verb: str) -> None:
+    result = build_sh(verb)
+    assert result.returncode == 2
+    assert "comes with the image issue" in result.stderr
+
+
+def test_an_unknown_group_is_named() -> None:
+    result = build_sh("test", "units")
+    assert result.returncode == 2
+    assert "no group 'units'" in result.stderr
+
+
+def test_a_group_that_is_not_there_yet_fails_by_name() -> None:
+    result = build_sh("test", "dds")
+    assert result.returncode == 1
+    assert "dds: not there yet" in result.stdout
+    assert result.stdout.splitlines()[-1] == "0 passed, 1 failed, 0 skipped"
+
+
+def test_where_nothing_can_be_installed_what_is_missing_is_listed_with_its_reason(
+    tmp_path: Path,
+) -> None:
+    tools = tmp_path / "bin"
+    tools.mkdir()
+    for folder in ("/usr/bin", "/bin"):
+        for tool in Path(folder).iterdir():
+            if tool.name not in ("ninja", "patch") and not (tools / tool.name).exists():
+                (tools / tool.name).symlink_to(tool)
+    release = tmp_path / "os-release"
+    release.write_text("ID=other\n")
+    result = build_sh("build", PATH=str(tools), ECDAQ_OS_RELEASE=str(release))
+    assert result.returncode == 1
+    assert "not Debian 12 or 13" in result.stderr
+    assert re.search(r"^  ninja-build +carries the build out$", result.stderr, re.MULTILINE)
+    assert re.search(r"^  patch +applies our patches", result.stderr, re.MULTILINE)
+    assert "cmake " not in result.stderr
