@@ -32,9 +32,10 @@ static void print_sample(const void *payload, const struct channel *const *wante
 	printf("%s\n", header.flags == 0 && header.slaves_bad == 0 ? "" : " bad");
 }
 
-static int read_until_closed(struct ring_reader *reader, const struct channel *const *wanted, int count)
+static int read_until_closed(struct ring_reader *reader, const struct channel *const *wanted,
+			     int count)
 {
-	const struct timespec pause = { .tv_nsec = 10 * 1000 * 1000 };
+	const struct timespec pause = { .tv_nsec = 10000000 };
 	void *payload = malloc(ring_payload_bytes(reader));
 
 	if (payload == NULL) {
