@@ -3,8 +3,10 @@
  * The cyclic exchange: our own frames, made once, sent every cycle. The first frame carries LRW (of
  * the first part of the process image), FRMW of 0x0910, and, if wanted, BRD of 0x0130 and of 0x092C; further
  * frames carry the rest of the image. A SyncManager's buffer is never split (T41). Every
- * datagram's echo is checked (command, index, address, length); its index bytes carry a 16-bit
- * exchange sequence, so that a late or doubled frame is recognised, counted and never taken (T05, T06).
+ * datagram's echo is checked (command, index, address, length, and that a slave marked the source
+ * address); its index bytes carry a 16-bit exchange sequence, so that a late or doubled frame is
+ * recognised, counted and never taken (T05, T06). The reference clock is asked by FPRD instead of
+ * FRMW in the first cycle and while it is gone (T17, bus/exchange_dc.h).
  */
 #ifndef BUS_EXCHANGE_H
 #define BUS_EXCHANGE_H
@@ -18,7 +20,7 @@
 enum exchange_status {
 	EXCHANGE_OK,
 	EXCHANGE_NO_FRAME, /* one or more frames were not back before the deadline */
-	EXCHANGE_WKC_LOW,  /* all back, but not every slave answered: the image is not touched */
+	EXCHANGE_WKC_LOW,  /* all back, but a WKC is not as expected: the image is not touched */
 };
 
 struct exchange_plan {
@@ -38,7 +40,7 @@ struct exchange_result {
 	enum exchange_status status;
 	uint16_t wkc;
 	uint16_t wkc_expected;
-	int64_t dc_time_ns;    /* system time of the reference at this frame; 0: its WKC was 0 */
+	int64_t dc_time_ns;    /* system time of the reference at this frame; 0: no (believable) answer */
 	uint16_t al_status;    /* all slaves' AL status ORed: exactly AL_OP only if all are in OP */
 	uint16_t al_wkc;       /* how many answered; 0 without monitor */
 	int64_t dc_diff_ns;    /* all slaves' |0x092C| ORed: an upper estimate; -1: not read */

@@ -44,11 +44,15 @@ void line_bind(struct line *line);
 struct line *line_bound(void);
 
 /**
- * Send @frame and wait for its echo: same command and index in the first datagram, same length. Returns the answer's
- * length, -ETIMEDOUT, or -errno of the transport. Other frames are thrown away and counted.
+ * Send @frame and wait for its echo (link/echo.h: every command, index, address and length the same).
+ * Returns the answer's length, -ETIMEDOUT, -EINVAL for bytes that are no EtherCAT frame, or -errno of
+ * the transport. Other frames are thrown away and counted. While riding, @timeout is 100 ms at least.
  */
 int line_transact(struct line *line, const uint8_t *frame, size_t frame_len, uint8_t *ret_answer,
 		  size_t capacity, span_t timeout);
+
+/** Frames that line_transact() met and threw away in direct mode. */
+uint64_t line_thrown_away(const struct line *line);
 
 /** Let @span pass; while riding the cycle goes on. */
 void line_sleep(struct line *line, span_t span);

@@ -1,0 +1,321 @@
+/* SPDX-License-Identifier: MIT */
+#include "bus/exchange.h"
+
+#include <assert.h>
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/bytes.h"
+#include "bus/exchange_dc.h"
+#include "bus/exchange_frame.h"
+#include "wire/datagram.h"
+
+enum {
+	HISTORY = 256, /* exchanges whose frames are remembered, to tell a late one from a doubled one */
+	DC_DIFF_MAGNITUDE = 0x7fffffff,
+};
+
+static_assert(LIMIT_FRAMES <= 8, "a bit per frame in history[]");
+
+struct exchange {
+	struct exchange_plan plan;
+	struct line *line;
+	struct transport transport;
+	struct platform platform;
+	unsigned frame_count;
+	uint16_t sequence;              /* of the exchange that runs or ran last */
+	uint64_t run_count;
+	unsigned missing;               /* bit per frame of this exchange that is not back */
+	uint8_t history[HISTORY];       /* by sequence: bit per frame that came back */
+	struct dc_track dc;
+	struct exchange_result result;  /* being made; keeps what a ride met for the next one */
+	struct exchange_frame frame[LIMIT_FRAMES];
+	uint8_t inputs[LIMIT_IMAGE_BYTES];
+	uint8_t received[LIMIT_FRAME_BYTES];
+};
+
+static int plan_is_sound(const struct exchange_plan *plan)
+{
+	uint64_t sum = 0;
+
+	if (plan->chunk_count > LIMIT_FRAMES || plan->image_bytes > LIMIT_IMAGE_BYTES ||
+	    plan->output_bytes > plan->image_bytes) {
+		return 0;
+	}
+	for (unsigned i = 0; i < plan->chunk_count; i++) {
+		if (plan->chunk_bytes[i] == 0) {
+			return 0;
+		}
+		sum += plan->chunk_bytes[i];
+	}
+	return sum == plan->image_bytes;
+}
+
+int exchange_create(const struct exchange_plan *plan, struct line *line,
+		    struct exchange **ret_exchange)
+{
+	struct exchange *ex;
+
+	if (!plan_is_sound(plan)) {
+		return -EINVAL;
+	}
+	ex = calloc(1, sizeof(*ex));
+	if (ex == NULL) {
+		return -ENOMEM;
+	}
+	ex->plan = *plan;
+	ex->line = line;
+	ex->transport = *line_transport(line);
+	ex->platform = *line_platform(line);
+	ex->frame_count = plan->chunk_count > 0 ? plan->chunk_count : 1;
+	for (unsigned i = 0; i < ex->frame_count; i++) {
+		int r = exchange_frame_build(plan, i, &ex->frame[i]);
+
+		if (r < 0) {
+			free(ex);
+			return r;
+		}
+	}
+	*ret_exchange = ex;
+	return 0;
+}
+
+void exchange_destroy(struct exchange *ex)
+{
+	free(ex);
+}
+
+static mono_t now(const struct exchange *ex)
+{
+	return ex->platform.now(ex->platform.ctx);
+}
+
+/* --- out --- */
+
+static void load_outputs(struct exchange *ex, struct exchange_frame *ef, const uint8_t *image)
+{
+	if (ef->image_offset < ex->plan.output_bytes) {
+		uint32_t left = ex->plan.output_bytes - ef->image_offset;
+
+		memcpy(exchange_data(ef->bytes, ef->image), image + ef->image_offset,
+		       left < ef->image_len ? left : ef->image_len);
+	}
+}
+
+static void load_dc(struct exchange *ex, struct exchange_frame *ef, mono_t at)
+{
+	int64_t payload_ns;
+
+	ef->bytes[ef->dc] = dc_track_command(&ex->dc, at, &payload_ns);
+	put_le64(exchange_data(ef->bytes, ef->dc), (uint64_t)payload_ns);
+}
+
+/* Send all frames. Returns how many went out. */
+static unsigned send_frames(struct exchange *ex, const uint8_t *image)
+{
+	unsigned sent_count = 0;
+
+	ex->missing = 0;
+	for (unsigned i = 0; i < ex->frame_count; i++) {
+		struct exchange_frame *ef = &ex->frame[i];
+		int r;
+
+		exchange_frame_number(ef, ex->sequence);
+		if (ef->image != 0) {
+			load_outputs(ex, ef, image);
+		}
+		if (i == 0) {
+			ex->result.sent = now(ex);
+		}
+		if (ef->dc != 0) {
+			load_dc(ex, ef, ex->result.sent);
+		}
+		ex->missing |= 1u << i;
+		r = ex->transport.send(ex->transport.ctx, ef->bytes, ef->len);
+		if (r < 0) {
+			ex->result.send_error = r;
+		} else {
+			sent_count++;
+		}
+	}
+	return sent_count;
+}
+
+/* --- back --- */
+
+static void keep_inputs(struct exchange *ex, const struct exchange_frame *ef)
+{
+	uint32_t skip = 0;
+
+	ex->result.wkc = (uint16_t)(ex->result.wkc + exchange_wkc(ex->received, ef->image));
+	if (ef->image_offset < ex->plan.output_bytes) {
+		skip = ex->plan.output_bytes - ef->image_offset;
+	}
+	if (skip < ef->image_len) {
+		memcpy(ex->inputs + ef->image_offset + skip,
+		       exchange_data(ex->received, ef->image) + skip, ef->image_len - skip);
+	}
+}
+
+static void keep_monitor(struct exchange *ex, const struct exchange_frame *ef)
+{
+	struct exchange_result *res = &ex->result;
+
+	res->al_wkc = exchange_wkc(ex->received, ef->al);
+	res->al_status = get_le16(exchange_data(ex->received, ef->al));
+	if (exchange_wkc(ex->received, ef->diff) > 0) {
+		res->dc_diff_ns = get_le32(exchange_data(ex->received, ef->diff)) & DC_DIFF_MAGNITUDE;
+	}
+}
+
+static void keep_frame(struct exchange *ex, unsigned number)
+{
+	const struct exchange_frame *ef = &ex->frame[number];
+
+	if (ef->image != 0) {
+		keep_inputs(ex, ef);
+		if (exchange_wkc(ex->received, ef->image) != ex->plan.chunk_wkc[number]) {
+			ex->result.status = EXCHANGE_WKC_LOW;
+		}
+	}
+	if (ef->dc != 0) {
+		ex->result.dc_time_ns = dc_track_answer(
+			&ex->dc, ef->bytes[ef->dc], exchange_wkc(ex->received, ef->dc),
+			(int64_t)get_le64(exchange_data(ex->received, ef->dc)), ex->result.sent);
+	}
+	if (ef->al != 0) {
+		keep_monitor(ex, ef);
+	}
+}
+
+/* A frame of this exchange or an earlier one, by its sequence. */
+static void sort_frame(struct exchange *ex, unsigned number, uint16_t sequence, mono_t at)
+{
+	unsigned age = (uint16_t)(ex->sequence - sequence);
+	uint8_t *came = &ex->history[sequence % HISTORY];
+	uint8_t bit = (uint8_t)(1u << number);
+
+	if (age >= ex->run_count) {
+		ex->result.foreign++;
+		return;
+	}
+	if (age < HISTORY && (*came & bit) != 0) {
+		ex->result.doubled++;
+		return;
+	}
+	if (age < HISTORY) {
+		*came |= bit;
+	}
+	/* Outside exchange_run() nothing is missing any more: what comes then is late by one at least. */
+	if (age == 0 && (ex->missing & bit) != 0) {
+		ex->missing &= ~(unsigned)bit;
+		keep_frame(ex, number);
+		if (ex->missing == 0) {
+			ex->result.round_trip = mono_sub(at, ex->result.sent);
+		}
+		return;
+	}
+	ex->result.late++;
+	if (age == 0) {
+		age = 1;
+	}
+	if (age > ex->result.late_by) {
+		ex->result.late_by = age;
+	}
+}
+
+static void take_frame(struct exchange *ex, size_t len, mono_t at)
+{
+	for (unsigned i = 0; i < ex->frame_count; i++) {
+		uint16_t sequence;
+
+		if (exchange_frame_matches(&ex->frame[i], ex->received, len, &sequence)) {
+			sort_frame(ex, i, sequence, at);
+			return;
+		}
+	}
+	if (!line_ride_answer(ex->line, ex->received, len)) {
+		ex->result.foreign++;
+	}
+}
+
+static int receive_one(struct exchange *ex, mono_t deadline)
+{
+	mono_t at = { 0 };
+	int r = ex->transport.receive(ex->transport.ctx, ex->received, sizeof(ex->received), deadline,
+				      &at);
+
+	if (r < 0) {
+		return r;
+	}
+	take_frame(ex, (size_t)r, at);
+	return 0;
+}
+
+/* What a ride or an earlier receive met stays counted; the rest starts anew. */
+static void begin_result(struct exchange *ex)
+{
+	ex->result = (struct exchange_result){
+		.status = EXCHANGE_OK,
+		.wkc_expected = ex->plan.wkc_expected,
+		.dc_diff_ns = -1,
+		.round_trip = { -1 },
+		.late = ex->result.late,
+		.late_by = ex->result.late_by,
+		.doubled = ex->result.doubled,
+		.foreign = ex->result.foreign,
+	};
+	ex->sequence++;
+	ex->run_count++;
+	ex->history[ex->sequence % HISTORY] = 0;
+}
+
+static struct exchange_result end_result(struct exchange *ex)
+{
+	struct exchange_result res = ex->result;
+
+	ex->missing = 0;
+	ex->result.late = 0;
+	ex->result.late_by = 0;
+	ex->result.doubled = 0;
+	ex->result.foreign = 0;
+	return res;
+}
+
+struct exchange_result exchange_run(struct exchange *ex, uint8_t *image, mono_t deadline)
+{
+	uint32_t output_bytes = ex->plan.output_bytes;
+
+	begin_result(ex);
+	if (send_frames(ex, image) == 0) {
+		deadline = ex->result.sent;
+	}
+	while (ex->missing != 0) {
+		if (receive_one(ex, deadline) < 0) {
+			ex->result.status = EXCHANGE_NO_FRAME;
+			break;
+		}
+	}
+	if (ex->result.status == EXCHANGE_OK) {
+		memcpy(image + output_bytes, ex->inputs + output_bytes,
+		       ex->plan.image_bytes - output_bytes);
+	}
+	return end_result(ex);
+}
+
+int exchange_ride(struct exchange *ex, mono_t deadline)
+{
+	size_t len;
+	const uint8_t *frame = line_ride_take(ex->line, &len);
+
+	if (frame != NULL) {
+		ex->transport.send(ex->transport.ctx, frame, len);
+	}
+	while (line_ride_is_out(ex->line)) {
+		if (receive_one(ex, deadline) < 0) {
+			break;
+		}
+	}
+	return frame != NULL;
+}

@@ -1,0 +1,144 @@
+/* SPDX-License-Identifier: MIT */
+#include "bus/exchange_frame.h"
+
+#include <errno.h>
+#include <string.h>
+
+#include "base/bytes.h"
+#include "link/echo.h"
+#include "wire/datagram.h"
+#include "wire/esc_reg.h"
+
+enum {
+	HEADERS = ECAT_ETHERNET_BYTES + ECAT_FRAME_HEADER_BYTES,
+	OVERHEAD = ECAT_DATAGRAM_HEADER_BYTES + ECAT_WKC_BYTES,
+	LENGTH_MASK = 0x07ff,
+};
+
+/* As SOEM sends, so that captures look alike; bit 0x02 of the first octet must be clear. */
+static const uint8_t source[6] = { 0x10, 0x10, 0x10, 0x10, 0x10, 0x10 };
+
+static int has_monitor(const struct exchange_plan *plan, unsigned number)
+{
+	return number == 0 && plan->monitor;
+}
+
+static int has_dc(const struct exchange_plan *plan, unsigned number)
+{
+	return number == 0 && plan->dc_reference != 0;
+}
+
+/* Two index bytes are needed for the sequence: a lone datagram gets a NOP as companion. */
+static int needs_nop(const struct exchange_plan *plan, unsigned number)
+{
+	return !has_dc(plan, number) && !has_monitor(plan, number);
+}
+
+uint32_t exchange_frame_capacity(const struct exchange_plan *plan, unsigned number)
+{
+	uint32_t taken = HEADERS + OVERHEAD;
+
+	if (has_dc(plan, number)) {
+		taken += OVERHEAD + EXCHANGE_DC_BYTES;
+	}
+	if (has_monitor(plan, number)) {
+		taken += OVERHEAD + EXCHANGE_AL_BYTES + OVERHEAD + EXCHANGE_DIFF_BYTES;
+	}
+	if (needs_nop(plan, number)) {
+		taken += OVERHEAD + EXCHANGE_NOP_BYTES;
+	}
+	return ECAT_FRAME_MAX_BYTES - taken;
+}
+
+static size_t add(struct exchange_frame *ef, struct ecat_frame_builder *fb, enum ecat_cmd cmd,
+		  uint32_t address, uint16_t data_len)
+{
+	uint8_t *data = ecat_frame_add(fb, cmd, 0, (uint16_t)address, (uint16_t)(address >> 16), data_len);
+
+	if (data == NULL) {
+		return 0;
+	}
+	ef->datagram[ef->datagram_count] = (size_t)(data - ef->bytes) - ECAT_DATAGRAM_HEADER_BYTES;
+	return ef->datagram[ef->datagram_count++];
+}
+
+static uint32_t register_address(uint16_t station, uint16_t reg)
+{
+	return (uint32_t)reg << 16 | station;
+}
+
+int exchange_frame_build(const struct exchange_plan *plan, unsigned number, struct exchange_frame *ret)
+{
+	struct ecat_frame_builder fb;
+	uint32_t image_len = number < plan->chunk_count ? plan->chunk_bytes[number] : 0;
+
+	if (image_len > exchange_frame_capacity(plan, number)) {
+		return -E2BIG;
+	}
+	memset(ret, 0, sizeof(*ret));
+	for (unsigned i = 0; i < number; i++) {
+		ret->image_offset += plan->chunk_bytes[i];
+	}
+	ret->image_len = image_len;
+	ecat_frame_begin(&fb, ret->bytes, source);
+	if (image_len > 0) {
+		ret->image = add(ret, &fb, ECAT_CMD_LRW, plan->logical_start + ret->image_offset,
+				 (uint16_t)image_len);
+	}
+	if (has_dc(plan, number)) {
+		ret->dc = add(ret, &fb, ECAT_CMD_FRMW,
+			      register_address(plan->dc_reference, ESC_REG_DC_SYSTEM_TIME),
+			      EXCHANGE_DC_BYTES);
+	}
+	if (has_monitor(plan, number)) {
+		ret->al = add(ret, &fb, ECAT_CMD_BRD, register_address(0, ESC_REG_AL_STATUS),
+			      EXCHANGE_AL_BYTES);
+		ret->diff = add(ret, &fb, ECAT_CMD_BRD, register_address(0, ESC_REG_DC_SYSTEM_TIME_DIFF),
+				EXCHANGE_DIFF_BYTES);
+	}
+	while (ret->datagram_count < 2) {
+		add(ret, &fb, ECAT_CMD_NOP, 0, EXCHANGE_NOP_BYTES);
+	}
+	ret->len = ecat_frame_end(&fb);
+	return 0;
+}
+
+void exchange_frame_number(struct exchange_frame *ef, uint16_t sequence)
+{
+	ef->bytes[ef->datagram[0] + 1] = (uint8_t)sequence;
+	ef->bytes[ef->datagram[1] + 1] = (uint8_t)(sequence >> 8);
+}
+
+/* The reference is read by FRMW in one cycle and by FPRD in another; an older frame may have either. */
+static int is_dc_command(uint8_t cmd)
+{
+	return cmd == ECAT_CMD_FRMW || cmd == ECAT_CMD_FPRD;
+}
+
+int exchange_frame_matches(const struct exchange_frame *ef, uint8_t *frame, size_t frame_len,
+			   uint16_t *ret_sequence)
+{
+	uint8_t *dc = ef->dc != 0 && ef->dc < frame_len ? &frame[ef->dc] : NULL;
+	uint8_t kept = dc != NULL ? *dc : 0;
+	int is_match;
+
+	if (dc != NULL && is_dc_command(kept)) {
+		*dc = ef->bytes[ef->dc];
+	}
+	is_match = echo_matches(ef->bytes, frame, frame_len, ECHO_INDEX_ANY);
+	if (dc != NULL) {
+		*dc = kept;
+	}
+	if (!is_match) {
+		return 0;
+	}
+	*ret_sequence = (uint16_t)(frame[ef->datagram[0] + 1] | frame[ef->datagram[1] + 1] << 8);
+	return 1;
+}
+
+uint16_t exchange_wkc(const uint8_t *frame, size_t datagram)
+{
+	size_t data_len = get_le16(frame + datagram + 6) & LENGTH_MASK;
+
+	return get_le16(frame + datagram + ECAT_DATAGRAM_HEADER_BYTES + data_len);
+}

@@ -1,0 +1,58 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The cyclic frames as buffers that are built once: where their datagrams stand, how a cycle writes
+ * its sequence into them, how a returned frame is told to be theirs. Context: cycle thread, but for
+ * exchange_frame_build().
+ */
+#ifndef BUS_EXCHANGE_FRAME_H
+#define BUS_EXCHANGE_FRAME_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/limits.h"
+#include "bus/exchange.h"
+
+enum {
+	EXCHANGE_DC_BYTES = 8,
+	EXCHANGE_AL_BYTES = 2,
+	EXCHANGE_DIFF_BYTES = 4,
+	EXCHANGE_NOP_BYTES = 2,
+	EXCHANGE_DATAGRAMS = 4, /* in one frame */
+};
+
+/* Offsets in bytes of a datagram's header from the frame's first byte; 0: it has none of that kind. */
+struct exchange_frame {
+	uint8_t bytes[LIMIT_FRAME_BYTES];
+	size_t len;
+	size_t datagram[EXCHANGE_DATAGRAMS];
+	unsigned datagram_count;
+	size_t image;          /* LRW */
+	uint32_t image_offset; /* of its data in the process image */
+	uint32_t image_len;
+	size_t dc;             /* FRMW or FPRD of 0x0910 */
+	size_t al;             /* BRD of 0x0130 */
+	size_t diff;           /* BRD of 0x092C */
+};
+
+/** How many process data bytes fit into frame @number of @plan. */
+uint32_t exchange_frame_capacity(const struct exchange_plan *plan, unsigned number);
+
+/** Build frame @number. 0, or -E2BIG if the plan's chunk does not fit. */
+int exchange_frame_build(const struct exchange_plan *plan, unsigned number, struct exchange_frame *ret);
+
+/** The exchange sequence goes low byte first into the index bytes of the first two datagrams. */
+void exchange_frame_number(struct exchange_frame *ef, uint16_t sequence);
+
+/** 1 and the sequence it carries, if @frame is a returned @ef of any cycle; else 0. */
+int exchange_frame_matches(const struct exchange_frame *ef, uint8_t *frame, size_t frame_len,
+			   uint16_t *ret_sequence);
+
+static inline uint8_t *exchange_data(uint8_t *frame, size_t datagram)
+{
+	return frame + datagram + 10;
+}
+
+uint16_t exchange_wkc(const uint8_t *frame, size_t datagram);
+
+#endif

@@ -1,0 +1,62 @@
+/* SPDX-License-Identifier: MIT */
+#include "link/echo.h"
+
+#include "base/bytes.h"
+#include "wire/datagram.h"
+
+enum {
+	HEADERS = ECAT_ETHERNET_BYTES + ECAT_FRAME_HEADER_BYTES,
+	LENGTH_MASK = 0x07ff,
+	MORE_FOLLOWS = 0x8000,
+	SOURCE_OCTET = 6,
+	PASSED_A_SLAVE = 0x02,
+};
+
+/* Broadcast and auto-increment commands: every slave adds one to the address. */
+static int is_position_counted(uint8_t cmd)
+{
+	return (cmd >= ECAT_CMD_APRD && cmd <= ECAT_CMD_APRW) ||
+	       (cmd >= ECAT_CMD_BRD && cmd <= ECAT_CMD_BRW) || cmd == ECAT_CMD_ARMW;
+}
+
+static int is_same_datagram(const uint8_t *sent, const uint8_t *got, enum echo_index index)
+{
+	if (sent[0] != got[0] || get_le16(sent + 4) != get_le16(got + 4)) {
+		return 0;
+	}
+	if (index == ECHO_INDEX_SAME && sent[1] != got[1]) {
+		return 0;
+	}
+	if (!is_position_counted(sent[0]) && get_le16(sent + 2) != get_le16(got + 2)) {
+		return 0;
+	}
+	return ((get_le16(sent + 6) ^ get_le16(got + 6)) & (LENGTH_MASK | MORE_FOLLOWS)) == 0;
+}
+
+int echo_matches(const uint8_t *sent, const uint8_t *frame, size_t frame_len, enum echo_index index)
+{
+	size_t end = HEADERS + (size_t)(get_le16(sent + ECAT_ETHERNET_BYTES) & LENGTH_MASK);
+	size_t pos = HEADERS;
+
+	if (!ecat_frame_is_valid(frame, frame_len) || frame_len < end ||
+	    get_le16(frame + ECAT_ETHERNET_BYTES) != get_le16(sent + ECAT_ETHERNET_BYTES)) {
+		return 0;
+	}
+	/* What never passed a slave is our own frame, mirrored. */
+	if ((frame[SOURCE_OCTET] & PASSED_A_SLAVE) == 0) {
+		return 0;
+	}
+	while (pos + ECAT_DATAGRAM_HEADER_BYTES + ECAT_WKC_BYTES <= end) {
+		uint16_t length_word = get_le16(sent + pos + 6);
+
+		if (!is_same_datagram(sent + pos, frame + pos, index)) {
+			return 0;
+		}
+		if ((length_word & MORE_FOLLOWS) == 0) {
+			return 1;
+		}
+		pos += ECAT_DATAGRAM_HEADER_BYTES + (size_t)(length_word & LENGTH_MASK) +
+		       ECAT_WKC_BYTES;
+	}
+	return 0;
+}

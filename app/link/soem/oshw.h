@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: MIT */
+/* SOEM's view of the network hardware: a line (link/line.h) and nothing else. */
+#ifndef LINK_SOEM_OSHW_H
+#define LINK_SOEM_OSHW_H
+
+#include "ethercattype.h"
+#include "nicdrv.h"
+
+#include "ethercatmain.h"
+
+uint16 oshw_htons(uint16 host);
+/** None: the NIC is chosen where the line's transport is made (link/packet_socket.h). */
+ec_adaptert *oshw_find_adapters(void);
+void oshw_free_adapters(ec_adaptert *adapter);
+
+#endif
