@@ -25,7 +25,7 @@ not to be had, and ecdaqd says so once.
   --json          no live view; the last line printed is `ecdaq status --json --summary`
 
 environment:
-  ECDAQ_BIN      folder of the programs (default: build/stage/bin)
+  ECDAQ_BIN_DIR  folder of the programs (default: build/stage/bin)
   ECDAQ_RUN_DIR  run directory: rings, status, admin socket (default: a new one in /dev/shm, removed
                  at the end). With it set, `ecdaq` in a second terminal reads what runs here.
   ECDAQ_SII      as --sii
@@ -192,7 +192,7 @@ run_inside()
 	local set_options=(--set bus.interface=ecat0 --set "record.dir=$record")
 	local segment_options=(--interface ecsim0 --slaves "$slaves")
 
-	bin=${ECDAQ_BIN:-$root/build/stage/bin}
+	bin=${ECDAQ_BIN_DIR:-$root/build/stage/bin}
 	[ -z "$sii" ] || segment_options+=(--sii "$sii")
 	[ -z "$config" ] || set_options=(--config "$config" "${set_options[@]}")
 	if [ -z "${ECDAQ_RUN_DIR:-}" ]; then

@@ -110,7 +110,7 @@ def tail(text: str, lines: int) -> str:
 def environment(suite: Suite) -> dict[str, str]:
     """What a test may rely on: where the programs, the build and the flavour are."""
     return os.environ | {
-        "ECDAQ_BIN": str(suite.stage / "bin"),
+        "ECDAQ_BIN_DIR": str(suite.stage / "bin"),
         "ECDAQ_STAGE": str(suite.stage),
         "ECDAQ_BUILD": str(suite.build_dir),
         "ECDAQ_FLAVOUR": suite.flavour,
