@@ -243,7 +243,7 @@ static int place_oneshot(const struct admin_target *t, const struct admin_reques
 			 struct placed *ret_placed, struct admin_reply *reply)
 {
 	int channel;
-	int64_t at_ns;
+	int64_t at_ns = 0;
 	int r;
 
 	if (!has_op(t, reply)) {
@@ -287,7 +287,7 @@ static enum admin_outcome run_oneshot(const struct admin_target *t, const struct
 				      uint32_t uid, struct admin_reply *reply,
 				      uint64_t *ret_sequence)
 {
-	struct placed placed;
+	struct placed placed = { .channel = 0 };
 
 	if (place_oneshot(t, rq, &placed, reply) < 0) {
 		emit(t, EVENT_COMMAND_REFUSED, rq->slave_pos, -1, reply->result, (int32_t)uid);

@@ -10,6 +10,16 @@ target_compile_options(ecdaq_options INTERFACE ${ECDAQ_WARNINGS})
 target_compile_definitions(ecdaq_options INTERFACE _GNU_SOURCE ECDAQ_VERSION="${PROJECT_VERSION}")
 target_include_directories(ecdaq_options INTERFACE "${CMAKE_SOURCE_DIR}")
 
+# Always optimised: gcc finds unset variables only then. No NDEBUG: assertions stay on everywhere.
+if(NOT CMAKE_BUILD_TYPE)
+	set(CMAKE_BUILD_TYPE Release)
+endif()
+if(ECDAQ_SANITIZE)
+	set(CMAKE_C_FLAGS_RELEASE "-O1 -g")
+else()
+	set(CMAKE_C_FLAGS_RELEASE "-O2 -g")
+endif()
+
 if(ECDAQ_SANITIZE)
 	add_compile_options(-fsanitize=${ECDAQ_SANITIZE} -fno-omit-frame-pointer -g)
 	add_link_options(-fsanitize=${ECDAQ_SANITIZE})

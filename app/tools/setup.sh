@@ -148,21 +148,12 @@ configure_flavour()
 {
 	build_dir=$root/build/$1
 	compiler=gcc
-	flags='-O2 -g'
-	set -- "$1" -DCMAKE_BUILD_TYPE=Release
 	case $1 in
 	release) ;;
-	asan)
-		flags='-O1 -g'
-		set -- "$@" -DECDAQ_SANITIZE=address,undefined
-		;;
-	tsan)
-		flags='-O1 -g'
-		set -- "$@" -DECDAQ_SANITIZE=thread
-		;;
+	asan) set -- "$@" -DECDAQ_SANITIZE=address,undefined ;;
+	tsan) set -- "$@" -DECDAQ_SANITIZE=thread ;;
 	fuzz)
 		compiler=clang
-		flags='-O1 -g'
 		set -- "$@" -DECDAQ_FUZZ=ON -DECDAQ_SANITIZE=address,undefined
 		;;
 	clang) compiler=clang ;;
@@ -172,10 +163,9 @@ configure_flavour()
 	if command -v ccache > /dev/null 2>&1; then
 		set -- "$@" -DCMAKE_C_COMPILER_LAUNCHER=ccache
 	fi
-	# Assertions stay on in every flavour: the flags carry no NDEBUG.
 	mkdir -p "$build_dir"
-	if ! cmake -S "$root/app" -B "$build_dir" -G Ninja -DCMAKE_C_COMPILER="$compiler" \
-		-DCMAKE_C_FLAGS_RELEASE="$flags" "$@" > "$build_dir/configure.log" 2>&1; then
+	if ! cmake -S "$root/app" -B "$build_dir" -G Ninja -DCMAKE_C_COMPILER="$compiler" "$@" \
+		> "$build_dir/configure.log" 2>&1; then
 		cat "$build_dir/configure.log" >&2
 		die "cannot configure $build_dir (cmake's reason stands above)"
 	fi
