@@ -29,7 +29,7 @@ struct config_slave {
 	enum config_mode mode; /* FB1111-Piccolo: writes 0x8000:01 in PRE-OP */
 	int64_t sync0_shift_ns;
 	uint32_t assign_activate; /* 0 = from what the slave is: DC slaves 0x0300 */
-	int line;              /* in the file, for messages */
+	int line;                 /* in the file, for messages */
 };
 
 /* slaves[].sdo[]: written in PRE-OP, in order. */
@@ -46,8 +46,8 @@ struct config_sdo {
 struct config_output {
 	char channel[LIMIT_NAME_BYTES];
 	enum config_owner owner;
-	double fail_safe;   /* physical value */
-	double min;         /* physical */
+	double fail_safe; /* physical value */
+	double min;       /* physical */
 	double max;
 	int64_t timeout_ns; /* remote owners; 0 = none */
 	int line;
@@ -61,32 +61,32 @@ struct config {
 	char interface[32];
 	int64_t bus_scan_timeout_ns;
 	int64_t bus_op_timeout_ns;
-	int64_t bus_watchdog_ns;         /* SM watchdog of the slaves; 0 = leave */
+	int64_t bus_watchdog_ns; /* SM watchdog of the slaves; 0 = leave */
 	uint32_t bus_wkc_miss_limit_cycles;
-	uint32_t bus_monitor;            /* 1: BRD of AL status and 0x092C in every cycle */
+	uint32_t bus_monitor; /* 1: BRD of AL status and 0x092C in every cycle */
 	enum config_presence bus_presence;
 	/* cycle */
 	int64_t cycle_period_ns;
-	double cycle_phase_percent;      /* set point: frame after SYNC0, share of the period */
-	double cycle_receive_percent;    /* receive deadline, share of the period */
-	int32_t cycle_cpu;               /* -1 = do not pin */
-	uint32_t cycle_priority;         /* SCHED_FIFO; 0 = do not ask for it */
+	double cycle_phase_percent;   /* set point: frame after SYNC0, share of the period */
+	double cycle_receive_percent; /* receive deadline, share of the period */
+	int32_t cycle_cpu;            /* -1 = do not pin */
+	uint32_t cycle_priority;      /* SCHED_FIFO; 0 = do not ask for it */
 	enum config_poll cycle_poll;
 	enum config_overrun cycle_overrun;
 	uint32_t cycle_lock_memory;
 	int32_t cycle_cpu_dma_latency_us; /* -1 = leave */
 	/* dc */
 	uint32_t dc_enable;
-	int64_t dc_lock_limit_ns;        /* |filtered phase error| below this */
-	uint32_t dc_lock_cycles;         /* for so many cycles */
+	int64_t dc_lock_limit_ns; /* |filtered phase error| below this */
+	uint32_t dc_lock_cycles;  /* for so many cycles */
 	int64_t dc_unlock_limit_ns;
-	int64_t dc_slew_ns;              /* largest correction a cycle */
+	int64_t dc_slew_ns; /* largest correction a cycle */
 	double dc_kp;
 	double dc_ki;
-	int64_t dc_diff_limit_ns;        /* |0x092C| before SYNC0 is started */
+	int64_t dc_diff_limit_ns; /* |0x092C| before SYNC0 is started */
 	int64_t dc_lock_timeout_ns;
-	uint32_t dc_burst_frames;        /* static drift compensation */
-	int64_t dc_sync0_pulse_ns;       /* for documentation and checks: comes from SII */
+	uint32_t dc_burst_frames;  /* static drift compensation */
+	int64_t dc_sync0_pulse_ns; /* for documentation and checks: comes from SII */
 	/* ring */
 	int64_t ring_depth_ns;
 	uint32_t event_depth;
@@ -97,9 +97,9 @@ struct config {
 	int64_t record_sync_period_ns;
 	int64_t record_rotate_period_ns;
 	uint64_t record_rotate_bytes;
-	uint64_t record_budget_bytes;    /* oldest files go above this; 0 = none */
-	uint64_t record_reserve_bytes;   /* stop with less than this free */
-	int32_t record_compression;      /* zstd level, 0 = none */
+	uint64_t record_budget_bytes;  /* oldest files go above this; 0 = none */
+	uint64_t record_reserve_bytes; /* stop with less than this free */
+	int32_t record_compression;    /* zstd level, 0 = none */
 	/* lists */
 	struct config_slave slave[LIMIT_SLAVES];
 	size_t slave_count;
@@ -107,27 +107,28 @@ struct config {
 	size_t sdo_count;
 	struct config_output output[CONFIG_LIMIT_OUTPUTS];
 	size_t output_count;
-	char path[CONFIG_PATH_BYTES];    /* file it came from, "" = defaults only */
+	char path[CONFIG_PATH_BYTES]; /* file it came from, "" = defaults only */
 };
 
 /** Fill @cfg with the defaults. */
 void config_defaults(struct config *cfg);
 
 /**
- * Read @path over the defaults. 0; or -EINVAL with one line "FILE:LINE: what: why" in @error, or another
- * -errno with a line. @cfg is untouched on failure. Context: blocking.
+ * Read @path over the defaults. 0; or -EINVAL with one line "FILE:LINE: what: why" in @error, or
+ * another -errno with a line. @cfg is untouched on failure. Context: blocking.
  */
 int config_load(const char *path, struct config *cfg, char *error, size_t error_bytes);
 /** The same from memory; @name stands for the file in messages. */
 int config_parse(const char *name, const char *text, size_t text_len, struct config *cfg,
 		 char *error, size_t error_bytes);
 /**
- * Set one option by its dotted name as the file would: "cycle.period=500us", "slaves[0].mode=oneshot" (one
- * past the last makes a new item). Same errors, without FILE:LINE. How options must fit to each other is
- * not looked at: call config_check() after the last one.
+ * Set one option by its dotted name as the file would: "cycle.period=500us",
+ * "slaves[0].mode=oneshot" (one past the last makes a new item). Same errors, without FILE:LINE.
+ * How options must fit to each other is not looked at: call config_check() after the last one.
  */
 int config_set(struct config *cfg, const char *assignment, char *error, size_t error_bytes);
-/** Do the options fit to each other? config_load() and config_parse() have asked already. 0 or -EINVAL. */
+/** Do the options fit to each other? config_load() and config_parse() have asked already. 0 or
+ * -EINVAL. */
 int config_check(const struct config *cfg, char *error, size_t error_bytes);
 
 /* What stands in the run directory. */
@@ -137,7 +138,8 @@ int config_check(const struct config *cfg, char *error, size_t error_bytes);
 #define CONFIG_RUN_RECORD_STATUS "record-status" /* struct record_status */
 #define CONFIG_RUN_ADMIN "admin"                 /* socket, admin/protocol.h */
 
-/** Where the run directory is: @cfg->run_dir, else $ECDAQ_RUN_DIR, else /run/ecdaq (root) or /dev/shm/ecdaq-UID. */
+/** Where the run directory is: @cfg->run_dir, else $ECDAQ_RUN_DIR, else /run/ecdaq (root) or
+ * /dev/shm/ecdaq-UID. */
 int config_run_path(const struct config *cfg, const char *file, char *ret_path, size_t path_bytes);
 
 #endif

@@ -1,0 +1,172 @@
+/* SPDX-License-Identifier: MIT */
+/* How options must fit to each other. */
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "config/option.h"
+#include "config/sdo_value.h"
+
+struct relation {
+	const char *subject;
+	const char *other;
+	int holds;
+	const char *why;
+};
+
+static int line_of(const struct option_lines *lines, const char *name)
+{
+	const struct option *option = option_find(name);
+
+	return lines == NULL || option == NULL ? 0 : lines->line[option - option_table];
+}
+
+static int check_relations(const struct config *cfg, const struct option_lines *lines,
+			   const char **ret_key, int *ret_line, char *why)
+{
+	const struct relation relations[] = {
+		{ "bus.watchdog", "cycle.period",
+		  cfg->bus_watchdog_ns == 0 || cfg->bus_watchdog_ns >= 3 * cfg->cycle_period_ns,
+		  "must be 0s or at least three times cycle.period" },
+		{ "bus.presence", "bus.presence",
+		  cfg->bus_presence != CONFIG_EXACT_SLAVES || cfg->slave_count > 0,
+		  "exact wants slaves to be listed" },
+		{ "dc.unlock_limit", "dc.lock_limit",
+		  cfg->dc_unlock_limit_ns >= cfg->dc_lock_limit_ns,
+		  "must not be below dc.lock_limit" },
+		{ "dc.unlock_limit", "cycle.period",
+		  cfg->dc_unlock_limit_ns <= cfg->cycle_period_ns / 2,
+		  "must not be above half of cycle.period" },
+		{ "dc.slew", "cycle.period", cfg->dc_slew_ns <= cfg->cycle_period_ns / 4,
+		  "must not be above a quarter of cycle.period" },
+		{ "dc.sync0_pulse", "cycle.period", cfg->dc_sync0_pulse_ns < cfg->cycle_period_ns,
+		  "must be below cycle.period" },
+		{ "record.sync_period", "record.chunk_period",
+		  cfg->record_sync_period_ns >= cfg->record_chunk_period_ns,
+		  "must not be below record.chunk_period" },
+		{ "record.rotate_period", "record.sync_period",
+		  cfg->record_rotate_period_ns >= cfg->record_sync_period_ns,
+		  "must not be below record.sync_period" },
+		{ "record.budget", "record.rotate_size",
+		  cfg->record_budget_bytes == 0 ||
+			  cfg->record_budget_bytes >= cfg->record_rotate_bytes,
+		  "must be 0B or at least record.rotate_size" },
+		{ "record.dir", "record.enable", !cfg->record_enable || cfg->record_dir[0] != '\0',
+		  "must be given while record.enable is on" },
+	};
+
+	for (size_t i = 0; i < sizeof(relations) / sizeof(relations[0]); i++) {
+		if (!relations[i].holds) {
+			*ret_key = relations[i].subject;
+			*ret_line = line_of(lines, relations[i].subject);
+			if (*ret_line == 0) {
+				*ret_line = line_of(lines, relations[i].other);
+			}
+			snprintf(why, OPTION_WHY_BYTES, "%s", relations[i].why);
+			return -EINVAL;
+		}
+	}
+	return 0;
+}
+
+static int check_slaves(const struct config *cfg, const char **ret_key, int *ret_line, char *why)
+{
+	for (size_t i = 0; i < cfg->slave_count; i++) {
+		const struct config_slave *slave = &cfg->slave[i];
+
+		*ret_line = slave->line;
+		if (slave->sync0_shift_ns <= -cfg->cycle_period_ns ||
+		    slave->sync0_shift_ns >= cfg->cycle_period_ns) {
+			*ret_key = "slaves[].sync0_shift";
+			snprintf(why, OPTION_WHY_BYTES, "must be less than one cycle.period");
+			return -EINVAL;
+		}
+		for (size_t j = 0; j < i && slave->name[0] != '\0'; j++) {
+			if (strcmp(slave->name, cfg->slave[j].name) == 0) {
+				*ret_key = "slaves[].name";
+				snprintf(why, OPTION_WHY_BYTES,
+					 "slaves %zu and %zu are both called %s", j, i,
+					 slave->name);
+				return -EINVAL;
+			}
+		}
+	}
+	return 0;
+}
+
+static const char *output_fault(const struct config *cfg, size_t i, const char **ret_key)
+{
+	const struct config_output *output = &cfg->output[i];
+
+	*ret_key = "outputs[].channel";
+	if (output->channel[0] == '\0') {
+		return "is missing";
+	}
+	for (size_t j = 0; j < i; j++) {
+		if (strcmp(output->channel, cfg->output[j].channel) == 0) {
+			return "this channel is listed twice";
+		}
+	}
+	*ret_key = "outputs[].max";
+	if (!(output->min <= output->max)) {
+		return "is below min";
+	}
+	*ret_key = "outputs[].fail_safe";
+	if (!(output->fail_safe >= output->min && output->fail_safe <= output->max)) {
+		return "is not within min and max";
+	}
+	*ret_key = "outputs[].timeout";
+	if (output->timeout_ns != 0 && output->owner != CONFIG_OWNER_REMOTE) {
+		return "only a remote owner has one";
+	}
+	return NULL;
+}
+
+static int check_outputs(const struct config *cfg, const char **ret_key, int *ret_line, char *why)
+{
+	for (size_t i = 0; i < cfg->output_count; i++) {
+		const char *fault = output_fault(cfg, i, ret_key);
+
+		if (fault != NULL) {
+			*ret_line = cfg->output[i].line;
+			snprintf(why, OPTION_WHY_BYTES, "%s", fault);
+			return -EINVAL;
+		}
+	}
+	return 0;
+}
+
+int option_cross_check(const struct config *cfg, const struct option_lines *lines,
+		       const char **ret_key, int *ret_line, char *why)
+{
+	int r = check_relations(cfg, lines, ret_key, ret_line, why);
+
+	if (r == 0) {
+		r = check_slaves(cfg, ret_key, ret_line, why);
+	}
+	return r < 0 ? r : check_outputs(cfg, ret_key, ret_line, why);
+}
+
+int option_sdo_finish(const struct option_sdo *item, struct config_sdo *ret_sdo, char *why)
+{
+	enum sdo_type type = (enum sdo_type)item->type;
+	uint64_t bits;
+	int r = sdo_value_parse(type, item->value, &bits);
+
+	if (r == -ERANGE) {
+		snprintf(why, OPTION_WHY_BYTES, "%.40s does not fit into %s", item->value,
+			 sdo_type_to_str(type));
+		return r;
+	}
+	if (r < 0) {
+		snprintf(why, OPTION_WHY_BYTES, "\"%.40s\" is no %s", item->value,
+			 sdo_type_to_str(type));
+		return r;
+	}
+	ret_sdo->index = item->index;
+	ret_sdo->subindex = item->subindex;
+	ret_sdo->bytes = (uint8_t)sdo_type_bytes(type);
+	ret_sdo->value = bits;
+	return 0;
+}

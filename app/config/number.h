@@ -1,0 +1,12 @@
+/* SPDX-License-Identifier: MIT */
+/* Numbers of the configuration, with units and bounds. Private to config/. */
+#ifndef CONFIG_NUMBER_H
+#define CONFIG_NUMBER_H
+
+#include "config/option.h"
+
+/* As option_parse(), for the types that are whole numbers of something, and for OPTION_NUMBER. */
+int number_parse_whole(const struct option *option, const char *text, void *base, char *why);
+int number_parse_real(const struct option *option, const char *text, void *base, char *why);
+
+#endif

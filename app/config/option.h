@@ -1,0 +1,118 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The one option table (options.c): parser, --set, sample file and reference page all come from it.
+ * Defaults and bounds stand in it as a person would write them ("1ms") and go through the same
+ * parser as the file. Private to config/ and to the generator of the pages. Context: blocking.
+ */
+#ifndef CONFIG_OPTION_H
+#define CONFIG_OPTION_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "config/config.h"
+
+enum option_type {
+	OPTION_DURATION, /* int64_t ns */
+	OPTION_SIZE,     /* uint64_t bytes */
+	OPTION_NUMBER,   /* double; unit "%" takes a per cent sign */
+	OPTION_INT,      /* int32_t, in the option's unit */
+	OPTION_UINT,     /* uint8_t to uint64_t, in the option's unit */
+	OPTION_HEX,      /* the same, shown in hex */
+	OPTION_SWITCH,   /* uint32_t: on, off */
+	OPTION_WORD,     /* an enum: the n-th of words */
+	OPTION_TEXT,     /* char[] */
+	OPTION_NAME,     /* char[]: letters, digits, _ and - */
+};
+
+struct option {
+	const char *name; /* "cycle.period"; in a list "slaves[].mode" */
+	enum option_type type;
+	size_t offset;        /* in struct config; in a list, in its item */
+	size_t bytes;         /* of the field */
+	const char *standard; /* default; NULL: must be given (in lists only) */
+	const char *min;      /* numbers: inclusive bounds; else NULL */
+	const char *max;
+	const char *unit;      /* of a plain number; "" for none */
+	const char *otherwise; /* when the default is another one, for the pages; mostly NULL */
+	const char *words;     /* OPTION_WORD: "auto|spin|sleep", in the order of the enum */
+	const char *prose;
+};
+
+extern const struct option option_table[];
+extern const size_t option_count;
+
+enum { OPTION_LIMIT = 96, OPTION_WHY_BYTES = 192, OPTION_KEY_BYTES = 96 };
+
+/* A list of the file. Its items are filled by the options whose name starts with name and "[].". */
+struct option_list {
+	const char *name; /* "slaves", "slaves[].sdo" */
+	size_t limit;
+	const char *limit_name; /* as it is called in the sources */
+	const char *prose;
+};
+
+enum option_list_id { OPTION_LIST_SLAVES, OPTION_LIST_SDOS, OPTION_LIST_OUTPUTS, OPTION_LISTS };
+extern const struct option_list option_lists[OPTION_LISTS];
+
+/* Sections of the file in their order, for the pages: name and prose. */
+struct option_section {
+	const char *name;
+	const char *prose;
+};
+
+extern const struct option_section option_sections[];
+extern const size_t option_section_count;
+
+/* What an item of slaves[].sdo[] says; becomes a struct config_sdo when it is whole. */
+struct option_sdo {
+	uint16_t index;
+	uint8_t subindex;
+	uint32_t type; /* enum sdo_type */
+	char value[64];
+	int value_line;
+};
+
+/** The option named @name; NULL. */
+const struct option *option_find(const char *name);
+
+/**
+ * Read @text into @option's field of the struct at @base. 0; -EINVAL or -ERANGE with the reason in
+ * @why (OPTION_WHY_BYTES), field untouched.
+ */
+int option_parse(const struct option *option, const char *text, void *base, char *why);
+
+/** Put @value into @option's field, as wide as that is. */
+void option_store(const struct option *option, uint64_t value, void *base);
+
+/** Fill the fields at @base of all options named @prefix and something; "" for those of no list. */
+void option_fill_defaults(const char *prefix, void *base);
+
+/** The best guess at what was meant by @name: a name of the table, or NULL. */
+const char *option_suggest(const char *name);
+
+/** Is @name a section ("cycle"), or a list's item ("slaves[]")? */
+int option_is_section(const char *name);
+
+/** The list named @name, or -ENOENT. */
+int option_list_find(const char *name);
+
+/** Printable ASCII only, so that a message stays one line in one encoding; the rest becomes "?". */
+void option_make_plain(char *text);
+
+/* Where each option was set, by its place in the table; 0: not in the file. */
+struct option_lines {
+	int line[OPTION_LIMIT];
+};
+
+/**
+ * Do the options fit to each other? 0, or -EINVAL with the option's name in @ret_key, the reason in
+ * @why and the line to blame in @ret_line (0 if none is known). @lines may be NULL.
+ */
+int option_cross_check(const struct config *cfg, const struct option_lines *lines,
+		       const char **ret_key, int *ret_line, char *why);
+
+/** Turn a whole item of slaves[].sdo[] into @ret_sdo. 0, or -EINVAL or -ERANGE with @why. */
+int option_sdo_finish(const struct option_sdo *item, struct config_sdo *ret_sdo, char *why);
+
+#endif

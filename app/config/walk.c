@@ -1,0 +1,343 @@
+/* SPDX-License-Identifier: MIT */
+#include "config/walk.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+
+/* Where in the file's structure a mapping stands. */
+struct scope {
+	const char *pattern; /* "", "cycle.", "slaves[]." */
+	const char *shown;   /* "", "cycle.", "slaves[1]." */
+	void *base;          /* what its options fill */
+	unsigned slave;      /* in slaves[].: which */
+};
+
+int walk_fail(struct walk *walk, int line, const char *key, const char *why)
+{
+	char text[OPTION_KEY_BYTES + OPTION_WHY_BYTES + 8];
+
+	snprintf(text, sizeof(text), "%s%s%s", key, key[0] == '\0' ? "" : ": ", why);
+	option_make_plain(text);
+	snprintf(walk->error, walk->error_bytes, "%s:%d: %s", walk->name, line, text);
+	return -EINVAL;
+}
+
+static int line_of(const yaml_node_t *node)
+{
+	return (int)node->start_mark.line + 1;
+}
+
+static const char *text_of(const yaml_node_t *node)
+{
+	return (const char *)node->data.scalar.value;
+}
+
+/* A plain scalar that YAML takes for "nothing". */
+static int is_null(const yaml_node_t *node)
+{
+	const char *text;
+
+	if (node->type != YAML_SCALAR_NODE || node->data.scalar.style != YAML_PLAIN_SCALAR_STYLE) {
+		return 0;
+	}
+	text = text_of(node);
+	return text[0] == '\0' || strcmp(text, "~") == 0 || strcasecmp(text, "null") == 0;
+}
+
+static int read_scalar(struct walk *walk, const struct scope *scope, const struct option *option,
+		       const char *shown, const yaml_node_t *node)
+{
+	char why[OPTION_WHY_BYTES] = "";
+	int *line = &walk->lines.line[option - option_table];
+
+	if (scope->base == walk->cfg && *line != 0) {
+		snprintf(why, sizeof(why), "is set already in line %d", *line);
+		return walk_fail(walk, line_of(node), shown, why);
+	}
+	if (node->type != YAML_SCALAR_NODE) {
+		return walk_fail(walk, line_of(node), shown,
+				 node->type == YAML_SEQUENCE_NODE ? "wants one value, not a list"
+								  : "wants a value, not a section");
+	}
+	if (is_null(node)) {
+		return walk_fail(walk, line_of(node), shown, "has no value");
+	}
+	if (strlen(text_of(node)) != node->data.scalar.length) {
+		return walk_fail(walk, line_of(node), shown, "has a control character in it");
+	}
+	if (option_parse(option, text_of(node), scope->base, why) < 0) {
+		return walk_fail(walk, line_of(node), shown, why);
+	}
+	*line = line_of(node);
+	return 0;
+}
+
+static int read_mapping(struct walk *walk, const struct scope *scope, const yaml_node_t *node);
+
+/* Every option of the item that has no default must be in the mapping @node. */
+static int check_required(struct walk *walk, const struct scope *scope, const yaml_node_t *node)
+{
+	size_t len = strlen(scope->pattern);
+	char key[OPTION_KEY_BYTES];
+
+	for (size_t i = 0; i < option_count; i++) {
+		const char *rest = option_table[i].name + len;
+		int is_there = 0;
+
+		if (strncmp(option_table[i].name, scope->pattern, len) != 0 ||
+		    strchr(rest, '.') != NULL || option_table[i].standard != NULL) {
+			continue;
+		}
+		for (yaml_node_pair_t *p = node->data.mapping.pairs.start;
+		     p < node->data.mapping.pairs.top && !is_there; p++) {
+			is_there = strcmp(text_of(yaml_document_get_node(walk->doc, p->key)),
+					  rest) == 0;
+		}
+		if (!is_there) {
+			snprintf(key, sizeof(key), "%s%s", scope->shown, rest);
+			return walk_fail(walk, line_of(node), key, "is missing");
+		}
+	}
+	return 0;
+}
+
+static int read_item(struct walk *walk, const struct scope *scope, const yaml_node_t *node)
+{
+	int r;
+
+	if (node->type != YAML_MAPPING_NODE) {
+		char key[OPTION_KEY_BYTES];
+
+		snprintf(key, sizeof(key), "%.*s", (int)strlen(scope->shown) - 1, scope->shown);
+		return walk_fail(walk, line_of(node), key, "wants key: value pairs");
+	}
+	option_fill_defaults(scope->pattern, scope->base);
+	r = read_mapping(walk, scope, node);
+	return r < 0 ? r : check_required(walk, scope, node);
+}
+
+static int read_slave(struct walk *walk, const yaml_node_t *node, unsigned index)
+{
+	struct config_slave *slave = &walk->cfg->slave[index];
+	char shown[32];
+	struct scope scope = {
+		.pattern = "slaves[].", .shown = shown, .base = slave, .slave = index
+	};
+
+	snprintf(shown, sizeof(shown), "slaves[%u].", index);
+	memset(slave, 0, sizeof(*slave));
+	slave->line = line_of(node);
+	walk->cfg->slave_count = index + 1;
+	return read_item(walk, &scope, node);
+}
+
+static int read_sdo(struct walk *walk, const yaml_node_t *node, unsigned slave, unsigned index)
+{
+	struct option_sdo item = { .value_line = 0 };
+	struct config_sdo *sdo = &walk->cfg->sdo[walk->cfg->sdo_count];
+	char why[OPTION_WHY_BYTES] = "";
+	char shown[48];
+	struct scope scope = { .pattern = "slaves[].sdo[].", .shown = shown, .base = &item };
+	int r;
+
+	snprintf(shown, sizeof(shown), "slaves[%u].sdo[%u].", slave, index);
+	r = read_item(walk, &scope, node);
+	if (r < 0) {
+		return r;
+	}
+	sdo->slave_pos = (uint16_t)slave;
+	sdo->line = line_of(node);
+	if (option_sdo_finish(&item, sdo, why) < 0) {
+		const struct option *value = option_find("slaves[].sdo[].value");
+		char key[64];
+
+		snprintf(key, sizeof(key), "%svalue", shown);
+		return walk_fail(walk, walk->lines.line[value - option_table], key, why);
+	}
+	walk->cfg->sdo_count++;
+	return 0;
+}
+
+static int read_output(struct walk *walk, const yaml_node_t *node, unsigned index)
+{
+	struct config_output *output = &walk->cfg->output[index];
+	char shown[32];
+	struct scope scope = { .pattern = "outputs[].", .shown = shown, .base = output };
+
+	snprintf(shown, sizeof(shown), "outputs[%u].", index);
+	memset(output, 0, sizeof(*output));
+	output->line = line_of(node);
+	walk->cfg->output_count = index + 1;
+	return read_item(walk, &scope, node);
+}
+
+static int read_list(struct walk *walk, const struct scope *scope, enum option_list_id id,
+		     const char *shown, const yaml_node_t *node)
+{
+	const struct option_list *list = &option_lists[id];
+	char why[OPTION_WHY_BYTES];
+	unsigned index = 0;
+	int r = 0;
+
+	if (is_null(node)) {
+		return 0;
+	}
+	if (node->type != YAML_SEQUENCE_NODE) {
+		return walk_fail(walk, line_of(node), shown,
+				 "wants a list: lines that start with \"- \"");
+	}
+	for (yaml_node_item_t *i = node->data.sequence.items.start;
+	     r == 0 && i < node->data.sequence.items.top; i++, index++) {
+		const yaml_node_t *item = yaml_document_get_node(walk->doc, *i);
+		size_t used = id == OPTION_LIST_SDOS ? walk->cfg->sdo_count : index;
+
+		if (used >= list->limit) {
+			snprintf(why, sizeof(why), "more than %s = %zu items", list->limit_name,
+				 list->limit);
+			return walk_fail(walk, line_of(item), shown, why);
+		}
+		switch (id) {
+		case OPTION_LIST_SLAVES:
+			r = read_slave(walk, item, index);
+			break;
+		case OPTION_LIST_SDOS:
+			r = read_sdo(walk, item, scope->slave, index);
+			break;
+		case OPTION_LIST_OUTPUTS:
+			r = read_output(walk, item, index);
+			break;
+		case OPTION_LISTS:
+			break;
+		}
+	}
+	return r;
+}
+
+static int read_section(struct walk *walk, const char *name, const yaml_node_t *node)
+{
+	char prefix[OPTION_KEY_BYTES + 2];
+	struct scope scope = { .pattern = prefix, .shown = prefix, .base = walk->cfg };
+
+	if (is_null(node)) {
+		return 0; /* a section whose options are all commented out */
+	}
+	if (node->type != YAML_MAPPING_NODE) {
+		return walk_fail(walk, line_of(node), name, "is a section: wants key: value pairs");
+	}
+	snprintf(prefix, sizeof(prefix), "%s.", name);
+	return read_mapping(walk, &scope, node);
+}
+
+static int fail_unknown(struct walk *walk, int line, const char *pattern, const char *shown)
+{
+	const char *guess = option_suggest(pattern);
+	char why[OPTION_WHY_BYTES];
+
+	if (guess == NULL) {
+		return walk_fail(walk, line, shown, "unknown option");
+	}
+	snprintf(why, sizeof(why), "unknown option; did you mean %s?", guess);
+	return walk_fail(walk, line, shown, why);
+}
+
+static int check_key(struct walk *walk, const struct scope *scope, const yaml_node_t *map,
+		     const yaml_node_pair_t *pair)
+{
+	const yaml_node_t *key = yaml_document_get_node(walk->doc, pair->key);
+	const yaml_node_t *other;
+	char shown[OPTION_KEY_BYTES];
+	char why[OPTION_WHY_BYTES];
+
+	if (key->type != YAML_SCALAR_NODE) {
+		return walk_fail(walk, line_of(key), scope->shown, "a key must be a word");
+	}
+	for (const yaml_node_pair_t *p = map->data.mapping.pairs.start; p < pair; p++) {
+		other = yaml_document_get_node(walk->doc, p->key);
+		if (strcmp(text_of(other), text_of(key)) == 0) {
+			snprintf(shown, sizeof(shown), "%s%.40s", scope->shown, text_of(key));
+			snprintf(why, sizeof(why), "is set already in line %d", line_of(other));
+			return walk_fail(walk, line_of(key), shown, why);
+		}
+	}
+	return 0;
+}
+
+static int read_pair(struct walk *walk, const struct scope *scope, const char *key, int line,
+		     const yaml_node_t *value)
+{
+	char pattern[OPTION_KEY_BYTES];
+	char shown[OPTION_KEY_BYTES];
+	const struct option *option;
+	int list;
+
+	snprintf(pattern, sizeof(pattern), "%s%.60s", scope->pattern, key);
+	snprintf(shown, sizeof(shown), "%s%.60s", scope->shown, key);
+	if (key[0] == '\0') {
+		return walk_fail(walk, line, shown, "an empty key");
+	}
+	if (strchr(key, '[') != NULL || strlen(key) > 60) {
+		return fail_unknown(walk, line, pattern, shown);
+	}
+	option = option_find(pattern);
+	if (option != NULL) {
+		return read_scalar(walk, scope, option, shown, value);
+	}
+	list = option_list_find(pattern);
+	if (list >= 0) {
+		return read_list(walk, scope, (enum option_list_id)list, shown, value);
+	}
+	if (scope->pattern[0] == '\0' && option_is_section(pattern)) {
+		return read_section(walk, key, value);
+	}
+	return fail_unknown(walk, line, pattern, shown);
+}
+
+static int read_mapping(struct walk *walk, const struct scope *scope, const yaml_node_t *node)
+{
+	for (const yaml_node_pair_t *p = node->data.mapping.pairs.start;
+	     p < node->data.mapping.pairs.top; p++) {
+		const yaml_node_t *key = yaml_document_get_node(walk->doc, p->key);
+		int r = check_key(walk, scope, node, p);
+
+		if (r == 0) {
+			r = read_pair(walk, scope, text_of(key), line_of(key),
+				      yaml_document_get_node(walk->doc, p->value));
+		}
+		if (r < 0) {
+			return r;
+		}
+	}
+	return 0;
+}
+
+int walk_document(struct walk *walk)
+{
+	const yaml_node_t *root = yaml_document_get_root_node(walk->doc);
+	const struct option *presence = option_find("bus.presence");
+	struct scope scope = { .pattern = "", .shown = "", .base = walk->cfg };
+	char why[OPTION_WHY_BYTES] = "";
+	const char *key = "";
+	int line = 0;
+	int r;
+
+	if (root == NULL || is_null(root)) {
+		return 0; /* nothing but comments */
+	}
+	if (root->type != YAML_MAPPING_NODE) {
+		return walk_fail(walk, line_of(root), "",
+				 "wants sections: lines such as \"cycle:\"");
+	}
+	r = read_mapping(walk, &scope, root);
+	if (r < 0) {
+		return r;
+	}
+	if (walk->cfg->slave_count > 0 && walk->lines.line[presence - option_table] == 0) {
+		walk->cfg->bus_presence = CONFIG_EXACT_SLAVES;
+	}
+	if (option_cross_check(walk->cfg, &walk->lines, &key, &line, why) < 0) {
+		return walk_fail(walk, line, key, why);
+	}
+	return 0;
+}

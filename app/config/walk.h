@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: MIT */
+/* The walk over the nodes of one YAML document. Private to config/. */
+#ifndef CONFIG_WALK_H
+#define CONFIG_WALK_H
+
+#include <stddef.h>
+
+#include <yaml.h>
+
+#include "config/option.h"
+
+struct walk {
+	const char *name; /* of the file, for messages */
+	yaml_document_t *doc;
+	struct config *cfg;
+	struct option_lines lines;
+	char *error;
+	size_t error_bytes;
+};
+
+/** The document's options into @walk->cfg, checked. 0, or -EINVAL with the line in @walk->error. */
+int walk_document(struct walk *walk);
+
+/** Put "NAME:LINE: key: why" into @walk->error. Returns -EINVAL. */
+int walk_fail(struct walk *walk, int line, const char *key, const char *why);
+
+#endif
