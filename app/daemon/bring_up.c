@@ -1,0 +1,405 @@
+/* SPDX-License-Identifier: MIT */
+/* From nothing to OP, in the order that distributed clocks ask for (masters' sequence: filters, delays,
+ * offsets, burst; then the cyclic frame and the servo's lock; then one common SYNC0; then SAFE-OP, OP). */
+#include <errno.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "daemon/session.h"
+#include "daemon/session_inside.h"
+
+enum {
+	FILE_MODE = 0640,
+	FLOWING_CYCLES = 10, /* in a row with a frame, before OP is asked for (T07) */
+	META_BYTES_MAX = sizeof(struct sample_meta) + LIMIT_SLAVES * sizeof(struct slave_info) +
+			 LIMIT_CHANNELS * sizeof(struct channel),
+};
+#define LOOK_SPAN ((span_t){ 5 * NS_PER_MS })
+
+static int cancelled(const struct session *s, struct failure *failure)
+{
+	return session_is_stop_asked(s) ? failure_set(failure, EXIT_CODE_OK, -ECANCELED,
+						      "bring-up: told to stop before OP was reached")
+					: 0;
+}
+
+/* --- the slaves --- */
+
+static int open_line(struct session *s, struct failure *failure)
+{
+	struct transport transport;
+	int r = s->spec.hooks.transport_open(s->spec.hooks.ctx, &transport, failure);
+
+	if (r < 0) {
+		return r;
+	}
+	s->is_link_up = 1;
+	r = line_create(s->spec.platform, transport, &s->line);
+	if (r < 0) {
+		transport.destroy(transport.ctx);
+		return failure_set(failure, EXIT_CODE_RESOURCES, r, "line: %s", strerror(-r));
+	}
+	line_bind(s->line);
+	r = bus_create(s->spec.cfg, s->line, &s->bus);
+	return r < 0 ? failure_set(failure, EXIT_CODE_RESOURCES, r, "bus: %s", strerror(-r)) : 0;
+}
+
+static void show_slaves(struct session *s)
+{
+	size_t count;
+	const struct slave_info *slaves = bus_slaves(s->bus, &count);
+
+	for (size_t i = 0; i < count && i < LIMIT_SLAVES; i++) {
+		s->home.page->slave[i].info = slaves[i];
+	}
+	atomic_store_explicit(&s->home.page->slave_count, (uint32_t)count, memory_order_release);
+}
+
+/* One step of bus/bus.h with its own meaning of "not in time". */
+static int step(struct session *s, int r, enum exit_code late, const char *error,
+		struct failure *failure)
+{
+	if (s->spec.hooks.alive != NULL) {
+		s->spec.hooks.alive(s->spec.hooks.ctx);
+	}
+	if (r < 0) {
+		return failure_set(failure, exit_code_of_bus(r, late), r, "%s", error);
+	}
+	return cancelled(s, failure);
+}
+
+static int prepare_slaves(struct session *s, struct failure *failure)
+{
+	char error[BUS_ERROR_BYTES] = "";
+	int r;
+
+	session_state_set(s, BUS_SCANNING);
+	r = step(s, bus_scan(s->bus, error), EXIT_CODE_STATE, error, failure);
+	if (r < 0) {
+		return r;
+	}
+	show_slaves(s);
+	r = step(s, bus_compare(s->bus, error), EXIT_CODE_SLAVES, error, failure);
+	if (r < 0) {
+		return r;
+	}
+	session_state_set(s, BUS_PREOP);
+	r = step(s, bus_map(s->bus, error), EXIT_CODE_STATE, error, failure);
+	if (r < 0) {
+		return r;
+	}
+	r = step(s, bus_dc_setup(s->bus, error), EXIT_CODE_CLOCKS, error, failure);
+	if (r < 0) {
+		return r;
+	}
+	show_slaves(s); /* now with delays and the reference */
+	return 0;
+}
+
+/* --- ring and cycle --- */
+
+static size_t write_meta(const struct session *s, uint8_t *meta)
+{
+	const struct exchange_plan *plan = bus_plan(s->bus);
+	size_t slave_count;
+	size_t channel_count;
+	const struct slave_info *slaves = bus_slaves(s->bus, &slave_count);
+	const struct channel *channels = bus_channels(s->bus, &channel_count);
+	struct sample_meta head = {
+		.version = SAMPLE_VERSION,
+		.slave_count = (uint32_t)slave_count,
+		.channel_count = (uint32_t)channel_count,
+		.image_bytes = plan->image_bytes,
+		.output_bytes = plan->output_bytes,
+		.tai_offset_s = s->spec.tai_offset_s,
+		.period_ns = (uint64_t)s->spec.cfg->cycle_period_ns,
+		.session = s->home.page->session,
+	};
+	size_t slaves_bytes = slave_count * sizeof(*slaves);
+	size_t channels_bytes = channel_count * sizeof(*channels);
+
+	memcpy(meta, &head, sizeof(head));
+	memcpy(meta + sizeof(head), slaves, slaves_bytes);
+	memcpy(meta + sizeof(head) + slaves_bytes, channels, channels_bytes);
+	return sizeof(head) + slaves_bytes + channels_bytes;
+}
+
+static int make_samples(struct session *s, struct failure *failure)
+{
+	static uint8_t meta[META_BYTES_MAX]; /* one session in a process brings up at a time */
+	char path[CONFIG_PATH_BYTES + 16];
+	struct ring_spec spec = {
+		.path = path,
+		.kind = "sample",
+		.payload_bytes = (uint32_t)(sizeof(struct sample_header) +
+					    bus_plan(s->bus)->image_bytes),
+		.slot_count = (uint64_t)(s->spec.cfg->ring_depth_ns / s->spec.cfg->cycle_period_ns),
+		.meta = meta,
+		.meta_bytes = write_meta(s, meta),
+		.period_ns = (uint64_t)s->spec.cfg->cycle_period_ns,
+		.file_mode = FILE_MODE,
+	};
+	int r = home_path(&s->home, CONFIG_RUN_SAMPLES, path, sizeof(path));
+
+	if (r == 0) {
+		r = ring_create(&spec, &s->samples);
+	}
+	if (r < 0) {
+		return failure_set(failure,
+				   r == -EACCES || r == -EPERM ? EXIT_CODE_PERMISSION
+							       : EXIT_CODE_RESOURCES,
+				   r, "%s: %s%s", path, strerror(-r),
+				   r == -ENOSPC ? " (a smaller ring.depth needs less)" : "");
+	}
+	return 0;
+}
+
+static int make_cycle(struct session *s, struct failure *failure)
+{
+	char error[FAILURE_TEXT_BYTES] = "";
+	struct cycle_spec spec = {
+		.cfg = s->spec.cfg,
+		.platform = session_cycle_platform(s),
+		.plan = bus_plan(s->bus),
+		.samples = s->samples,
+		.events = s->home.events,
+		.stats = &s->home.page->cycle,
+		.boards = { [CYCLE_WRITER_LOCAL] = &s->board },
+	};
+	int r = exchange_create(spec.plan, s->line, &s->exchange);
+
+	if (r < 0) {
+		return failure_set(failure, exit_code_of_bus(r, EXIT_CODE_MAPPING), r,
+				   "exchange: %s", strerror(-r));
+	}
+	spec.exchange = s->exchange;
+	spec.slaves = bus_slaves(s->bus, &spec.slave_count);
+	spec.channels = bus_channels(s->bus, &spec.channel_count);
+	board_init(&s->board);
+	memset(&s->home.page->cycle, 0, sizeof(s->home.page->cycle));
+	r = cycle_create(&spec, &s->cycle, error, sizeof(error));
+	if (r < 0) {
+		return failure_set(failure,
+				   r == -ENOMEM ? EXIT_CODE_RESOURCES : EXIT_CODE_CONFIG, r, "%s",
+				   error[0] != '\0' ? error : strerror(-r));
+	}
+	return 0;
+}
+
+static void line_wait(void *ctx, mono_t until)
+{
+	struct session *s = ctx;
+
+	s->spec.hooks.wait(s->spec.hooks.ctx, until);
+	if (s->spec.hooks.alive != NULL) {
+		s->spec.hooks.alive(s->spec.hooks.ctx);
+	}
+}
+
+static int start_cycle(struct session *s, struct failure *failure)
+{
+	int r;
+
+	line_ride_begin(s->line, (struct line_waiter){ .wait = line_wait, .ctx = s });
+	s->is_riding = 1;
+	r = s->spec.hooks.cycle_start(s->spec.hooks.ctx, s->cycle, failure);
+	if (r < 0) {
+		s->is_riding = 0;
+		line_ride_end(s->line);
+	}
+	return r;
+}
+
+/* --- to OP, while the cycle runs --- */
+
+static int look_again(struct session *s, mono_t give_up, struct failure *failure)
+{
+	int r = cancelled(s, failure);
+
+	if (r < 0) {
+		return r;
+	}
+	if (s->spec.hooks.cycle_has_ended(s->spec.hooks.ctx)) {
+		return failure_set(failure, EXIT_CODE_OVERRUN, -EIO,
+				   "cycle: ended by itself during bring-up (overrun?)");
+	}
+	if (session_now(s).ns >= give_up.ns) {
+		return -ETIME;
+	}
+	session_wait(s, LOOK_SPAN);
+	return 0;
+}
+
+static uint64_t load(const _Atomic uint64_t *counter)
+{
+	return atomic_load_explicit(counter, memory_order_relaxed);
+}
+
+static int wait_for_lock(struct session *s, struct failure *failure)
+{
+	const struct cycle_stats *st = &s->home.page->cycle;
+	int64_t timeout_ns = s->spec.cfg->dc_lock_timeout_ns;
+	mono_t give_up = mono_add(session_now(s), (span_t){ timeout_ns });
+
+	while (atomic_load_explicit(&st->dc_state, memory_order_relaxed) != DC_LOCKED) {
+		int r = look_again(s, give_up, failure);
+
+		if (r == -ETIME) {
+			return failure_set(
+				failure, EXIT_CODE_CLOCKS, r,
+				"dc: no lock to the reference clock within %" PRId64
+				" ms (dc.lock_timeout): correction %" PRId64 " ppb, %" PRIu64
+				" of %" PRIu64 " frames lost, wake latency up to %" PRId64 " us",
+				timeout_ns / NS_PER_MS,
+				atomic_load_explicit(&st->correction_ppb, memory_order_relaxed),
+				load(&st->frames_lost), load(&st->frames_sent),
+				histogram_max_magnitude(&st->wake_latency) / NS_PER_US);
+		}
+		if (r < 0) {
+			return r;
+		}
+	}
+	return 0;
+}
+
+/* A slave that is asked for OP while frames are missing trips over its watchdog (T07). */
+static int wait_for_flow(struct session *s, struct failure *failure)
+{
+	const struct cycle_stats *st = &s->home.page->cycle;
+	mono_t give_up =
+		mono_add(session_now(s), (span_t){ s->spec.cfg->bus_op_timeout_ns });
+	uint64_t lost = load(&st->frames_lost);
+	uint64_t enough = load(&st->cycles) + FLOWING_CYCLES;
+
+	while (load(&st->cycles) < enough) {
+		int r = look_again(s, give_up, failure);
+
+		if (r == -ETIME) {
+			return failure_set(failure, EXIT_CODE_WIRE, r,
+					   "bus: frames do not come back steadily: %" PRIu64
+					   " of %" PRIu64 " lost",
+					   load(&st->frames_lost), load(&st->frames_sent));
+		}
+		if (r < 0) {
+			return r;
+		}
+		if (load(&st->frames_lost) != lost) {
+			lost = load(&st->frames_lost);
+			enough = load(&st->cycles) + FLOWING_CYCLES;
+		}
+	}
+	return 0;
+}
+
+static int start_clocks(struct session *s, struct failure *failure)
+{
+	char error[BUS_ERROR_BYTES] = "";
+	int64_t dc_now_ns = 0;
+	int r;
+
+	if (bus_plan(s->bus)->dc_reference == 0) {
+		return 0;
+	}
+	r = wait_for_lock(s, failure);
+	if (r < 0) {
+		return r;
+	}
+	r = cycle_dc_now(s->cycle, &dc_now_ns);
+	if (r < 0) {
+		return failure_set(failure, EXIT_CODE_CLOCKS, r, "dc: the DC time is not known");
+	}
+	return step(s, bus_sync0_start(s->bus, dc_now_ns, error), EXIT_CODE_CLOCKS, error, failure);
+}
+
+static int lead_to_op(struct session *s, struct failure *failure)
+{
+	span_t timeout = { s->spec.cfg->bus_op_timeout_ns };
+	char error[BUS_ERROR_BYTES] = "";
+	int r = start_clocks(s, failure);
+
+	if (r < 0) {
+		return r;
+	}
+	cycle_phase_set(s->cycle, CYCLE_SYNCED);
+	r = wait_for_flow(s, failure);
+	if (r < 0) {
+		return r;
+	}
+	r = step(s, bus_request_state(s->bus, AL_SAFEOP, timeout, error), EXIT_CODE_STATE, error,
+		 failure);
+	if (r < 0) {
+		return r;
+	}
+	session_state_set(s, BUS_SAFEOP);
+	r = wait_for_flow(s, failure);
+	if (r < 0) {
+		return r;
+	}
+	return step(s, bus_request_state(s->bus, AL_OP, timeout, error), EXIT_CODE_STATE, error,
+		    failure);
+}
+
+static void arrive(struct session *s)
+{
+	size_t count;
+	struct event ev = {
+		.id = EVENT_STARTED,
+		.slave_pos = EVENT_NO_SLAVE,
+		.value = s->spec.cfg->cycle_period_ns,
+	};
+
+	bus_slaves(s->bus, &count);
+	ev.arg[0] = (int32_t)count;
+	cycle_phase_set(s->cycle, CYCLE_OP);
+	s->lost_since = (mono_t){ 0 };
+	s->wkc_low_seen = 0;
+	s->next_watch = session_now(s);
+	session_state_set(s, BUS_OP);
+	session_say(s, "");
+	session_emit(s, &ev);
+}
+
+static int climb(struct session *s, struct failure *failure)
+{
+	int r = open_line(s, failure);
+
+	if (r == 0) {
+		r = prepare_slaves(s, failure);
+	}
+	if (r == 0) {
+		r = make_samples(s, failure);
+	}
+	if (r == 0) {
+		r = make_cycle(s, failure);
+	}
+	if (r == 0) {
+		r = start_cycle(s, failure);
+	}
+	if (r == 0) {
+		r = lead_to_op(s, failure);
+	}
+	return r;
+}
+
+int session_bring_up(struct session *session, struct failure *failure)
+{
+	struct session *s = session;
+	struct failure ignored;
+	int r;
+
+	s->home.page->session = (uint64_t)s->spec.platform.tai_ns(s->spec.platform.ctx);
+	r = climb(s, failure);
+	if (r < 0) {
+		session_say(s, failure->text);
+		if (failure->code == EXIT_CODE_INTERFACE || failure->code == EXIT_CODE_NO_SLAVE) {
+			session_drop(s); /* nobody there to lead back */
+		} else {
+			session_stop(s, &ignored);
+		}
+		session_state_set(s, BUS_DOWN);
+		return r;
+	}
+	arrive(s);
+	return 0;
+}

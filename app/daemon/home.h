@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The run directory: made, locked against a second instance, with the status page and the event ring
+ * in it. It lives as long as the program; sessions on the bus come and go inside it.
+ */
+#ifndef DAEMON_HOME_H
+#define DAEMON_HOME_H
+
+#include <stddef.h>
+#include <sys/types.h>
+
+#include "base/platform.h"
+#include "base/ring.h"
+#include "base/status.h"
+#include "config/config.h"
+#include "daemon/failure.h"
+
+struct home {
+	char dir[CONFIG_PATH_BYTES];
+	gid_t group; /* (gid_t)-1: leave */
+	int lock;    /* descriptor that holds the lock; -1: none */
+	int is_tmpfs;
+	struct status_page *page;
+	struct ring *events;
+};
+
+enum home_segment { HOME_REAL, HOME_SIMULATED };
+
+/**
+ * Make all of it. 0 or -errno with @failure: no permission, another instance, tmpfs full, no such
+ * group. Close with home_close(), also after a failure. Context: blocking.
+ */
+int home_open(struct home *home, const struct config *cfg, const struct platform *platform,
+	      enum home_segment segment, struct failure *failure);
+/** The files stay for readers; the lock goes. */
+void home_close(struct home *home);
+
+/** The path of @file inside. 0 or -ENAMETOOLONG. */
+int home_path(const struct home *home, const char *file, char *ret_path, size_t path_bytes);
+
+/** The page's message; "" for none. Context: service thread. */
+void home_say(struct home *home, const char *text);
+
+/**
+ * Claim the NIC @name in this network namespace, so that two masters never share it. A descriptor to
+ * close at the end, or -errno with @failure. Context: blocking.
+ */
+int home_claim_interface(const char *name, struct failure *failure);
+
+#endif

@@ -1,0 +1,458 @@
+/* SPDX-License-Identifier: MIT */
+/* ecdaqd: one session on this machine's clock, threads and NIC, until it is told to stop. */
+#include <errno.h>
+#include <inttypes.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/timex.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "daemon/notify.h"
+#include "daemon/options.h"
+#include "daemon/realtime.h"
+#include "daemon/session.h"
+#include "link/packet_socket.h"
+
+/* How long the service loop sleeps when nothing presses. */
+#define SERVICE_PERIOD_MS 20
+/* How long it sleeps while the cycle works for it: a frame of its own rides once a cycle. */
+#define WAIT_NS (150 * NS_PER_US)
+#define BACK_OFF_MIN_NS (250 * NS_PER_MS)
+#define BACK_OFF_MAX_NS (5 * NS_PER_S)
+
+struct program {
+	struct options options;
+	struct config cfg;
+	struct notify notify;
+	struct realtime realtime;
+	struct session *session;
+	int interface_claim;
+	int has_been_up;
+	int is_ready;                          /* READY=1 was sent */
+	char link_warning[PACKET_ERROR_BYTES]; /* said already */
+	enum exit_code waiting_for;            /* said already */
+	uint64_t cycles_before;                /* of earlier sessions, in OP */
+	uint64_t cycles_at_op;
+	mono_t op_since;
+};
+
+static _Atomic int signals_taken;
+static struct session *_Atomic signalled;
+
+static void on_signal(int number)
+{
+	struct session *session = atomic_load(&signalled);
+
+	if (atomic_fetch_add(&signals_taken, 1) > 0) {
+		_exit(128 + number);
+	}
+	if (session != NULL) {
+		session_stop_ask(session);
+	}
+}
+
+static mono_t now(void)
+{
+	struct platform pf = platform_posix();
+
+	return pf.now(pf.ctx);
+}
+
+/* --- hooks --- */
+
+static enum packet_wait packet_wait(const struct config *cfg)
+{
+	switch (cfg->cycle_poll) {
+	case CONFIG_POLL_SPIN:
+		return PACKET_WAIT_SPIN;
+	case CONFIG_POLL_SLEEP:
+		return PACKET_WAIT_SLEEP;
+	case CONFIG_POLL_AUTO:
+		break;
+	}
+	return realtime_is_isolated(cfg->cycle_cpu) ? PACKET_WAIT_SPIN : PACKET_WAIT_SLEEP;
+}
+
+static enum exit_code code_of_transport(int r)
+{
+	switch (-r) {
+	case EPERM:
+	case EACCES:
+		return EXIT_CODE_PERMISSION;
+	case ENOMEM:
+	case ENOBUFS:
+		return EXIT_CODE_RESOURCES;
+	default:
+		return EXIT_CODE_INTERFACE;
+	}
+}
+
+static int open_transport(void *ctx, struct transport *ret_transport, struct failure *failure)
+{
+	struct program *pg = ctx;
+	char error[PACKET_ERROR_BYTES] = "";
+	int r = packet_socket_open(pg->cfg.interface, packet_wait(&pg->cfg), ret_transport, error,
+				   sizeof(error));
+
+	if (r < 0) {
+		return failure_set(failure, code_of_transport(r), r, "%s", error);
+	}
+	if (error[0] != '\0' && strcmp(error, pg->link_warning) != 0) {
+		fprintf(stderr, "ecdaqd: warning: %s\n", error);
+		snprintf(pg->link_warning, sizeof(pg->link_warning), "%s", error);
+	}
+	return 0;
+}
+
+static int start_cycle(void *ctx, struct cycle *cycle, struct failure *failure)
+{
+	struct program *pg = ctx;
+	int r = realtime_cycle_start(&pg->realtime, cycle, failure);
+
+	if (r == 0 && pg->realtime.is_pinned) {
+		session_cpu_set(pg->session, (uint32_t)pg->cfg.cycle_cpu);
+	}
+	return r;
+}
+
+static int end_cycle(void *ctx)
+{
+	struct program *pg = ctx;
+
+	return realtime_cycle_end(&pg->realtime);
+}
+
+static int has_cycle_ended(void *ctx)
+{
+	struct program *pg = ctx;
+
+	return realtime_cycle_has_ended(&pg->realtime);
+}
+
+static void wait_shortly(void *ctx, mono_t until)
+{
+	int64_t left_ns = mono_sub(until, now()).ns;
+	struct timespec ts = { 0 };
+
+	(void)ctx;
+	ts.tv_nsec = left_ns < WAIT_NS ? (left_ns > 0 ? left_ns : 0) : WAIT_NS;
+	clock_nanosleep(CLOCK_MONOTONIC, 0, &ts, NULL);
+}
+
+static void alive(void *ctx)
+{
+	struct program *pg = ctx;
+
+	notify_alive(&pg->notify, now());
+}
+
+static void degraded(void *ctx, enum event_rt which, int err, const char *text)
+{
+	struct program *pg = ctx;
+
+	fprintf(stderr, "ecdaqd: warning: %s\n", text);
+	session_degraded(pg->session, which, err);
+}
+
+/* --- start --- */
+
+static int32_t kernel_tai_offset(void)
+{
+	struct timex tx = { .modes = 0 };
+
+	return adjtimex(&tx) < 0 ? 0 : tx.tai;
+}
+
+static int make_session(struct program *pg, struct failure *failure)
+{
+	struct session_spec spec = {
+		.cfg = &pg->cfg,
+		.platform = platform_posix(),
+		.hooks = {
+			.transport_open = open_transport,
+			.cycle_start = start_cycle,
+			.cycle_end = end_cycle,
+			.cycle_has_ended = has_cycle_ended,
+			.wait = wait_shortly,
+			.alive = alive,
+			.ctx = pg,
+		},
+		.segment = pg->options.is_simulated ? HOME_SIMULATED : HOME_REAL,
+		.tai_offset_s = kernel_tai_offset(),
+	};
+
+	return session_create(&spec, &pg->session, failure);
+}
+
+static void catch_signals(void)
+{
+	struct sigaction action = { .sa_handler = on_signal };
+
+	sigfillset(&action.sa_mask);
+	sigaction(SIGTERM, &action, NULL);
+	sigaction(SIGINT, &action, NULL);
+	action.sa_handler = SIG_IGN;
+	sigaction(SIGPIPE, &action, NULL);
+	sigaction(SIGHUP, &action, NULL);
+}
+
+static void check_ring_place(struct program *pg)
+{
+	const struct home *home = session_home(pg->session);
+	char text[CONFIG_PATH_BYTES + 128];
+
+	if (!home->is_tmpfs) {
+		snprintf(text, sizeof(text),
+			 "%s: not on a tmpfs: write-back to the disk will hold the cycle up "
+			 "(runtime.run_dir)",
+			 home->dir);
+		degraded(pg, EVENT_RT_RING_DISK, 0, text);
+	}
+}
+
+/* --- the bus, again and again --- */
+
+static void say_ready(struct program *pg)
+{
+	if (!pg->is_ready) {
+		notify_send(&pg->notify, "READY=1");
+		pg->is_ready = 1;
+	}
+}
+
+static void begin_op(struct program *pg)
+{
+	const struct status_page *page = session_page(pg->session);
+	unsigned slaves = atomic_load(&page->slave_count);
+
+	pg->waiting_for = EXIT_CODE_OK;
+	pg->cycles_at_op = atomic_load(&page->cycle.cycles);
+	if (!pg->has_been_up) {
+		pg->op_since = now();
+	}
+	pg->has_been_up = 1;
+	printf("ecdaqd: %s: %u slave%s in OP, period %" PRId64 " us\n", pg->cfg.interface, slaves,
+	       slaves == 1 ? "" : "s", pg->cfg.cycle_period_ns / NS_PER_US);
+	fflush(stdout);
+	say_ready(pg);
+	notify_send(&pg->notify, "STATUS=%u slaves in OP", slaves);
+}
+
+static uint64_t cycles_in_op(const struct program *pg)
+{
+	return pg->cycles_before + atomic_load(&session_page(pg->session)->cycle.cycles) -
+	       pg->cycles_at_op;
+}
+
+static int is_time_over(const struct program *pg)
+{
+	if (pg->options.cycles > 0 && cycles_in_op(pg) >= pg->options.cycles) {
+		return 1;
+	}
+	return pg->options.seconds > 0 && mono_sub(now(), pg->op_since).ns >=
+						  (int64_t)pg->options.seconds * NS_PER_S;
+}
+
+static void sleep_a_pass(const struct program *pg)
+{
+	struct pollfd fd = { .fd = session_fd(pg->session), .events = POLLIN };
+
+	if (session_is_pressed(pg->session)) {
+		poll(NULL, 0, 1);
+	} else {
+		poll(&fd, 1, SERVICE_PERIOD_MS);
+	}
+}
+
+/* In OP until there is news: an enum session_news, or -errno with @failure. */
+static int serve(struct program *pg, struct failure *failure)
+{
+	int r;
+
+	do {
+		sleep_a_pass(pg);
+		r = session_service(pg->session, failure);
+		if (r == SESSION_GOES_ON && is_time_over(pg)) {
+			r = SESSION_STOP_ASKED;
+		}
+	} while (r == SESSION_GOES_ON);
+	return r;
+}
+
+/* Nothing is up: let @span pass, answering the admin socket. 1 if told to stop. */
+static int idle(struct program *pg, int64_t span_ns)
+{
+	mono_t until = mono_add(now(), (span_t){ span_ns });
+	struct failure failure;
+
+	while (now().ns < until.ns) {
+		sleep_a_pass(pg);
+		if (session_service(pg->session, &failure) == SESSION_STOP_ASKED) {
+			return 1;
+		}
+	}
+	return 0;
+}
+
+/* 0 as soon as the bus is in OP; -errno with @failure when trying again makes no sense. */
+static int bring_up(struct program *pg, struct failure *failure)
+{
+	int64_t back_off_ns = BACK_OFF_MIN_NS;
+	int r;
+
+	while ((r = session_bring_up(pg->session, failure)) < 0) {
+		if (exit_code_hope(failure->code) != EXIT_CODE_PASSING ||
+		    !(pg->options.can_wait || pg->has_been_up)) {
+			return r;
+		}
+		if (pg->waiting_for != failure->code) {
+			fprintf(stderr, "ecdaqd: %s; waiting\n", failure->text);
+			pg->waiting_for = failure->code;
+		}
+		say_ready(pg);
+		notify_send(&pg->notify, "STATUS=waiting: %s", failure->text);
+		if (idle(pg, back_off_ns)) {
+			return failure_set(failure, EXIT_CODE_OK, -ECANCELED,
+					   "bring-up: told to stop before OP was reached");
+		}
+		back_off_ns = back_off_ns * 2 > BACK_OFF_MAX_NS ? BACK_OFF_MAX_NS : back_off_ns * 2;
+	}
+	begin_op(pg);
+	return 0;
+}
+
+static void start_anew(struct program *pg)
+{
+	fprintf(stderr, "ecdaqd: %s: all slaves are lost; starting anew when they are back\n",
+		pg->cfg.interface);
+	pg->cycles_before = cycles_in_op(pg);
+	session_drop(pg->session);
+}
+
+static int run_bus(struct program *pg, struct failure *failure)
+{
+	struct failure stopping;
+	int r;
+
+	do {
+		r = bring_up(pg, failure);
+		if (r < 0) {
+			return r;
+		}
+		r = serve(pg, failure);
+		if (r == SESSION_LOST) {
+			start_anew(pg);
+		}
+	} while (r == SESSION_LOST);
+	notify_send(&pg->notify, "STOPPING=1");
+	if (r < 0) {
+		session_stop(pg->session, &stopping);
+		return r;
+	}
+	return session_stop(pg->session, failure);
+}
+
+/* --- end --- */
+
+static void summarize(const struct program *pg)
+{
+	const struct cycle_stats *st = &session_page(pg->session)->cycle;
+
+	if (!pg->has_been_up) {
+		return;
+	}
+	printf("ecdaqd: stopped after %" PRIu64 " cycles: %" PRIu64 " frames lost, %" PRIu64
+	       " late, %" PRIu64 " overruns, %" PRIu64 " good and %" PRIu64
+	       " bad samples, wake latency p50 %" PRId64 " us, p99.9 %" PRId64 " us, max %" PRId64
+	       " us\n",
+	       atomic_load(&st->cycles), atomic_load(&st->frames_lost), atomic_load(&st->frames_late),
+	       atomic_load(&st->overruns), atomic_load(&st->samples_good),
+	       atomic_load(&st->samples_bad),
+	       histogram_percentile(&st->wake_latency, 500000) / NS_PER_US,
+	       histogram_percentile(&st->wake_latency, 999000) / NS_PER_US,
+	       histogram_max_magnitude(&st->wake_latency) / NS_PER_US);
+}
+
+static int fail(const struct failure *failure)
+{
+	fprintf(stderr, "ecdaqd: %s\n", failure->text);
+	return (int)failure->code;
+}
+
+static int run_session(struct program *pg, struct failure *failure)
+{
+	int r;
+
+	/* A signal that came before there was anything to ask. */
+	if (atomic_load(&signals_taken) > 0) {
+		session_stop_ask(pg->session);
+	}
+	realtime_open(&pg->realtime, &pg->cfg, degraded, pg);
+	check_ring_place(pg);
+	r = run_bus(pg, failure);
+	realtime_close(&pg->realtime);
+	return r;
+}
+
+static int run(struct program *pg)
+{
+	struct failure failure = { .code = EXIT_CODE_OK };
+	int r;
+
+	if (pg->cfg.interface[0] == '\0') {
+		failure_set(&failure, EXIT_CODE_CONFIG, -EINVAL,
+			    "bus.interface: not set: name the segment's NIC there or by --interface");
+		return fail(&failure);
+	}
+	notify_open(&pg->notify);
+	catch_signals();
+	r = make_session(pg, &failure);
+	if (r < 0) {
+		return fail(&failure);
+	}
+	atomic_store(&signalled, pg->session);
+	pg->interface_claim = home_claim_interface(pg->cfg.interface, &failure);
+	r = pg->interface_claim < 0 ? pg->interface_claim : run_session(pg, &failure);
+	if (r < 0) {
+		fail(&failure);
+	}
+	session_conclude(pg->session, failure.code != EXIT_CODE_OK ? &failure : NULL);
+	summarize(pg);
+	atomic_store(&signalled, NULL);
+	session_destroy(pg->session);
+	if (pg->interface_claim >= 0) {
+		close(pg->interface_claim);
+	}
+	notify_close(&pg->notify);
+	return (int)failure.code;
+}
+
+int main(int argc, char **argv)
+{
+	static struct program program;
+	struct failure failure;
+
+	if (options_parse(argc, argv, &program.options, &failure) < 0) {
+		return fail(&failure);
+	}
+	if (program.options.verb == OPTIONS_HELP) {
+		options_help(stdout);
+		return EXIT_CODE_OK;
+	}
+	if (program.options.verb == OPTIONS_VERSION) {
+		puts("ecdaqd " ECDAQ_VERSION);
+		return EXIT_CODE_OK;
+	}
+	if (options_apply(&program.options, &program.cfg, &failure) < 0) {
+		return fail(&failure);
+	}
+	if (program.options.verb == OPTIONS_CHECK) {
+		printf("%s: good\n", program.options.config_path != NULL ? program.options.config_path
+									  : "configuration");
+		return EXIT_CODE_OK;
+	}
+	return run(&program);
+}

@@ -1,0 +1,257 @@
+/* SPDX-License-Identifier: MIT */
+#include "daemon/session.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "daemon/session_inside.h"
+
+#define ZERO(field) atomic_store_explicit(&(field), 0, memory_order_relaxed)
+
+/* --- events: the cycle thread is the ring's producer while it runs, else this one --- */
+
+void session_emit(struct session *s, const struct event *ev)
+{
+	struct event stamped = *ev;
+	const struct platform *pf = &s->spec.platform;
+
+	stamped.mono_ns = pf->now(pf->ctx).ns;
+	stamped.tai_ns = pf->tai_ns(pf->ctx);
+	stamped.cycle = atomic_load_explicit(&s->home.page->cycle.cycle_number,
+					     memory_order_relaxed);
+	if (s->is_riding) {
+		post_push(&s->post, &stamped);
+	} else {
+		ring_push(s->home.events, &stamped, sizeof(stamped), NULL, 0);
+	}
+}
+
+/* --- the cycle's platform --- */
+
+/* Counters and histograms; not what says where the cycle stands. */
+static void clear_stats(struct cycle_stats *st)
+{
+	ZERO(st->frames_sent);
+	ZERO(st->frames_lost);
+	ZERO(st->frames_late);
+	ZERO(st->frames_doubled);
+	ZERO(st->frames_foreign);
+	ZERO(st->wkc_low);
+	ZERO(st->overruns);
+	ZERO(st->cycles_skipped);
+	ZERO(st->samples_good);
+	ZERO(st->samples_bad);
+	ZERO(st->samples_bad_unexplained);
+	ZERO(st->rides);
+	ZERO(st->dc_unlocks);
+	ZERO(st->dc_diff_max_ns);
+	for (size_t i = 0; i < LIMIT_SLAVES; i++) {
+		ZERO(st->slave_good[i]);
+		ZERO(st->slave_bad[i]);
+	}
+	histogram_clear(&st->wake_latency);
+	histogram_clear(&st->round_trip);
+	histogram_clear(&st->phase);
+	histogram_clear(&st->work);
+}
+
+static mono_t cycle_now(void *ctx)
+{
+	const struct session *s = ctx;
+
+	return s->spec.platform.now(s->spec.platform.ctx);
+}
+
+static int64_t cycle_tai(void *ctx)
+{
+	const struct session *s = ctx;
+
+	return s->spec.platform.tai_ns(s->spec.platform.ctx);
+}
+
+/* Context: cycle thread, between two cycles. */
+static int cycle_sleep(void *ctx, mono_t deadline)
+{
+	struct session *s = ctx;
+
+	post_collect(&s->post, s->home.events);
+	if (atomic_load_explicit(&s->clear_asked, memory_order_relaxed)) {
+		atomic_store_explicit(&s->clear_asked, 0, memory_order_relaxed);
+		clear_stats(&s->home.page->cycle);
+	}
+	return s->spec.platform.sleep_until(s->spec.platform.ctx, deadline);
+}
+
+struct platform session_cycle_platform(struct session *s)
+{
+	return (struct platform){
+		.now = cycle_now,
+		.tai_ns = cycle_tai,
+		.sleep_until = cycle_sleep,
+		.ctx = s,
+	};
+}
+
+/* --- small things --- */
+
+mono_t session_now(const struct session *s)
+{
+	return s->spec.platform.now(s->spec.platform.ctx);
+}
+
+void session_wait(struct session *s, span_t span)
+{
+	mono_t until = mono_add(session_now(s), span);
+
+	do {
+		s->spec.hooks.wait(s->spec.hooks.ctx, until);
+		if (s->spec.hooks.alive != NULL) {
+			s->spec.hooks.alive(s->spec.hooks.ctx);
+		}
+	} while (session_now(s).ns < until.ns && !session_is_stop_asked(s));
+}
+
+void session_state_set(struct session *s, enum bus_state state)
+{
+	struct event ev = {
+		.id = EVENT_BUS_STATE,
+		.slave_pos = EVENT_NO_SLAVE,
+		.arg = { (int32_t)s->state, (int32_t)state },
+	};
+
+	if (s->state == state) {
+		return;
+	}
+	session_emit(s, &ev);
+	s->state = state;
+	atomic_store_explicit(&s->home.page->bus_state, state, memory_order_relaxed);
+}
+
+void session_say(struct session *session, const char *text)
+{
+	home_say(&session->home, text);
+}
+
+void session_degraded(struct session *session, enum event_rt which, int err)
+{
+	struct event ev = {
+		.id = EVENT_RT_DEGRADED,
+		.slave_pos = EVENT_NO_SLAVE,
+		.arg = { (int32_t)which, err },
+	};
+
+	atomic_fetch_or_explicit(&session->home.page->rt_degraded, 1u << which,
+				 memory_order_relaxed);
+	session_emit(session, &ev);
+}
+
+void session_cpu_set(struct session *session, uint32_t cpu)
+{
+	atomic_store_explicit(&session->home.page->cycle_cpu, cpu, memory_order_relaxed);
+}
+
+void session_stop_ask(struct session *session)
+{
+	atomic_store_explicit(&session->stop_asked, 1, memory_order_relaxed);
+}
+
+int session_is_stop_asked(const struct session *session)
+{
+	return atomic_load_explicit(&session->stop_asked, memory_order_relaxed);
+}
+
+const struct status_page *session_page(const struct session *session)
+{
+	return session->home.page;
+}
+
+struct bus *session_bus(const struct session *session)
+{
+	return session->bus;
+}
+
+struct cycle *session_cycle(const struct session *session)
+{
+	return session->cycle;
+}
+
+const struct home *session_home(const struct session *session)
+{
+	return &session->home;
+}
+
+int session_fd(const struct session *session)
+{
+	return admin_server_fd(session->admin);
+}
+
+int session_is_pressed(const struct session *session)
+{
+	return session->replies_waiting > 0;
+}
+
+/* --- life --- */
+
+int session_create(const struct session_spec *spec, struct session **ret_session,
+		   struct failure *failure)
+{
+	struct session *s = aligned_alloc(64, (sizeof(*s) + 63) / 64 * 64);
+	char path[CONFIG_PATH_BYTES + 16];
+	char error[FAILURE_TEXT_BYTES];
+	int r;
+
+	if (s == NULL) {
+		return failure_set(failure, EXIT_CODE_RESOURCES, -ENOMEM, "session: no memory");
+	}
+	memset(s, 0, sizeof(*s));
+	s->spec = *spec;
+	r = home_open(&s->home, spec->cfg, &spec->platform, spec->segment, failure);
+	if (r < 0) {
+		session_destroy(s);
+		return r;
+	}
+	r = home_path(&s->home, CONFIG_RUN_ADMIN, path, sizeof(path));
+	if (r == 0) {
+		r = admin_server_create(path, s->home.group, &s->admin, error, sizeof(error));
+	} else {
+		snprintf(error, sizeof(error), "%s: %s", s->home.dir, strerror(-r));
+	}
+	if (r < 0) {
+		session_destroy(s);
+		return failure_set(failure, r == -EACCES || r == -EPERM ? EXIT_CODE_PERMISSION
+									: EXIT_CODE_CONFIG,
+				   r, "%s", error);
+	}
+	*ret_session = s;
+	return 0;
+}
+
+void session_conclude(struct session *session, const struct failure *failure)
+{
+	struct event ev = {
+		.id = EVENT_STOPPED,
+		.slave_pos = EVENT_NO_SLAVE,
+		.value = (int64_t)atomic_load_explicit(&session->home.page->cycle.cycles,
+						       memory_order_relaxed),
+	};
+
+	atomic_store_explicit(&session->home.page->exit_code,
+			      failure != NULL ? (uint32_t)failure->code : EXIT_CODE_OK,
+			      memory_order_relaxed);
+	session_say(session, failure != NULL ? failure->text : "");
+	session_state_set(session, failure != NULL ? BUS_FAILED : BUS_STOPPED);
+	session_emit(session, &ev);
+}
+
+void session_destroy(struct session *session)
+{
+	if (session == NULL) {
+		return;
+	}
+	session_drop(session);
+	admin_server_destroy(session->admin);
+	home_close(&session->home);
+	free(session);
+}

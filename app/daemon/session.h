@@ -1,0 +1,109 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * One run of the master, apart from threads: bring-up, service, stop. On the machine the hooks start a
+ * thread for the cycle and wait by sleeping; on virtual time they step the cycle. Everything here
+ * belongs to the service thread and may block; only session_stop_ask() may be called from anywhere.
+ *
+ * A session may be brought up again after it was stopped, has failed or has lost its slaves: the run
+ * directory, the status page, the event ring and the admin socket stay.
+ */
+#ifndef DAEMON_SESSION_H
+#define DAEMON_SESSION_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/event.h"
+#include "base/platform.h"
+#include "base/status.h"
+#include "config/config.h"
+#include "cycle/cycle.h"
+#include "daemon/failure.h"
+#include "daemon/home.h"
+
+struct session;
+
+struct session_hooks {
+	/** Open the way to the wire, once in each bring-up. 0 or -errno with @failure. */
+	int (*transport_open)(void *ctx, struct transport *ret_transport, struct failure *failure);
+	/** Let @cycle run from here on. 0 or -errno with @failure. */
+	int (*cycle_start)(void *ctx, struct cycle *cycle, struct failure *failure);
+	/** Ask it to stop, wait until it has; the result of cycle_run(). */
+	int (*cycle_end)(void *ctx);
+	/** 1 if the cycle has ended by itself. */
+	int (*cycle_has_ended)(void *ctx);
+	/** Return at @until at the latest; on virtual time the cycle makes a step. */
+	void (*wait)(void *ctx, mono_t until);
+	/** Called often, also in the middle of a long bring-up: a sign of life. May be NULL. */
+	void (*alive)(void *ctx);
+	void *ctx;
+};
+
+struct session_spec {
+	const struct config *cfg; /* outlives the session */
+	struct platform platform;
+	struct session_hooks hooks;
+	enum home_segment segment;
+	int32_t tai_offset_s; /* TAI - UTC of the kernel; 0: unset */
+};
+
+/** Run directory, status page, event ring, admin socket. Free with session_destroy(). 0 or -errno. */
+int session_create(const struct session_spec *spec, struct session **ret_session,
+		   struct failure *failure);
+
+/**
+ * Scan, compare, map, clocks; then ring and cycle; the servo's lock, SYNC0, SAFE-OP, OP. 0, or -errno
+ * with @failure; everything but the run directory is taken down again then. -ECANCELED with
+ * EXIT_CODE_OK: told to stop on the way.
+ */
+int session_bring_up(struct session *session, struct failure *failure);
+
+enum session_news {
+	SESSION_GOES_ON,
+	SESSION_STOP_ASKED, /* by session_stop_ask() or the admin socket */
+	SESSION_LOST,       /* all slaves have been lost for long: take it down and bring it up again */
+};
+
+/**
+ * One pass of the service loop: admin requests, bus watch, status page. An enum session_news, or -errno
+ * with @failure if the cycle has ended by itself. May also be called while nothing is up.
+ */
+int session_service(struct session *session, struct failure *failure);
+
+/** A descriptor that polls readable when the admin socket has something to do. */
+int session_fd(const struct session *session);
+/** 1 if session_service() should be called again within a period or so. */
+int session_is_pressed(const struct session *session);
+
+/** Outputs safe, SAFE-OP, SYNC0 off, INIT, ring closed. Goes on over errors: 0, or the first one with @failure. */
+int session_stop(struct session *session, struct failure *failure);
+/** Take everything down without a word on the wire: the slaves are gone, or shall be left as they are. */
+void session_drop(struct session *session);
+
+/** How it all ended, for the status page: state STOPPED or FAILED, exit code, message. */
+void session_conclude(struct session *session, const struct failure *failure);
+
+/** Without a word on the wire. NULL is fine. */
+void session_destroy(struct session *session);
+
+/** Context: any, also a signal handler. */
+void session_stop_ask(struct session *session);
+int session_is_stop_asked(const struct session *session);
+
+/** A real-time setting could not be had: one bit and one event. Context: service thread. */
+void session_degraded(struct session *session, enum event_rt which, int err);
+/** The core of the cycle thread. Context: service thread. */
+void session_cpu_set(struct session *session, uint32_t cpu);
+/** A message for the status page; "" for none. Context: service thread. */
+void session_say(struct session *session, const char *text);
+
+/** The status page; it lives as long as the session. */
+const struct status_page *session_page(const struct session *session);
+/** The bus, the cycle; NULL while nothing is up. */
+struct bus;
+struct bus *session_bus(const struct session *session);
+struct cycle *session_cycle(const struct session *session);
+/** The run directory. */
+const struct home *session_home(const struct session *session);
+
+#endif

@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: MIT */
+/* What session.c, bring_up.c, take_down.c and watch.c share; nobody else includes it. */
+#ifndef DAEMON_SESSION_INSIDE_H
+#define DAEMON_SESSION_INSIDE_H
+
+#include <stdatomic.h>
+
+#include "admin/server.h"
+#include "base/board.h"
+#include "bus/bus.h"
+#include "bus/exchange.h"
+#include "daemon/home.h"
+#include "daemon/post.h"
+#include "daemon/session.h"
+#include "link/line.h"
+
+struct session {
+	struct session_spec spec;
+	struct home home;
+	struct admin_server *admin;
+	_Atomic int stop_asked;  /* [any] */
+	_Atomic int clear_asked; /* [service] set; [cycle] reset */
+	struct post post;
+	unsigned replies_waiting;
+	/* while the bus is up */
+	struct line *line;
+	struct bus *bus;
+	struct ring *samples;
+	struct exchange *exchange;
+	struct cycle *cycle;
+	struct board board;
+	int is_riding;       /* the cycle owns the transport and the event ring */
+	int is_link_up;
+	enum bus_state state;
+	mono_t next_watch;
+	mono_t lost_since;   /* all slaves, from then on; 0: not so */
+	uint64_t wkc_low_seen;
+};
+
+/** @ev goes to the event ring, stamped with the time now. */
+void session_emit(struct session *s, const struct event *ev);
+/** State, page and event. */
+void session_state_set(struct session *s, enum bus_state state);
+void session_wait(struct session *s, span_t span);
+mono_t session_now(const struct session *s);
+
+/** The platform as the cycle sees it: before it sleeps, it collects what the service thread left for it. */
+struct platform session_cycle_platform(struct session *s);
+
+/** Stop the cycle and give the transport back; its result. */
+int session_cycle_end(struct session *s);
+
+/** Look after the bus; an enum session_news. */
+enum session_news session_watch(struct session *s);
+
+#endif

@@ -1,0 +1,92 @@
+/* SPDX-License-Identifier: MIT */
+/* From OP, or from wherever bring-up has come to, back to nothing. */
+#include <errno.h>
+#include <stdio.h>
+
+#include "daemon/session.h"
+#include "daemon/session_inside.h"
+
+/* So many cycles carry the fail-safe outputs before the slaves are asked to leave OP. */
+enum { SAFE_CYCLES = 4 };
+#define SAFE_TIMEOUT_NS (200 * NS_PER_MS)
+
+int session_cycle_end(struct session *s)
+{
+	int r;
+
+	if (!s->is_riding) {
+		return 0;
+	}
+	r = s->spec.hooks.cycle_end(s->spec.hooks.ctx);
+	s->is_riding = 0;
+	line_ride_end(s->line);
+	post_collect(&s->post, s->home.events);
+	return r;
+}
+
+static void make_outputs_safe(struct session *s)
+{
+	const _Atomic uint64_t *cycles = &s->home.page->cycle.cycles;
+	uint64_t enough = atomic_load_explicit(cycles, memory_order_relaxed) + SAFE_CYCLES;
+	mono_t give_up = mono_add(session_now(s), (span_t){ SAFE_TIMEOUT_NS });
+
+	cycle_phase_set(s->cycle, CYCLE_SAFE);
+	while (atomic_load_explicit(cycles, memory_order_relaxed) < enough &&
+	       session_now(s).ns < give_up.ns &&
+	       !s->spec.hooks.cycle_has_ended(s->spec.hooks.ctx)) {
+		s->spec.hooks.wait(s->spec.hooks.ctx,
+				   mono_add(session_now(s), (span_t){ NS_PER_MS }));
+	}
+}
+
+int session_stop(struct session *session, struct failure *failure)
+{
+	struct session *s = session;
+	char error[BUS_ERROR_BYTES];
+	int first = 0;
+	int r;
+
+	if (s->bus == NULL) {
+		session_drop(s);
+		return 0;
+	}
+	if (s->is_riding) {
+		make_outputs_safe(s);
+		r = bus_request_state(s->bus, AL_SAFEOP, (span_t){ s->spec.cfg->bus_op_timeout_ns },
+				      error);
+		if (r < 0) {
+			first = failure_set(failure, exit_code_of_bus(r, EXIT_CODE_STATE), r,
+					    "%s", error);
+		}
+		session_cycle_end(s);
+	}
+	r = bus_stop(s->bus, error);
+	if (r < 0 && first == 0) {
+		first = failure_set(failure, exit_code_of_bus(r, EXIT_CODE_STATE), r, "%s", error);
+	}
+	session_drop(s);
+	return first;
+}
+
+void session_drop(struct session *session)
+{
+	struct session *s = session;
+
+	session_cycle_end(s);
+	cycle_destroy(s->cycle);
+	s->cycle = NULL;
+	exchange_destroy(s->exchange);
+	s->exchange = NULL;
+	if (s->samples != NULL) {
+		ring_close(s->samples);
+		ring_destroy(s->samples);
+		s->samples = NULL;
+	}
+	bus_destroy(s->bus);
+	s->bus = NULL;
+	if (s->line != NULL) {
+		line_bind(NULL);
+		line_destroy(s->line);
+		s->line = NULL;
+	}
+}

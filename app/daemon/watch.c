@@ -1,0 +1,198 @@
+/* SPDX-License-Identifier: MIT */
+/* The service loop: a few times a second the bus, in every pass the admin socket. */
+#include <errno.h>
+#include <stdio.h>
+
+#include "daemon/session.h"
+#include "daemon/session_inside.h"
+
+#define WATCH_PERIOD_NS (100 * NS_PER_MS)
+/* Recovery goes one step a look. */
+#define RECOVERY_PERIOD_NS (20 * NS_PER_MS)
+/* All slaves gone for so long: their clocks cannot be trusted to go on, start anew. */
+#define LOST_LIMIT_NS (5 * NS_PER_S)
+
+static void emit_event(void *ctx, const struct event *ev)
+{
+	session_emit(ctx, ev);
+}
+
+/* --- admin --- */
+
+static int admin_dc_now(void *ctx, int64_t *ret_dc_ns)
+{
+	const struct session *s = ctx;
+
+	return s->cycle != NULL ? cycle_dc_now(s->cycle, ret_dc_ns) : -EAGAIN;
+}
+
+static int admin_sdo_read(void *ctx, const struct admin_request *rq, uint8_t *ret_data, size_t *len,
+			  uint32_t *ret_abort)
+{
+	const struct session *s = ctx;
+
+	return bus_sdo_read(s->bus, rq->slave_pos, rq->index, rq->subindex, ret_data, len, ret_abort);
+}
+
+static int admin_sdo_write(void *ctx, const struct admin_request *rq, uint32_t *ret_abort)
+{
+	const struct session *s = ctx;
+
+	return bus_sdo_write(s->bus, rq->slave_pos, rq->index, rq->subindex, rq->data, rq->data_len,
+			     ret_abort);
+}
+
+static void admin_stop(void *ctx)
+{
+	session_stop_ask(ctx);
+}
+
+static void admin_clear(void *ctx)
+{
+	struct session *s = ctx;
+
+	if (s->is_riding) {
+		atomic_store_explicit(&s->clear_asked, 1, memory_order_relaxed);
+	}
+}
+
+static void serve_admin(struct session *s)
+{
+	struct admin_target target = {
+		.cfg = s->spec.cfg,
+		.is_op = s->state == BUS_OP,
+		.dc_now = admin_dc_now,
+		.stop = admin_stop,
+		.clear = admin_clear,
+		.emit = emit_event,
+		.ctx = s,
+	};
+
+	if (s->is_riding) {
+		target.channels = bus_channels(s->bus, &target.channel_count);
+		target.slaves = bus_slaves(s->bus, &target.slave_count);
+		target.board = &s->board;
+		target.sdo_read = admin_sdo_read;
+		target.sdo_write = admin_sdo_write;
+	}
+	s->replies_waiting = admin_server_service(s->admin, &target, session_now(s));
+}
+
+/* --- bus --- */
+
+/* Asking is also what binds the socket anew to an interface that went and came back. */
+static void watch_link(struct session *s)
+{
+	const struct transport *tr = line_transport(s->line);
+	int is_up = tr->is_up(tr->ctx);
+	struct event ev = {
+		.id = EVENT_LINK,
+		.slave_pos = EVENT_NO_SLAVE,
+		.arg = { is_up, 0 },
+	};
+
+	if (is_up >= 0 && is_up != s->is_link_up) {
+		s->is_link_up = is_up;
+		session_emit(s, &ev);
+	}
+}
+
+static void follow_bus(struct session *s, const struct bus_watch_report *report)
+{
+	uint32_t count = atomic_load_explicit(&s->home.page->slave_count, memory_order_relaxed);
+	char text[BUS_ERROR_BYTES];
+
+	if (report->is_all_op && s->state == BUS_RECOVERING) {
+		cycle_phase_set(s->cycle, CYCLE_OP);
+		session_state_set(s, BUS_OP);
+		session_say(s, "");
+	} else if (!report->is_all_op) {
+		if (s->state == BUS_OP) {
+			cycle_phase_set(s->cycle, CYCLE_SYNCED);
+			session_state_set(s, BUS_RECOVERING);
+		}
+		snprintf(text, sizeof(text), "bus: %u of %u slaves in OP, %u lost", report->slaves_op,
+			 count, report->slaves_lost);
+		session_say(s, text);
+	}
+	if (report->slaves_lost < count) {
+		s->lost_since = (mono_t){ 0 };
+	} else if (s->lost_since.ns == 0) {
+		s->lost_since = session_now(s);
+	}
+}
+
+enum session_news session_watch(struct session *s)
+{
+	struct bus_watch_report report = { 0 };
+	char text[BUS_ERROR_BYTES];
+	int r = bus_watch(s->bus, s->home.page, emit_event, s, &report);
+
+	if (r < 0) {
+		snprintf(text, sizeof(text), "bus: cannot be watched: error %d", -r);
+		session_say(s, text);
+	} else {
+		follow_bus(s, &report);
+	}
+	if (s->lost_since.ns != 0 &&
+	    mono_sub(session_now(s), s->lost_since).ns > LOST_LIMIT_NS) {
+		return SESSION_LOST;
+	}
+	return SESSION_GOES_ON;
+}
+
+/* Has the working counter been low for longer than is waited for? Then look at once. */
+static int is_wkc_alarming(struct session *s)
+{
+	uint64_t low = atomic_load_explicit(&s->home.page->cycle.wkc_low, memory_order_relaxed);
+	uint64_t more = low - s->wkc_low_seen;
+
+	if (low < s->wkc_low_seen) { /* cleared */
+		s->wkc_low_seen = low;
+		return 0;
+	}
+	return s->state == BUS_OP && more >= s->spec.cfg->bus_wkc_miss_limit_cycles;
+}
+
+static int report_ended_cycle(struct session *s, struct failure *failure)
+{
+	int r = session_cycle_end(s);
+
+	if (r == -ETIME) {
+		return failure_set(failure, EXIT_CODE_OVERRUN, r,
+				   "cycle: overrun in cycle %llu, and cycle.overrun is stop",
+				   (unsigned long long)atomic_load_explicit(
+					   &s->home.page->cycle.cycle_number,
+					   memory_order_relaxed));
+	}
+	return failure_set(failure, EXIT_CODE_INTERNAL, r < 0 ? r : -EIO,
+			   "cycle: ended by itself: error %d", -r);
+}
+
+int session_service(struct session *session, struct failure *failure)
+{
+	struct session *s = session;
+	enum session_news news = SESSION_GOES_ON;
+	mono_t now = session_now(s);
+
+	if (s->spec.hooks.alive != NULL) {
+		s->spec.hooks.alive(s->spec.hooks.ctx);
+	}
+	if (s->is_riding && s->spec.hooks.cycle_has_ended(s->spec.hooks.ctx)) {
+		return report_ended_cycle(s, failure);
+	}
+	serve_admin(s);
+	if (now.ns >= s->next_watch.ns || is_wkc_alarming(s)) {
+		s->wkc_low_seen = atomic_load_explicit(&s->home.page->cycle.wkc_low,
+						       memory_order_relaxed);
+		atomic_fetch_add_explicit(&s->home.page->heartbeat, 1, memory_order_relaxed);
+		if (s->is_riding) {
+			watch_link(s);
+			news = session_watch(s);
+		}
+		s->next_watch = mono_add(now, (span_t){ s->state == BUS_RECOVERING
+								? RECOVERY_PERIOD_NS
+								: WATCH_PERIOD_NS });
+	}
+	return session_is_stop_asked(s) ? SESSION_STOP_ASKED : (int)news;
+}
