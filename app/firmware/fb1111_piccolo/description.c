@@ -16,8 +16,8 @@ static const struct piccolo_entry tx_entries[PICCOLO_TX_ENTRIES] = {
 
 const struct piccolo_description piccolo_description = {
 	.vendor_name = "Beckhoff Automation GmbH & Co. KG",
-	.order = "FB1111-Piccolo",
-	.name = "FB1111-0141 with TMS320F28069 Piccolo, sampling on SYNC0",
+	.order = "FB1111-0141",
+	.name = "FB1111-Piccolo",
 	.group = "FB1111",
 	.group_name = "FB1111 piggyback boards",
 	.hardware_version = "FB1111-0141",

@@ -132,7 +132,7 @@ static uint32_t mapped(const struct piccolo_pdo *pdo, uint32_t i)
 static const char *text_of(enum piccolo_value value)
 {
 	if (value == VALUE_NAME) {
-		return piccolo_description.order;
+		return piccolo_description.name;
 	}
 	return value == VALUE_HARDWARE ? piccolo_description.hardware_version :
 					 piccolo_description.software_version;
