@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * A program of your own that reads every sample: read_ring RING CHANNEL... prints cycle number, DC
- * time and the channels' values, until the ring is closed. Build it against the installed library:
+ * time and the channels' values: what the ring still holds (64 s by default), then what comes, until
+ * the ring is closed. Build it against the installed library:
  *
  *	cc read_ring.c -o read_ring $(pkg-config --cflags --libs ecdaq)
  *
@@ -105,6 +106,7 @@ int main(int argc, char **argv)
 		fprintf(stderr, "read_ring: %s: %s\n", argv[1], strerror(-r));
 		return 1;
 	}
+	ring_seek(reader, ring_oldest(reader));
 	r = find_channels(reader, argv + 2, argc - 2, wanted);
 	if (r == 0) {
 		r = read_until_closed(reader, wanted, argc - 2);
