@@ -4,6 +4,7 @@
 #include "firmware/fb1111_piccolo/esc_register.h"
 #include "firmware/fb1111_piccolo/host/sii.h"
 #include "firmware/fb1111_piccolo/pdo.h"
+#include "firmware/fb1111_piccolo/spi.h"
 #include "harness/test.h"
 #include "wire/al.h"
 #include "wire/esc_reg.h"
@@ -58,19 +59,28 @@ TEST(firmware, starts_anew_when_the_esc_is_reset)
 	CHECK_EQ(board_breaches(&b), 0);
 }
 
-TEST(firmware, spi_address_reaches_the_top_of_the_address_space)
+TEST(firmware, spi_reaches_every_address_bit_and_brings_al_events_back)
 {
 	struct board b;
+	octet_t data[2];
 
 	board_init(&b);
 	board_start(&b);
-	b.memory[0x1fff] = 0x5a;
+	for (unsigned bit = 0; bit < 16; bit++) {
+		uint16_t address = (uint16_t)(1u << bit);
+
+		b.al_event = (uint16_t)(0x8001u | 1u << bit);
+		piccolo_esc_read(&b.fw, address, data, 2);
+		CHECK_EQ(b.address, address + 2);
+		CHECK_EQ(b.fw.al_event, 0x8001u | 1u << bit);
+		data[0] = data[1] = 0x5a;
+		piccolo_esc_write(&b.fw, address, data, 2);
+		CHECK_EQ((uint16_t)(b.address - 2), address);
+	}
+	b.al_event = 0x4321;
 	b.is_masked = 1;
-	CHECK_EQ(b.fw.hal.spi_transfer != NULL, 1);
-	b.is_masked = 0;
-	b.memory[0x1080] = 0xc3;
-	board_master_mailbox_sms(&b);
-	CHECK_EQ(board_master_request(&b, AL_PREOP), AL_PREOP);
+	piccolo_spi_poll(&b.fw);
+	CHECK_EQ(b.fw.al_event, 0x4321);
 	CHECK_EQ(board_breaches(&b), 0);
 }
 
