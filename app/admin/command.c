@@ -201,8 +201,8 @@ static int find_oneshot(const struct admin_target *t, uint16_t slave_pos)
 		const struct channel *ch = &t->channels[i];
 		const char *entry = strrchr(ch->name, '.');
 
-		if (ch->slave_pos == slave_pos && ch->direction == CHANNEL_OUTPUT && entry != NULL &&
-		    strcmp(entry + 1, ONESHOT_ENTRY) == 0) {
+		if (ch->slave_pos == slave_pos && ch->direction == CHANNEL_OUTPUT &&
+		    entry != NULL && strcmp(entry + 1, ONESHOT_ENTRY) == 0) {
 			return (int)i;
 		}
 	}
@@ -226,13 +226,14 @@ static int oneshot_time(const struct admin_target *t, const struct admin_request
 		return reply->result;
 	}
 	if (at_ns <= now_ns) {
-		admin_reply_refuse(reply, -ETIME, "the time is in the past (DC time is %" PRId64 " ns)",
-				   now_ns);
+		admin_reply_refuse(reply, -ETIME,
+				   "the time is in the past (DC time is %" PRId64 " ns)", now_ns);
 		return reply->result;
 	}
 	if (at_ns - now_ns < margin_ns) {
-		admin_reply_refuse(reply, -ETIME, "only %" PRId64 " ns ahead, at least %" PRId64
-				   " ns are needed", at_ns - now_ns, margin_ns);
+		admin_reply_refuse(reply, -ETIME,
+				   "only %" PRId64 " ns ahead, at least %" PRId64 " ns are needed",
+				   at_ns - now_ns, margin_ns);
 		return reply->result;
 	}
 	*ret_time_ns = at_ns;

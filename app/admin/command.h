@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What a request to the admin socket means: checked from the outside in, then done on a target, which
- * is the running session of ecdaqd (or a test's own). Nothing here knows sockets or threads.
+ * What a request to the admin socket means: checked from the outside in, then done on a target,
+ * which is the running session of ecdaqd (or a test's own). Nothing here knows sockets or threads.
  */
 #ifndef ADMIN_COMMAND_H
 #define ADMIN_COMMAND_H
@@ -18,7 +18,8 @@
 /* A one-shot time must be so many periods ahead: the value travels in the next frames first. */
 enum { ADMIN_ONESHOT_MARGIN_CYCLES = 5 };
 
-/* What the commands work on. All of it belongs to the session; it may change between two requests. */
+/* What the commands work on. All of it belongs to the session; it may change between two requests.
+ */
 struct admin_target {
 	const struct config *cfg;
 	const struct channel *channels; /* NULL with channel_count 0: the bus is not mapped */
@@ -45,17 +46,17 @@ enum admin_outcome {
 };
 
 /**
- * Copy and check @message as it came from a client. 0; -EMSGSIZE wrong length, -EPROTO no request of
- * ours, -EINVAL a field out of range, each with one line in @why (ADMIN_TEXT_BYTES); @ret_request is
- * untouched then. Context: any.
+ * Copy and check @message as it came from a client. 0; -EMSGSIZE wrong length, -EPROTO no request
+ * of ours, -EINVAL a field out of range, each with one line in @why (ADMIN_TEXT_BYTES);
+ * @ret_request is untouched then. Context: any.
  */
 int admin_request_parse(const void *message, size_t len, struct admin_request *ret_request,
 			char *why);
 
 /**
- * Do what a parsed @request of user @uid asks for. @reply is filled; with ADMIN_DEFERRED, the board's
- * set *ret_sequence must be on the wire before it is sent (admin_reply_finish()). Context: service
- * thread; SDO requests block.
+ * Do what a parsed @request of user @uid asks for. @reply is filled; with ADMIN_DEFERRED, the
+ * board's set *ret_sequence must be on the wire before it is sent (admin_reply_finish()). Context:
+ * service thread; SDO requests block.
  */
 enum admin_outcome admin_command_run(const struct admin_target *target,
 				     const struct admin_request *request, uint32_t uid,

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The admin socket of ecdaqd ("admin" in the run directory, SOCK_SEQPACKET, mode 0660, group from
- * configuration): one fixed-size request, one fixed-size reply. Little-endian hosts only; both ends are on
- * one machine. Reading needs no socket: it is done on the status page and the rings.
+ * configuration): one fixed-size request, one fixed-size reply. Little-endian hosts only; both ends
+ * are on one machine. Reading needs no socket: it is done on the status page and the rings.
  */
 #ifndef ADMIN_PROTOCOL_H
 #define ADMIN_PROTOCOL_H
@@ -51,8 +51,8 @@ struct admin_reply {
 	int32_t result;     /* 0 or -errno */
 	uint32_t sdo_abort; /* 0: none */
 	uint32_t data_len;
-	uint64_t cycle;     /* in which it took effect; SET, ONESHOT */
-	int64_t dc_time_ns; /* ONESHOT: the absolute time armed */
+	uint64_t cycle;              /* in which it took effect; SET, ONESHOT */
+	int64_t dc_time_ns;          /* ONESHOT: the absolute time armed */
 	char text[ADMIN_TEXT_BYTES]; /* one line: why it failed */
 	uint8_t data[ADMIN_DATA_BYTES];
 };

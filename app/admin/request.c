@@ -89,7 +89,8 @@ int admin_request_parse(const void *message, size_t len, struct admin_request *r
 	int r;
 
 	if (len != sizeof(rq)) {
-		snprintf(why, ADMIN_TEXT_BYTES, "a request has %zu bytes, not %zu", sizeof(rq), len);
+		snprintf(why, ADMIN_TEXT_BYTES, "a request has %zu bytes, not %zu", sizeof(rq),
+			 len);
 		return -EMSGSIZE;
 	}
 	memcpy(&rq, message, sizeof(rq));

@@ -63,8 +63,8 @@ static int listen_at(struct admin_server *server, gid_t group)
 	return 0;
 }
 
-int admin_server_create(const char *path, gid_t group, struct admin_server **ret_server, char *error,
-			size_t error_bytes)
+int admin_server_create(const char *path, gid_t group, struct admin_server **ret_server,
+			char *error, size_t error_bytes)
 {
 	struct admin_server *server = calloc(1, sizeof(*server));
 	int r;
@@ -78,8 +78,8 @@ int admin_server_create(const char *path, gid_t group, struct admin_server **ret
 	server->poller = epoll_create1(EPOLL_CLOEXEC);
 	server->listener = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
 	r = server->poller < 0 || server->listener < 0 ? -errno : 0;
-	if (r == 0 && snprintf(server->path, sizeof(server->path), "%s", path) >=
-			      (int)sizeof(server->path)) {
+	if (r == 0 &&
+	    snprintf(server->path, sizeof(server->path), "%s", path) >= (int)sizeof(server->path)) {
 		r = -ENAMETOOLONG;
 	}
 	if (r == 0) {

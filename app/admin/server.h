@@ -22,8 +22,8 @@ struct admin_server;
  * Listen at @path, mode 0660; a socket left by an earlier run is replaced. @group (gid_t)-1: leave.
  * 0 or -errno with one line in @error. Free with admin_server_destroy(). Context: blocking.
  */
-int admin_server_create(const char *path, gid_t group, struct admin_server **ret_server, char *error,
-			size_t error_bytes);
+int admin_server_create(const char *path, gid_t group, struct admin_server **ret_server,
+			char *error, size_t error_bytes);
 /** Closes all clients and removes the socket. NULL is fine. */
 void admin_server_destroy(struct admin_server *server);
 

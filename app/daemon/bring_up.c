@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* From nothing to OP, in the order that distributed clocks ask for (masters' sequence: filters, delays,
- * offsets, burst; then the cyclic frame and the servo's lock; then one common SYNC0; then SAFE-OP, OP). */
+/* From nothing to OP, in the order that distributed clocks ask for (masters' sequence: filters,
+ * delays, offsets, burst; then the cyclic frame and the servo's lock; then one common SYNC0; then
+ * SAFE-OP, OP). */
 #include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
@@ -13,15 +14,16 @@ enum {
 	FILE_MODE = 0640,
 	FLOWING_CYCLES = 10, /* in a row with a frame, before OP is asked for (T07) */
 	META_BYTES_MAX = sizeof(struct sample_meta) + LIMIT_SLAVES * sizeof(struct slave_info) +
-			 LIMIT_CHANNELS * sizeof(struct channel),
+		LIMIT_CHANNELS * sizeof(struct channel),
 };
 #define LOOK_SPAN ((span_t){ 5 * NS_PER_MS })
 
 static int cancelled(const struct session *s, struct failure *failure)
 {
-	return session_is_stop_asked(s) ? failure_set(failure, EXIT_CODE_OK, -ECANCELED,
-						      "bring-up: told to stop before OP was reached")
-					: 0;
+	return session_is_stop_asked(s)
+		       ? failure_set(failure, EXIT_CODE_OK, -ECANCELED,
+				     "bring-up: told to stop before OP was reached")
+		       : 0;
 }
 
 /* --- the slaves --- */
@@ -132,8 +134,8 @@ static int make_samples(struct session *s, struct failure *failure)
 	struct ring_spec spec = {
 		.path = path,
 		.kind = "sample",
-		.payload_bytes = (uint32_t)(sizeof(struct sample_header) +
-					    bus_plan(s->bus)->image_bytes),
+		.payload_bytes =
+			(uint32_t)(sizeof(struct sample_header) + bus_plan(s->bus)->image_bytes),
 		.slot_count = (uint64_t)(s->spec.cfg->ring_depth_ns / s->spec.cfg->cycle_period_ns),
 		.meta = meta,
 		.meta_bytes = write_meta(s, meta),
@@ -180,9 +182,8 @@ static int make_cycle(struct session *s, struct failure *failure)
 	memset(&s->home.page->cycle, 0, sizeof(s->home.page->cycle));
 	r = cycle_create(&spec, &s->cycle, error, sizeof(error));
 	if (r < 0) {
-		return failure_set(failure,
-				   r == -ENOMEM ? EXIT_CODE_RESOURCES : EXIT_CODE_CONFIG, r, "%s",
-				   error[0] != '\0' ? error : strerror(-r));
+		return failure_set(failure, r == -ENOMEM ? EXIT_CODE_RESOURCES : EXIT_CODE_CONFIG,
+				   r, "%s", error[0] != '\0' ? error : strerror(-r));
 	}
 	return 0;
 }
@@ -267,8 +268,7 @@ static int wait_for_lock(struct session *s, struct failure *failure)
 static int wait_for_flow(struct session *s, struct failure *failure)
 {
 	const struct cycle_stats *st = &s->home.page->cycle;
-	mono_t give_up =
-		mono_add(session_now(s), (span_t){ s->spec.cfg->bus_op_timeout_ns });
+	mono_t give_up = mono_add(session_now(s), (span_t){ s->spec.cfg->bus_op_timeout_ns });
 	uint64_t lost = load(&st->frames_lost);
 	uint64_t enough = load(&st->cycles) + FLOWING_CYCLES;
 

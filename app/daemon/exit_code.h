@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* How ecdaqd ended, for scripts and service managers. Part of the interface: numbers do not change. */
+/* How ecdaqd ended, for scripts and service managers. Part of the interface: numbers do not change.
+ */
 #ifndef DAEMON_EXIT_CODE_H
 #define DAEMON_EXIT_CODE_H
 
@@ -29,7 +30,8 @@ enum exit_code_hope { EXIT_CODE_LASTING, EXIT_CODE_PASSING };
 /** PASSING: the same attempt may do better later (no slave yet), so --wait tries again. */
 enum exit_code_hope exit_code_hope(enum exit_code code);
 
-/** What a call of bus/bus.h that failed with @r means; @otherwise for a state or lock not reached. */
+/** What a call of bus/bus.h that failed with @r means; @otherwise for a state or lock not reached.
+ */
 enum exit_code exit_code_of_bus(int r, enum exit_code otherwise);
 
 #endif

@@ -104,7 +104,8 @@ static int make_dir(struct home *home, struct failure *failure)
 	if (!S_ISDIR(st.st_mode)) {
 		return fail(failure, home->dir, ENOTDIR);
 	}
-	/* In a directory of somebody else, our files could be swapped under us (/dev/shm is open to all). */
+	/* In a directory of somebody else, our files could be swapped under us (/dev/shm is open to
+	 * all). */
 	if (st.st_uid != geteuid() && st.st_uid != 0) {
 		return failure_set(failure, EXIT_CODE_PERMISSION, -EPERM,
 				   "%s: belongs to user %u, not to this one", home->dir, st.st_uid);
@@ -119,9 +120,9 @@ static int busy(const struct home *home, struct failure *failure)
 	ssize_t len = pread(home->lock, pid, sizeof(pid) - 1, 0);
 
 	pid[len > 0 ? strcspn(pid, "\n") : 0] = '\0';
-	return failure_set(failure, EXIT_CODE_BUSY, -EBUSY, "%s: another ecdaqd runs here%s%s%s",
-			   home->dir, pid[0] != '\0' ? " (pid " : "", pid,
-			   pid[0] != '\0' ? ")" : "");
+	return failure_set(failure, EXIT_CODE_BUSY, -EBUSY,
+			   "%s: another ecdaqd is running here%s%s%s", home->dir,
+			   pid[0] != '\0' ? " (pid " : "", pid, pid[0] != '\0' ? ")" : "");
 }
 
 static int lock_dir(struct home *home, struct failure *failure)
@@ -248,9 +249,11 @@ void home_say(struct home *home, const char *text)
 
 int home_claim_interface(const char *name, struct failure *failure)
 {
-	/* The abstract socket namespace belongs to the network namespace, as the names of NICs do. */
+	/* The abstract socket namespace belongs to the network namespace, as the names of NICs do.
+	 */
 	struct sockaddr_un address = { .sun_family = AF_UNIX };
-	int len = snprintf(address.sun_path + 1, sizeof(address.sun_path) - 1, "ecdaq/nic/%s", name);
+	int len =
+		snprintf(address.sun_path + 1, sizeof(address.sun_path) - 1, "ecdaq/nic/%s", name);
 	int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
 
 	if (fd < 0) {
@@ -263,7 +266,7 @@ int home_claim_interface(const char *name, struct failure *failure)
 		close(fd);
 		if (err == EADDRINUSE) {
 			return failure_set(failure, EXIT_CODE_BUSY, -EBUSY,
-					   "%s: another ecdaqd has this interface", name);
+					   "%s: another ecdaqd is running on this interface", name);
 		}
 		return fail(failure, name, err);
 	}

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The run directory: made, locked against a second instance, with the status page and the event ring
- * in it. It lives as long as the program; sessions on the bus come and go inside it.
+ * The run directory: made, locked against a second instance, with the status page and the event
+ * ring in it. It lives as long as the program; sessions on the bus come and go inside it.
  */
 #ifndef DAEMON_HOME_H
 #define DAEMON_HOME_H
@@ -42,8 +42,8 @@ int home_path(const struct home *home, const char *file, char *ret_path, size_t 
 void home_say(struct home *home, const char *text);
 
 /**
- * Claim the NIC @name in this network namespace, so that two masters never share it. A descriptor to
- * close at the end, or -errno with @failure. Context: blocking.
+ * Claim the NIC @name in this network namespace, so that two masters never share it. A descriptor
+ * to close at the end, or -errno with @failure. Context: blocking.
  */
 int home_claim_interface(const char *name, struct failure *failure);
 

@@ -7,7 +7,6 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/timex.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "daemon/notify.h"
@@ -134,12 +133,11 @@ static int has_cycle_ended(void *ctx)
 
 static void wait_shortly(void *ctx, mono_t until)
 {
-	int64_t left_ns = mono_sub(until, now()).ns;
-	struct timespec ts = { 0 };
+	struct platform pf = platform_posix();
+	mono_t soon = mono_add(pf.now(pf.ctx), (span_t){ WAIT_NS });
 
 	(void)ctx;
-	ts.tv_nsec = left_ns < WAIT_NS ? (left_ns > 0 ? left_ns : 0) : WAIT_NS;
-	clock_nanosleep(CLOCK_MONOTONIC, 0, &ts, NULL);
+	pf.sleep_until(pf.ctx, soon.ns < until.ns ? soon : until);
 }
 
 static void alive(void *ctx)
@@ -252,8 +250,8 @@ static int is_time_over(const struct program *pg)
 	if (pg->options.cycles > 0 && cycles_in_op(pg) >= pg->options.cycles) {
 		return 1;
 	}
-	return pg->options.seconds > 0 && mono_sub(now(), pg->op_since).ns >=
-						  (int64_t)pg->options.seconds * NS_PER_S;
+	return pg->options.seconds > 0 &&
+	       mono_sub(now(), pg->op_since).ns >= (int64_t)pg->options.seconds * NS_PER_S;
 }
 
 static void sleep_a_pass(const struct program *pg)
@@ -368,9 +366,9 @@ static void summarize(const struct program *pg)
 	       " late, %" PRIu64 " overruns, %" PRIu64 " good and %" PRIu64
 	       " bad samples, wake latency p50 %" PRId64 " us, p99.9 %" PRId64 " us, max %" PRId64
 	       " us\n",
-	       atomic_load(&st->cycles), atomic_load(&st->frames_lost), atomic_load(&st->frames_late),
-	       atomic_load(&st->overruns), atomic_load(&st->samples_good),
-	       atomic_load(&st->samples_bad),
+	       atomic_load(&st->cycles), atomic_load(&st->frames_lost),
+	       atomic_load(&st->frames_late), atomic_load(&st->overruns),
+	       atomic_load(&st->samples_good), atomic_load(&st->samples_bad),
 	       histogram_percentile(&st->wake_latency, 500000) / NS_PER_US,
 	       histogram_percentile(&st->wake_latency, 999000) / NS_PER_US,
 	       histogram_max_magnitude(&st->wake_latency) / NS_PER_US);
@@ -403,8 +401,9 @@ static int run(struct program *pg)
 	int r;
 
 	if (pg->cfg.interface[0] == '\0') {
-		failure_set(&failure, EXIT_CODE_CONFIG, -EINVAL,
-			    "bus.interface: not set: name the segment's NIC there or by --interface");
+		failure_set(
+			&failure, EXIT_CODE_CONFIG, -EINVAL,
+			"bus.interface: not set: name the segment's NIC there or by --interface");
 		return fail(&failure);
 	}
 	notify_open(&pg->notify);
@@ -450,8 +449,9 @@ int main(int argc, char **argv)
 		return fail(&failure);
 	}
 	if (program.options.verb == OPTIONS_CHECK) {
-		printf("%s: good\n", program.options.config_path != NULL ? program.options.config_path
-									  : "configuration");
+		printf("%s: good\n", program.options.config_path != NULL
+					     ? program.options.config_path
+					     : "configuration");
 		return EXIT_CODE_OK;
 	}
 	return run(&program);

@@ -11,7 +11,7 @@
 #include "base/clock.h"
 
 struct notify {
-	int fd; /* -1: nobody listens */
+	int fd;              /* -1: nobody listens */
 	int64_t watchdog_ns; /* half of what the manager allows; 0: none asked for */
 	mono_t next_watchdog;
 };

@@ -71,9 +71,9 @@ static const struct {
 	enum argument argument;
 } known[] = {
 	{ "--config", ARG_VALUE }, { "--interface", ARG_VALUE }, { "--run-dir", ARG_VALUE },
-	{ "--set", ARG_VALUE },	   { "--cycles", ARG_VALUE },	 { "--seconds", ARG_VALUE },
-	{ "--check", ARG_NONE },   { "--version", ARG_NONE },	 { "--help", ARG_NONE },
-	{ "-h", ARG_NONE },	   { "--wait", ARG_NONE },	 { "--simulated", ARG_NONE },
+	{ "--set", ARG_VALUE },    { "--cycles", ARG_VALUE },    { "--seconds", ARG_VALUE },
+	{ "--check", ARG_NONE },   { "--version", ARG_NONE },    { "--help", ARG_NONE },
+	{ "-h", ARG_NONE },        { "--wait", ARG_NONE },       { "--simulated", ARG_NONE },
 };
 
 /* Index into known[] of "--name" or "--name=value"; -ENOENT. */
@@ -157,11 +157,12 @@ int options_apply(const struct options *options, struct config *ret_cfg, struct 
 		return refuse(failure, r, error);
 	}
 	if (options->interface != NULL) {
-		r = put_text(cfg.interface, sizeof(cfg.interface), "--interface", options->interface,
-			     failure);
+		r = put_text(cfg.interface, sizeof(cfg.interface), "--interface",
+			     options->interface, failure);
 	}
 	if (r == 0 && options->run_dir != NULL) {
-		r = put_text(cfg.run_dir, sizeof(cfg.run_dir), "--run-dir", options->run_dir, failure);
+		r = put_text(cfg.run_dir, sizeof(cfg.run_dir), "--run-dir", options->run_dir,
+			     failure);
 	}
 	if (r < 0) {
 		return r;
@@ -178,7 +179,8 @@ void options_help(FILE *out)
 {
 	fputs("usage: ecdaqd [OPTION...]\n"
 	      "\n"
-	      "The EtherCAT master: finds the slaves on one network interface, leads them to OP and\n"
+	      "The EtherCAT master: finds the slaves on one network interface, leads them to OP "
+	      "and\n"
 	      "exchanges process data in every cycle; samples go to a ring in the run directory.\n"
 	      "\n"
 	      "  --config FILE        ecdaq.yaml (default: built-in defaults)\n"
@@ -188,17 +190,20 @@ void options_help(FILE *out)
 	      "  --run-dir DIR        rings, status page, admin socket (runtime.run_dir)\n"
 	      "  --cycles N           stop in order after N cycles in OP\n"
 	      "  --seconds N          stop in order after N seconds in OP\n"
-	      "  --wait               while there is no interface, link or slave yet, say so once and\n"
+	      "  --wait               while there is no interface, link or slave yet, say so once "
+	      "and\n"
 	      "                       try again; READY=1 is sent when the waiting begins\n"
 	      "  --simulated          say in the status page that the segment is a simulated one\n"
 	      "  --check              read the configuration, say whether it is good, and end\n"
 	      "  --version            print the version\n"
 	      "  --help               this\n"
 	      "\n"
-	      "SIGTERM or SIGINT: outputs to fail-safe, slaves to INIT, a summary; a second one ends at\n"
+	      "SIGTERM or SIGINT: outputs to fail-safe, slaves to INIT, a summary; a second one "
+	      "ends at\n"
 	      "once, and the slaves' watchdogs make the outputs safe.\n"
 	      "\n"
-	      "environment: ECDAQ_RUN_DIR (run directory where none is configured), NOTIFY_SOCKET and\n"
+	      "environment: ECDAQ_RUN_DIR (run directory where none is configured), NOTIFY_SOCKET "
+	      "and\n"
 	      "WATCHDOG_USEC (set by systemd for Type=notify)\n"
 	      "\n"
 	      "exit codes:\n",

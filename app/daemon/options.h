@@ -30,7 +30,8 @@ struct options {
 /** Strings point into @argv. 0, or -EINVAL with @failure; @ret_options is untouched then. */
 int options_parse(int argc, char **argv, struct options *ret_options, struct failure *failure);
 
-/** The configuration that @options ask for: file, --set in order, the rest. 0 or -errno with @failure. */
+/** The configuration that @options ask for: file, --set in order, the rest. 0 or -errno with
+ * @failure. */
 int options_apply(const struct options *options, struct config *ret_cfg, struct failure *failure);
 
 void options_help(FILE *out);

@@ -24,8 +24,8 @@ void post_collect(struct post *post, struct ring *events)
 	uint32_t head = atomic_load_explicit(&post->head, memory_order_acquire);
 
 	while (tail != head) {
-		ring_push(events, &post->slot[tail & (POST_CAPACITY - 1)], sizeof(struct event), NULL,
-			  0);
+		ring_push(events, &post->slot[tail & (POST_CAPACITY - 1)], sizeof(struct event),
+			  NULL, 0);
 		tail++;
 	}
 	atomic_store_explicit(&post->tail, tail, memory_order_release);

@@ -16,9 +16,9 @@
 enum { POST_CAPACITY = 1024 };
 
 struct post {
-	_Alignas(64) _Atomic uint32_t head;  /* [service] next slot to fill */
-	uint64_t dropped;                    /* [service] */
-	_Alignas(64) _Atomic uint32_t tail;  /* [cycle] next slot to take */
+	_Alignas(64) _Atomic uint32_t head; /* [service] next slot to fill */
+	uint64_t dropped;                   /* [service] */
+	_Alignas(64) _Atomic uint32_t tail; /* [cycle] next slot to take */
 	_Alignas(64) struct event slot[POST_CAPACITY];
 };
 

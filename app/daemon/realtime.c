@@ -135,7 +135,8 @@ static void raise_priority(struct realtime *rt)
 
 /* --- memory --- */
 
-/* Rights are not asked for but tried: in a user namespace CAP_IPC_LOCK says yes and the kernel no. */
+/* Rights are not asked for but tried: in a user namespace CAP_IPC_LOCK says yes and the kernel no.
+ */
 static int may_lock_without_limit(void)
 {
 	struct rlimit old;
@@ -172,8 +173,8 @@ static void raise_memory_limit(void)
 }
 
 /*
- * With a limit, MCL_FUTURE would make a later allocation of the service thread fail when it is reached;
- * so only what there is now gets locked. All that the cycle touches is there now.
+ * With a limit, MCL_FUTURE would make a later allocation of the service thread fail when it is
+ * reached; so only what there is now gets locked. All that the cycle touches is there now.
  */
 static void lock_memory(struct realtime *rt)
 {
@@ -188,8 +189,10 @@ static void lock_memory(struct realtime *rt)
 		int err = errno;
 
 		report(rt, EVENT_RT_MEMORY, err,
-		       "cycle.lock_memory: mlockall refused: %s: it takes CAP_IPC_LOCK, or a higher "
-		       "`ulimit -l` (LimitMEMLOCK=), or a smaller ring.depth; memory may be paged out",
+		       "cycle.lock_memory: mlockall refused: %s: it takes CAP_IPC_LOCK, or a "
+		       "higher "
+		       "`ulimit -l` (LimitMEMLOCK=), or a smaller ring.depth; memory may be paged "
+		       "out",
 		       strerror(err));
 	}
 }
@@ -205,8 +208,8 @@ static void hold_cpu_awake(struct realtime *rt)
 		return;
 	}
 	rt->dma_latency = open(DMA_LATENCY_PATH, O_RDWR | O_CLOEXEC);
-	if (rt->dma_latency < 0 ||
-	    write(rt->dma_latency, &latency_us, sizeof(latency_us)) != (ssize_t)sizeof(latency_us)) {
+	if (rt->dma_latency < 0 || write(rt->dma_latency, &latency_us, sizeof(latency_us)) !=
+					   (ssize_t)sizeof(latency_us)) {
 		int err = errno;
 
 		report(rt, EVENT_RT_DMA_LATENCY, err,
@@ -316,9 +319,11 @@ int realtime_cycle_start(void *ctx, struct cycle *cycle, struct failure *failure
 	if (r < 0) {
 		sem_destroy(&rt->gate);
 		free_stack(rt);
-		return failure_set(failure, EXIT_CODE_RESOURCES, r, "cycle thread: %s", strerror(-r));
+		return failure_set(failure, EXIT_CODE_RESOURCES, r, "cycle thread: %s",
+				   strerror(-r));
 	}
 	rt->is_running = 1;
+	pthread_setname_np(rt->thread, "ecdaqd-cycle");
 	pin(rt);
 	raise_priority(rt);
 	lock_memory(rt);

@@ -19,8 +19,8 @@ void session_emit(struct session *s, const struct event *ev)
 
 	stamped.mono_ns = pf->now(pf->ctx).ns;
 	stamped.tai_ns = pf->tai_ns(pf->ctx);
-	stamped.cycle = atomic_load_explicit(&s->home.page->cycle.cycle_number,
-					     memory_order_relaxed);
+	stamped.cycle =
+		atomic_load_explicit(&s->home.page->cycle.cycle_number, memory_order_relaxed);
 	if (s->is_riding) {
 		post_push(&s->post, &stamped);
 	} else {
@@ -220,8 +220,9 @@ int session_create(const struct session_spec *spec, struct session **ret_session
 	}
 	if (r < 0) {
 		session_destroy(s);
-		return failure_set(failure, r == -EACCES || r == -EPERM ? EXIT_CODE_PERMISSION
-									: EXIT_CODE_CONFIG,
+		return failure_set(failure,
+				   r == -EACCES || r == -EPERM ? EXIT_CODE_PERMISSION
+							       : EXIT_CODE_CONFIG,
 				   r, "%s", error);
 	}
 	*ret_session = s;

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * One run of the master, apart from threads: bring-up, service, stop. On the machine the hooks start a
- * thread for the cycle and wait by sleeping; on virtual time they step the cycle. Everything here
- * belongs to the service thread and may block; only session_stop_ask() may be called from anywhere.
+ * One run of the master, apart from threads: bring-up, service, stop. On the machine the hooks
+ * start a thread for the cycle and wait by sleeping; on virtual time they step the cycle.
+ * Everything here belongs to the service thread and may block; only session_stop_ask() may be
+ * called from anywhere.
  *
- * A session may be brought up again after it was stopped, has failed or has lost its slaves: the run
- * directory, the status page, the event ring and the admin socket stay.
+ * A session may be brought up again after it was stopped, has failed or has lost its slaves: the
+ * run directory, the status page, the event ring and the admin socket stay.
  */
 #ifndef DAEMON_SESSION_H
 #define DAEMON_SESSION_H
@@ -47,13 +48,14 @@ struct session_spec {
 	int32_t tai_offset_s; /* TAI - UTC of the kernel; 0: unset */
 };
 
-/** Run directory, status page, event ring, admin socket. Free with session_destroy(). 0 or -errno. */
+/** Run directory, status page, event ring, admin socket. Free with session_destroy(). 0 or -errno.
+ */
 int session_create(const struct session_spec *spec, struct session **ret_session,
 		   struct failure *failure);
 
 /**
- * Scan, compare, map, clocks; then ring and cycle; the servo's lock, SYNC0, SAFE-OP, OP. 0, or -errno
- * with @failure; everything but the run directory is taken down again then. -ECANCELED with
+ * Scan, compare, map, clocks; then ring and cycle; the servo's lock, SYNC0, SAFE-OP, OP. 0, or
+ * -errno with @failure; everything but the run directory is taken down again then. -ECANCELED with
  * EXIT_CODE_OK: told to stop on the way.
  */
 int session_bring_up(struct session *session, struct failure *failure);
@@ -61,12 +63,12 @@ int session_bring_up(struct session *session, struct failure *failure);
 enum session_news {
 	SESSION_GOES_ON,
 	SESSION_STOP_ASKED, /* by session_stop_ask() or the admin socket */
-	SESSION_LOST,       /* all slaves have been lost for long: take it down and bring it up again */
+	SESSION_LOST, /* all slaves have been lost for long: take it down and bring it up again */
 };
 
 /**
- * One pass of the service loop: admin requests, bus watch, status page. An enum session_news, or -errno
- * with @failure if the cycle has ended by itself. May also be called while nothing is up.
+ * One pass of the service loop: admin requests, bus watch, status page. An enum session_news, or
+ * -errno with @failure if the cycle has ended by itself. May also be called while nothing is up.
  */
 int session_service(struct session *session, struct failure *failure);
 
@@ -75,9 +77,11 @@ int session_fd(const struct session *session);
 /** 1 if session_service() should be called again within a period or so. */
 int session_is_pressed(const struct session *session);
 
-/** Outputs safe, SAFE-OP, SYNC0 off, INIT, ring closed. Goes on over errors: 0, or the first one with @failure. */
+/** Outputs safe, SAFE-OP, SYNC0 off, INIT, ring closed. Goes on over errors: 0, or the first one
+ * with @failure. */
 int session_stop(struct session *session, struct failure *failure);
-/** Take everything down without a word on the wire: the slaves are gone, or shall be left as they are. */
+/** Take everything down without a word on the wire: the slaves are gone, or shall be left as they
+ * are. */
 void session_drop(struct session *session);
 
 /** How it all ended, for the status page: state STOPPED or FAILED, exit code, message. */

@@ -29,11 +29,11 @@ struct session {
 	struct exchange *exchange;
 	struct cycle *cycle;
 	struct board board;
-	int is_riding;       /* the cycle owns the transport and the event ring */
+	int is_riding; /* the cycle owns the transport and the event ring */
 	int is_link_up;
 	enum bus_state state;
 	mono_t next_watch;
-	mono_t lost_since;   /* all slaves, from then on; 0: not so */
+	mono_t lost_since; /* all slaves, from then on; 0: not so */
 	uint64_t wkc_low_seen;
 };
 
@@ -44,7 +44,8 @@ void session_state_set(struct session *s, enum bus_state state);
 void session_wait(struct session *s, span_t span);
 mono_t session_now(const struct session *s);
 
-/** The platform as the cycle sees it: before it sleeps, it collects what the service thread left for it. */
+/** The platform as the cycle sees it: before it sleeps, it collects what the service thread left
+ * for it. */
 struct platform session_cycle_platform(struct session *s);
 
 /** Stop the cycle and give the transport back; its result. */

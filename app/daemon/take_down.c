@@ -55,8 +55,8 @@ int session_stop(struct session *session, struct failure *failure)
 		r = bus_request_state(s->bus, AL_SAFEOP, (span_t){ s->spec.cfg->bus_op_timeout_ns },
 				      error);
 		if (r < 0) {
-			first = failure_set(failure, exit_code_of_bus(r, EXIT_CODE_STATE), r,
-					    "%s", error);
+			first = failure_set(failure, exit_code_of_bus(r, EXIT_CODE_STATE), r, "%s",
+					    error);
 		}
 		session_cycle_end(s);
 	}

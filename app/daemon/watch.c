@@ -31,7 +31,8 @@ static int admin_sdo_read(void *ctx, const struct admin_request *rq, uint8_t *re
 {
 	const struct session *s = ctx;
 
-	return bus_sdo_read(s->bus, rq->slave_pos, rq->index, rq->subindex, ret_data, len, ret_abort);
+	return bus_sdo_read(s->bus, rq->slave_pos, rq->index, rq->subindex, ret_data, len,
+			    ret_abort);
 }
 
 static int admin_sdo_write(void *ctx, const struct admin_request *rq, uint32_t *ret_abort)
@@ -111,8 +112,8 @@ static void follow_bus(struct session *s, const struct bus_watch_report *report)
 			cycle_phase_set(s->cycle, CYCLE_SYNCED);
 			session_state_set(s, BUS_RECOVERING);
 		}
-		snprintf(text, sizeof(text), "bus: %u of %u slaves in OP, %u lost", report->slaves_op,
-			 count, report->slaves_lost);
+		snprintf(text, sizeof(text), "bus: %u of %u slaves in OP, %u lost",
+			 report->slaves_op, count, report->slaves_lost);
 		session_say(s, text);
 	}
 	if (report->slaves_lost < count) {
@@ -134,8 +135,7 @@ enum session_news session_watch(struct session *s)
 	} else {
 		follow_bus(s, &report);
 	}
-	if (s->lost_since.ns != 0 &&
-	    mono_sub(session_now(s), s->lost_since).ns > LOST_LIMIT_NS) {
+	if (s->lost_since.ns != 0 && mono_sub(session_now(s), s->lost_since).ns > LOST_LIMIT_NS) {
 		return SESSION_LOST;
 	}
 	return SESSION_GOES_ON;
@@ -159,11 +159,11 @@ static int report_ended_cycle(struct session *s, struct failure *failure)
 	int r = session_cycle_end(s);
 
 	if (r == -ETIME) {
-		return failure_set(failure, EXIT_CODE_OVERRUN, r,
-				   "cycle: overrun in cycle %llu, and cycle.overrun is stop",
-				   (unsigned long long)atomic_load_explicit(
-					   &s->home.page->cycle.cycle_number,
-					   memory_order_relaxed));
+		return failure_set(
+			failure, EXIT_CODE_OVERRUN, r,
+			"cycle: overrun in cycle %llu, and cycle.overrun is stop",
+			(unsigned long long)atomic_load_explicit(&s->home.page->cycle.cycle_number,
+								 memory_order_relaxed));
 	}
 	return failure_set(failure, EXIT_CODE_INTERNAL, r < 0 ? r : -EIO,
 			   "cycle: ended by itself: error %d", -r);
@@ -183,16 +183,16 @@ int session_service(struct session *session, struct failure *failure)
 	}
 	serve_admin(s);
 	if (now.ns >= s->next_watch.ns || is_wkc_alarming(s)) {
-		s->wkc_low_seen = atomic_load_explicit(&s->home.page->cycle.wkc_low,
-						       memory_order_relaxed);
+		s->wkc_low_seen =
+			atomic_load_explicit(&s->home.page->cycle.wkc_low, memory_order_relaxed);
 		atomic_fetch_add_explicit(&s->home.page->heartbeat, 1, memory_order_relaxed);
 		if (s->is_riding) {
 			watch_link(s);
 			news = session_watch(s);
 		}
-		s->next_watch = mono_add(now, (span_t){ s->state == BUS_RECOVERING
-								? RECOVERY_PERIOD_NS
-								: WATCH_PERIOD_NS });
+		s->next_watch =
+			mono_add(now, (span_t){ s->state == BUS_RECOVERING ? RECOVERY_PERIOD_NS
+									   : WATCH_PERIOD_NS });
 	}
 	return session_is_stop_asked(s) ? SESSION_STOP_ASKED : (int)news;
 }
