@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * A program of your own that reads every sample: read_ring RING CHANNEL... prints cycle number, DC
- * time and the channels' values: what the ring still holds (64 s by default), then what comes, until
- * the ring is closed. Build it against the installed library:
+ * time and the channels' values: what the ring still holds (64 s by default), then what comes,
+ * until the ring is closed. Build it against the installed library:
  *
  *	cc read_ring.c -o read_ring $(pkg-config --cflags --libs ecdaq)
  *

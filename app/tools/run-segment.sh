@@ -16,7 +16,7 @@ cycle and shows it live. Ctrl-C ends it in order (ecdaqd, recorder, segment) and
 It needs no privilege where the kernel grants users their own namespaces; real-time priority is then
 not to be had, and ecdaqd says so once.
 
-  --seconds N     end after N seconds (default: at Ctrl-C)
+  --seconds N     end after N seconds in OP (default: at Ctrl-C)
   --slaves WHAT   1 to 64: so many FB1111+Piccolo slaves; or names, in order, from the folder of SII
                   images: ek1100,el2828,el2889 (default: 2)
   --sii DIR       folder of SII images for --slaves NAMES (default: $ECDAQ_SII)
@@ -90,6 +90,7 @@ check_options()
 		fi
 		;;
 	esac
+	[ -z "$seconds" ] || daemon_options+=(--seconds "$seconds")
 	[ -z "$config" ] || [ -r "$config" ] || die "--config: $config: cannot be read"
 }
 
@@ -155,7 +156,6 @@ interrupted=no
 end_in_order()
 {
 	stop view
-	stop timer
 	stop daemon
 	stop recorder
 	stop segment
@@ -178,7 +178,8 @@ wait_for_end()
 	for name in "${!pid[@]}"; do
 		[ "${pid[$name]}" = "$ended" ] || continue
 		case $name in
-		timer | view) ;;
+		view) ;;
+		daemon) [ -n "$seconds" ] || note "ecdaqd ended by itself" ;;
 		*)
 			note "$name ended by itself"
 			failed=1
@@ -190,10 +191,12 @@ wait_for_end()
 run_inside()
 {
 	local set_options=(--set bus.interface=ecat0 --set "record.dir=$record")
+	local daemon_options=(--simulated)
 	local segment_options=(--interface ecsim0 --slaves "$slaves")
 
 	bin=${ECDAQ_BIN_DIR:-$root/build/stage/bin}
 	[ -z "$sii" ] || segment_options+=(--sii "$sii")
+	[ -z "$seconds" ] || daemon_options+=(--seconds "$seconds")
 	[ -z "$config" ] || set_options=(--config "$config" "${set_options[@]}")
 	if [ -z "${ECDAQ_RUN_DIR:-}" ]; then
 		own_run_dir=$(mktemp -d /dev/shm/ecdaq-run-XXXXXX)
@@ -206,8 +209,7 @@ run_inside()
 	make_wire
 	start segment "$bin/ecdaq-sim" "${segment_options[@]}"
 	start recorder "$bin/ecdaq-record" "${set_options[@]}"
-	start daemon "$bin/ecdaqd" "${set_options[@]}"
-	[ -z "$seconds" ] || start timer sleep "$seconds"
+	start daemon "$bin/ecdaqd" "${set_options[@]}" "${daemon_options[@]}"
 	if [ "$json" = no ] && [ -t 1 ]; then
 		start view "$bin/ecdaq" top
 	fi

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: MIT
+"""`./build.sh run` starts, ends and reports in order, whatever its programs (stand-ins here) do."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from project import ROOT
+
+SCRIPT = ROOT / "app" / "tools" / "run-segment.sh"
+# A program that says when it starts and ends, and with what; SIGTERM ends it.
+STAND_IN = """#!/bin/bash
+echo "start $(basename "$0") $*" >> "$LOG"
+trap 'echo "end $(basename "$0")" >> "$LOG"; exit 0' TERM
+trap 'echo "interrupted $(basename "$0")" >> "$LOG"' INT
+{body}
+while :; do sleep 0.05; done
+"""
+TOOL = """#!/bin/bash
+echo "tool $*" >> "$LOG"
+[ "$1" = status ] && echo '{"state":"STOPPED"}'
+"""
+
+
+class Bench:
+    """Stand-ins for the four programs, and the log they write."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.log_file = folder / "log"
+        self.log_file.touch()
+        self.bin = folder / "bin"
+        self.bin.mkdir()
+        self.program("ecdaq", TOOL)
+        for name in ("ecdaqd", "ecdaq-record", "ecdaq-sim"):
+            self.program(name, STAND_IN.replace("{body}", ""))
+
+    def program(self, name: str, text: str) -> None:
+        (self.bin / name).write_text(text)
+        (self.bin / name).chmod(0o755)
+
+    def make_it(self, name: str, body: str) -> None:
+        self.program(name, STAND_IN.replace("{body}", body))
+
+    @property
+    def log(self) -> list[str]:
+        return self.log_file.read_text().splitlines()
+
+    def start(self, *options: str) -> subprocess.Popen[str]:
+        places = {"ECDAQ_BIN_DIR": str(self.bin), "LOG": str(self.log_file)}
+        return subprocess.Popen(
+            [SCRIPT, "--record", str(self.folder / "record"), *options],
+            env=os.environ | places,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+
+    def wait_for_log(self, *beginnings: str) -> None:
+        end = time.monotonic() + 20
+        while not all(any(line.startswith(b) for line in self.log) for b in beginnings):
+            assert time.monotonic() < end, self.log
+            time.sleep(0.01)
+
+    def wait_until_all_run(self) -> None:
+        self.wait_for_log("start ecdaq-sim", "start ecdaq-record", "start ecdaqd")
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    how = ["unshare", "--net"] if os.geteuid() == 0 else ["unshare", "-r", "--net"]
+    if subprocess.run([*how, "true"], capture_output=True, check=False).returncode != 0:
+        pytest.skip("no network namespace of one's own is to be had here")
+    yield Bench(tmp_path)
+
+
+def ends(bench: Bench) -> list[str]:
+    return [line for line in bench.log if line.startswith("end ")]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_ends_all_in_order_with_a_summary(bench: Bench, number: int) -> None:
+    run = bench.start()
+    bench.wait_until_all_run()
+    os.killpg(run.pid, number)
+    out, err = run.communicate(timeout=20)
+    assert run.returncode == 0, err
+    assert ends(bench) == ["end ecdaqd", "end ecdaq-record", "end ecdaq-sim"]
+    assert bench.log[-1] == "tool status --summary"
+    assert out.splitlines()[-1] == '{"state":"STOPPED"}'
+    assert not any(line.startswith("interrupted") for line in bench.log)
+
+
+def test_json_ends_with_the_summary_as_one_line(bench: Bench) -> None:
+    bench.make_it("ecdaqd", "exit 0")
+    run = bench.start("--seconds", "1", "--json", "--slaves", "8")
+    out, err = run.communicate(timeout=20)
+    assert run.returncode == 0, err
+    assert bench.log[-1] == "tool status --json --summary"
+    assert out == '{"state":"STOPPED"}\n'
+    assert any(line.startswith("start ecdaq-sim") and "--slaves 8" in line for line in bench.log)
+    assert any(line.startswith("start ecdaqd") and "--seconds 1" in line for line in bench.log)
+
+
+def test_a_master_that_fails_fails_the_run(bench: Bench) -> None:
+    bench.make_it("ecdaqd", "exit 8")
+    run = bench.start("--seconds", "1")
+    _, err = run.communicate(timeout=20)
+    assert run.returncode == 1
+    assert "daemon ended with 8" in err
+    assert ends(bench) == ["end ecdaq-record", "end ecdaq-sim"]
+
+
+def test_a_segment_that_ends_by_itself_fails_the_run(bench: Bench) -> None:
+    bench.make_it("ecdaq-sim", "exit 3")
+    run = bench.start()
+    _, err = run.communicate(timeout=20)
+    assert run.returncode == 1
+    assert "segment ended with 3" in err
+
+
+def test_a_run_that_is_killed_leaves_nothing_behind(bench: Bench) -> None:
+    run = bench.start()
+    bench.wait_until_all_run()
+    run.kill()
+    run.communicate(timeout=20)
+    bench.wait_for_log("end ecdaqd", "end ecdaq-record", "end ecdaq-sim")
+
+
+def test_the_run_directory_is_removed_unless_it_is_given(bench: Bench, tmp_path: Path) -> None:
+    before = set(Path("/dev/shm").glob("ecdaq-run-*"))
+    bench.make_it("ecdaqd", 'echo "run dir $ECDAQ_RUN_DIR" >> "$LOG"; exit 0')
+    assert bench.start("--seconds", "1").wait(20) == 0
+    (line,) = [entry for entry in bench.log if entry.startswith("run dir ")]
+    assert not Path(line.removeprefix("run dir ")).exists()
+    assert set(Path("/dev/shm").glob("ecdaq-run-*")) <= before
