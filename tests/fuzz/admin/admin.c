@@ -1,0 +1,144 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * A message as any member of the group may send it. The input is the beginning of a request, the
+ * rest is zero; its own length is tried, too. Whatever comes: the reply is whole, its text ends,
+ * and the board holds only what its channels can hold.
+ */
+#include <assert.h>
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "admin/command.h"
+
+enum { OUTPUTS = 3, CHANNELS = 4 };
+
+static struct config cfg;
+static struct board board;
+static struct channel channels[CHANNELS];
+static struct slave_info slaves[2];
+
+static int dc_now(void *ctx, int64_t *ret_dc_ns)
+{
+	(void)ctx;
+	*ret_dc_ns = 1000000000;
+	return 0;
+}
+
+static int sdo_read(void *ctx, const struct admin_request *request, uint8_t *ret_data, size_t *len,
+		    uint32_t *ret_abort)
+{
+	(void)ctx;
+	assert(request->slave_pos < 2 && *len == ADMIN_DATA_BYTES);
+	memset(ret_data, 0x55, *len);
+	*ret_abort = request->index % 2 != 0 ? 0x06020000 : 0;
+	return *ret_abort != 0 ? -EIO : 0;
+}
+
+static int sdo_write(void *ctx, const struct admin_request *request, uint32_t *ret_abort)
+{
+	(void)ctx;
+	assert(request->slave_pos < 2 && request->data_len >= 1 &&
+	       request->data_len <= ADMIN_DATA_BYTES);
+	*ret_abort = 0;
+	return 0;
+}
+
+static void nothing(void *ctx)
+{
+	(void)ctx;
+}
+
+static void emit(void *ctx, const struct event *ev)
+{
+	char text[256];
+
+	(void)ctx;
+	event_format(ev, text, sizeof(text));
+}
+
+static void make_channel(unsigned n, const char *name, enum channel_direction direction,
+			 enum channel_type type, uint8_t bit_len)
+{
+	channels[n] = (struct channel){ .slave_pos = n == 3,
+					.type = (uint8_t)type,
+					.direction = (uint8_t)direction,
+					.bit_len = bit_len,
+					.scale = 1.0 };
+	snprintf(channels[n].name, sizeof(channels[n].name), "%s", name);
+}
+
+static struct admin_target make_target(void)
+{
+	memset(&cfg, 0, sizeof(cfg));
+	cfg.cycle_period_ns = 1000000;
+	cfg.slave_count = 2;
+	cfg.slave[1].mode = CONFIG_MODE_ONESHOT;
+	make_channel(0, "a.adc", CHANNEL_INPUT, CHANNEL_UINT, 16);
+	make_channel(1, "a.led", CHANNEL_OUTPUT, CHANNEL_BOOL, 1);
+	make_channel(2, "a.level", CHANNEL_OUTPUT, CHANNEL_INT, 8);
+	make_channel(3, "b.oneshot_time", CHANNEL_OUTPUT, CHANNEL_UINT, 64);
+	board_init(&board);
+	return (struct admin_target){
+		.cfg = &cfg,
+		.channels = channels,
+		.channel_count = CHANNELS,
+		.slaves = slaves,
+		.slave_count = 2,
+		.board = &board,
+		.is_op = 1,
+		.dc_now = dc_now,
+		.sdo_read = sdo_read,
+		.sdo_write = sdo_write,
+		.stop = nothing,
+		.clear = nothing,
+		.emit = emit,
+	};
+}
+
+static void check_board(void)
+{
+	struct board_set set = { .sequence = UINT64_MAX };
+
+	assert(board_take(&board, OUTPUTS, &set) == 1);
+	assert(!set.is_set[0] || set.raw[0] <= 1);
+	assert(!set.is_set[1] || set.raw[1] <= 0xff);
+}
+
+static void run(const struct admin_request *request)
+{
+	struct admin_target target = make_target();
+	struct admin_reply reply;
+	uint64_t sequence = UINT64_MAX;
+
+	if (admin_command_run(&target, request, 0, &reply, &sequence) == ADMIN_DEFERRED) {
+		assert(sequence != UINT64_MAX && reply.result == 0);
+		board_answer(&board, sequence, 7);
+		assert(admin_reply_finish(&board, sequence, &reply) == 1 && reply.cycle == 7);
+	}
+	assert(memchr(reply.text, '\0', sizeof(reply.text)) != NULL);
+	assert(reply.data_len <= ADMIN_DATA_BYTES);
+	assert(reply.result != 0 || reply.text[0] == '\0');
+	check_board();
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+	static uint8_t message[sizeof(struct admin_request)];
+	struct admin_request request;
+	char why[ADMIN_TEXT_BYTES] = "";
+
+	if (admin_request_parse(data, size, &request, why) == 0) {
+		run(&request);
+	}
+	memset(message, 0, sizeof(message));
+	memcpy(message, data, size < sizeof(message) ? size : sizeof(message));
+	if (admin_request_parse(message, sizeof(message), &request, why) == 0) {
+		run(&request);
+	} else {
+		assert(why[0] != '\0' && memchr(why, '\0', sizeof(why)) != NULL);
+	}
+	return 0;
+}
