@@ -43,7 +43,7 @@ usage: ./build.sh build [FLAVOUR...]
   release   -O2, gcc; into build/release/, installed into build/stage/{bin,lib,include,share} (default)
   asan      AddressSanitizer and UndefinedBehaviorSanitizer; build/asan/, build/asan/stage/
   tsan      ThreadSanitizer; build/tsan/
-  fuzz      clang, libFuzzer, both sanitizers; build/fuzz/
+  fuzz      the fuzz targets: clang, libFuzzer, both sanitizers; build/fuzz/
   clang     -O2 with the second compiler; build/clang/
 
 ccache is used where it is installed. Assertions stay on in every flavour.
@@ -157,7 +157,7 @@ do_build()
 		fuzz | clang) need_packages build test ;;
 		esac
 		build_flavour "$flavour"
-		note "built $flavour, installed into ${stage#"$root/"}/"
+		note "built $flavour in build/$flavour/"
 	done
 }
 

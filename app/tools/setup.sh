@@ -171,14 +171,18 @@ configure_flavour()
 	fi
 }
 
-# build_flavour NAME: configure, build, install into $stage.
+# build_flavour NAME: configure, build, and, but for the fuzz targets, install into $stage.
 build_flavour()
 {
 	configure_flavour "$1"
-	cmake --build "$build_dir" -- --quiet >&2
+	stage=$build_dir/stage
 	case $1 in
+	fuzz)
+		cmake --build "$build_dir" --target fuzz_targets -- --quiet >&2
+		return
+		;;
 	release) stage=$root/build/stage ;;
-	*) stage=$build_dir/stage ;;
 	esac
+	cmake --build "$build_dir" -- --quiet >&2
 	cmake --install "$build_dir" --prefix "$stage" > "$build_dir/install.log"
 }
