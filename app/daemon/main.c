@@ -5,38 +5,14 @@
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
-#include <string.h>
-#include <sys/timex.h>
 #include <unistd.h>
 
-#include "daemon/notify.h"
-#include "daemon/options.h"
-#include "daemon/realtime.h"
-#include "daemon/session.h"
-#include "link/packet_socket.h"
+#include "daemon/machine.h"
 
 /* How long the service loop sleeps when nothing presses. */
 #define SERVICE_PERIOD_MS 20
-/* How long it sleeps while the cycle works for it: a frame of its own rides once a cycle. */
-#define WAIT_NS (150 * NS_PER_US)
 #define BACK_OFF_MIN_NS (250 * NS_PER_MS)
 #define BACK_OFF_MAX_NS (5 * NS_PER_S)
-
-struct program {
-	struct options options;
-	struct config cfg;
-	struct notify notify;
-	struct realtime realtime;
-	struct session *session;
-	int interface_claim;
-	int has_been_up;
-	int is_ready;                          /* READY=1 was sent */
-	char link_warning[PACKET_ERROR_BYTES]; /* said already */
-	enum exit_code waiting_for;            /* said already */
-	uint64_t cycles_before;                /* of earlier sessions, in OP */
-	uint64_t cycles_at_op;
-	mono_t op_since;
-};
 
 static _Atomic int signals_taken;
 static struct session *_Atomic signalled;
@@ -53,137 +29,7 @@ static void on_signal(int number)
 	}
 }
 
-static mono_t now(void)
-{
-	struct platform pf = platform_posix();
-
-	return pf.now(pf.ctx);
-}
-
-/* --- hooks --- */
-
-static enum packet_wait packet_wait(const struct config *cfg)
-{
-	switch (cfg->cycle_poll) {
-	case CONFIG_POLL_SPIN:
-		return PACKET_WAIT_SPIN;
-	case CONFIG_POLL_SLEEP:
-		return PACKET_WAIT_SLEEP;
-	case CONFIG_POLL_AUTO:
-		break;
-	}
-	return realtime_is_isolated(cfg->cycle_cpu) ? PACKET_WAIT_SPIN : PACKET_WAIT_SLEEP;
-}
-
-static enum exit_code code_of_transport(int r)
-{
-	switch (-r) {
-	case EPERM:
-	case EACCES:
-		return EXIT_CODE_PERMISSION;
-	case ENOMEM:
-	case ENOBUFS:
-		return EXIT_CODE_RESOURCES;
-	default:
-		return EXIT_CODE_INTERFACE;
-	}
-}
-
-static int open_transport(void *ctx, struct transport *ret_transport, struct failure *failure)
-{
-	struct program *pg = ctx;
-	char error[PACKET_ERROR_BYTES] = "";
-	int r = packet_socket_open(pg->cfg.interface, packet_wait(&pg->cfg), ret_transport, error,
-				   sizeof(error));
-
-	if (r < 0) {
-		return failure_set(failure, code_of_transport(r), r, "%s", error);
-	}
-	if (error[0] != '\0' && strcmp(error, pg->link_warning) != 0) {
-		fprintf(stderr, "ecdaqd: warning: %s\n", error);
-		snprintf(pg->link_warning, sizeof(pg->link_warning), "%s", error);
-	}
-	return 0;
-}
-
-static int start_cycle(void *ctx, struct cycle *cycle, struct failure *failure)
-{
-	struct program *pg = ctx;
-	int r = realtime_cycle_start(&pg->realtime, cycle, failure);
-
-	if (r == 0 && pg->realtime.is_pinned) {
-		session_cpu_set(pg->session, (uint32_t)pg->cfg.cycle_cpu);
-	}
-	return r;
-}
-
-static int end_cycle(void *ctx)
-{
-	struct program *pg = ctx;
-
-	return realtime_cycle_end(&pg->realtime);
-}
-
-static int has_cycle_ended(void *ctx)
-{
-	struct program *pg = ctx;
-
-	return realtime_cycle_has_ended(&pg->realtime);
-}
-
-static void wait_shortly(void *ctx, mono_t until)
-{
-	struct platform pf = platform_posix();
-	mono_t soon = mono_add(pf.now(pf.ctx), (span_t){ WAIT_NS });
-
-	(void)ctx;
-	pf.sleep_until(pf.ctx, soon.ns < until.ns ? soon : until);
-}
-
-static void alive(void *ctx)
-{
-	struct program *pg = ctx;
-
-	notify_alive(&pg->notify, now());
-}
-
-static void degraded(void *ctx, enum event_rt which, int err, const char *text)
-{
-	struct program *pg = ctx;
-
-	fprintf(stderr, "ecdaqd: warning: %s\n", text);
-	session_degraded(pg->session, which, err);
-}
-
 /* --- start --- */
-
-static int32_t kernel_tai_offset(void)
-{
-	struct timex tx = { .modes = 0 };
-
-	return adjtimex(&tx) < 0 ? 0 : tx.tai;
-}
-
-static int make_session(struct program *pg, struct failure *failure)
-{
-	struct session_spec spec = {
-		.cfg = &pg->cfg,
-		.platform = platform_posix(),
-		.hooks = {
-			.transport_open = open_transport,
-			.cycle_start = start_cycle,
-			.cycle_end = end_cycle,
-			.cycle_has_ended = has_cycle_ended,
-			.wait = wait_shortly,
-			.alive = alive,
-			.ctx = pg,
-		},
-		.segment = pg->options.is_simulated ? HOME_SIMULATED : HOME_REAL,
-		.tai_offset_s = kernel_tai_offset(),
-	};
-
-	return session_create(&spec, &pg->session, failure);
-}
 
 static void catch_signals(void)
 {
@@ -195,20 +41,6 @@ static void catch_signals(void)
 	action.sa_handler = SIG_IGN;
 	sigaction(SIGPIPE, &action, NULL);
 	sigaction(SIGHUP, &action, NULL);
-}
-
-static void check_ring_place(struct program *pg)
-{
-	const struct home *home = session_home(pg->session);
-	char text[CONFIG_PATH_BYTES + 128];
-
-	if (!home->is_tmpfs) {
-		snprintf(text, sizeof(text),
-			 "%s: not on a tmpfs: write-back to the disk will hold the cycle up "
-			 "(runtime.run_dir)",
-			 home->dir);
-		degraded(pg, EVENT_RT_RING_DISK, 0, text);
-	}
 }
 
 /* --- the bus, again and again --- */
@@ -229,7 +61,7 @@ static void begin_op(struct program *pg)
 	pg->waiting_for = EXIT_CODE_OK;
 	pg->cycles_at_op = atomic_load(&page->cycle.cycles);
 	if (!pg->has_been_up) {
-		pg->op_since = now();
+		pg->op_since = machine_now();
 	}
 	pg->has_been_up = 1;
 	printf("ecdaqd: %s: %u slave%s in OP, period %" PRId64 " us\n", pg->cfg.interface, slaves,
@@ -251,7 +83,7 @@ static int is_time_over(const struct program *pg)
 		return 1;
 	}
 	return pg->options.seconds > 0 &&
-	       mono_sub(now(), pg->op_since).ns >= (int64_t)pg->options.seconds * NS_PER_S;
+	       mono_sub(machine_now(), pg->op_since).ns >= (int64_t)pg->options.seconds * NS_PER_S;
 }
 
 static void sleep_a_pass(const struct program *pg)
@@ -283,10 +115,10 @@ static int serve(struct program *pg, struct failure *failure)
 /* Nothing is up: let @span pass, answering the admin socket. 1 if told to stop. */
 static int idle(struct program *pg, int64_t span_ns)
 {
-	mono_t until = mono_add(now(), (span_t){ span_ns });
+	mono_t until = mono_add(machine_now(), (span_t){ span_ns });
 	struct failure failure;
 
-	while (now().ns < until.ns) {
+	while (machine_now().ns < until.ns) {
 		sleep_a_pass(pg);
 		if (session_service(pg->session, &failure) == SESSION_STOP_ASKED) {
 			return 1;
@@ -388,10 +220,9 @@ static int run_session(struct program *pg, struct failure *failure)
 	if (atomic_load(&signals_taken) > 0) {
 		session_stop_ask(pg->session);
 	}
-	realtime_open(&pg->realtime, &pg->cfg, degraded, pg);
-	check_ring_place(pg);
+	machine_open(pg);
 	r = run_bus(pg, failure);
-	realtime_close(&pg->realtime);
+	machine_close(pg);
 	return r;
 }
 
@@ -408,7 +239,7 @@ static int run(struct program *pg)
 	}
 	notify_open(&pg->notify);
 	catch_signals();
-	r = make_session(pg, &failure);
+	r = machine_session_create(pg, &failure);
 	if (r < 0) {
 		return fail(&failure);
 	}
@@ -434,7 +265,7 @@ int main(int argc, char **argv)
 	static struct program program;
 	struct failure failure;
 
-	if (options_parse(argc, argv, &program.options, &failure) < 0) {
+	if (options_parse(argc, (const char *const *)argv, &program.options, &failure) < 0) {
 		return fail(&failure);
 	}
 	if (program.options.verb == OPTIONS_HELP) {

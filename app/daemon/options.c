@@ -91,7 +91,8 @@ static int find(const char *arg, const char **ret_value)
 	return -ENOENT;
 }
 
-int options_parse(int argc, char **argv, struct options *ret_options, struct failure *failure)
+int options_parse(int argc, const char *const *argv, struct options *ret_options,
+		  struct failure *failure)
 {
 	struct options op = { .verb = OPTIONS_RUN };
 

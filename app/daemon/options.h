@@ -28,7 +28,8 @@ struct options {
 };
 
 /** Strings point into @argv. 0, or -EINVAL with @failure; @ret_options is untouched then. */
-int options_parse(int argc, char **argv, struct options *ret_options, struct failure *failure);
+int options_parse(int argc, const char *const *argv, struct options *ret_options,
+		  struct failure *failure);
 
 /** The configuration that @options ask for: file, --set in order, the rest. 0 or -errno with
  * @failure. */

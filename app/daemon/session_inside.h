@@ -48,6 +48,15 @@ mono_t session_now(const struct session *s);
  * for it. */
 struct platform session_cycle_platform(struct session *s);
 
+/** 0; -ECANCELED with @failure if told to stop. */
+int session_cancelled(const struct session *s, struct failure *failure);
+/** After one call of bus/bus.h that gave @r and @error: @late is what "not in time" means for it.
+ */
+int session_step(struct session *s, int r, enum exit_code late, const char *error,
+		 struct failure *failure);
+/** The cycle runs: lock, SYNC0, SAFE-OP, OP. */
+int session_lead_to_op(struct session *s, struct failure *failure);
+
 /** Stop the cycle and give the transport back; its result. */
 int session_cycle_end(struct session *s);
 

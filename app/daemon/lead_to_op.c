@@ -1,0 +1,138 @@
+/* SPDX-License-Identifier: MIT */
+/* The last part of bring-up, while the cycle runs: lock, SYNC0, SAFE-OP, OP. */
+#include <errno.h>
+#include <inttypes.h>
+
+#include "daemon/session.h"
+#include "daemon/session_inside.h"
+
+/* In a row with a frame, before OP is asked for (T07). */
+enum { FLOWING_CYCLES = 10 };
+#define LOOK_SPAN ((span_t){ 5 * NS_PER_MS })
+
+static int look_again(struct session *s, mono_t give_up, struct failure *failure)
+{
+	int r = session_cancelled(s, failure);
+
+	if (r < 0) {
+		return r;
+	}
+	if (s->spec.hooks.cycle_has_ended(s->spec.hooks.ctx)) {
+		return failure_set(failure, EXIT_CODE_OVERRUN, -EIO,
+				   "cycle: ended by itself during bring-up (overrun?)");
+	}
+	if (session_now(s).ns >= give_up.ns) {
+		return -ETIME;
+	}
+	session_wait(s, LOOK_SPAN);
+	return 0;
+}
+
+static uint64_t load(const _Atomic uint64_t *counter)
+{
+	return atomic_load_explicit(counter, memory_order_relaxed);
+}
+
+static int wait_for_lock(struct session *s, struct failure *failure)
+{
+	const struct cycle_stats *st = &s->home.page->cycle;
+	int64_t timeout_ns = s->spec.cfg->dc_lock_timeout_ns;
+	mono_t give_up = mono_add(session_now(s), (span_t){ timeout_ns });
+
+	while (atomic_load_explicit(&st->dc_state, memory_order_relaxed) != DC_LOCKED) {
+		int r = look_again(s, give_up, failure);
+
+		if (r == -ETIME) {
+			return failure_set(
+				failure, EXIT_CODE_CLOCKS, r,
+				"dc: no lock to the reference clock within %" PRId64
+				" ms (dc.lock_timeout): correction %" PRId64 " ppb, %" PRIu64
+				" of %" PRIu64 " frames lost, wake latency up to %" PRId64 " us",
+				timeout_ns / NS_PER_MS,
+				atomic_load_explicit(&st->correction_ppb, memory_order_relaxed),
+				load(&st->frames_lost), load(&st->frames_sent),
+				histogram_max_magnitude(&st->wake_latency) / NS_PER_US);
+		}
+		if (r < 0) {
+			return r;
+		}
+	}
+	return 0;
+}
+
+/* A slave that is asked for OP while frames are missing trips over its watchdog (T07). */
+static int wait_for_flow(struct session *s, struct failure *failure)
+{
+	const struct cycle_stats *st = &s->home.page->cycle;
+	mono_t give_up = mono_add(session_now(s), (span_t){ s->spec.cfg->bus_op_timeout_ns });
+	uint64_t lost = load(&st->frames_lost);
+	uint64_t enough = load(&st->cycles) + FLOWING_CYCLES;
+
+	while (load(&st->cycles) < enough) {
+		int r = look_again(s, give_up, failure);
+
+		if (r == -ETIME) {
+			return failure_set(failure, EXIT_CODE_WIRE, r,
+					   "bus: frames do not come back steadily: %" PRIu64
+					   " of %" PRIu64 " lost",
+					   load(&st->frames_lost), load(&st->frames_sent));
+		}
+		if (r < 0) {
+			return r;
+		}
+		if (load(&st->frames_lost) != lost) {
+			lost = load(&st->frames_lost);
+			enough = load(&st->cycles) + FLOWING_CYCLES;
+		}
+	}
+	return 0;
+}
+
+static int start_clocks(struct session *s, struct failure *failure)
+{
+	char error[BUS_ERROR_BYTES] = "";
+	int64_t dc_now_ns = 0;
+	int r;
+
+	if (bus_plan(s->bus)->dc_reference == 0) {
+		return 0;
+	}
+	r = wait_for_lock(s, failure);
+	if (r < 0) {
+		return r;
+	}
+	r = cycle_dc_now(s->cycle, &dc_now_ns);
+	if (r < 0) {
+		return failure_set(failure, EXIT_CODE_CLOCKS, r, "dc: the DC time is not known");
+	}
+	return session_step(s, bus_sync0_start(s->bus, dc_now_ns, error), EXIT_CODE_CLOCKS, error,
+			    failure);
+}
+
+int session_lead_to_op(struct session *s, struct failure *failure)
+{
+	span_t timeout = { s->spec.cfg->bus_op_timeout_ns };
+	char error[BUS_ERROR_BYTES] = "";
+	int r = start_clocks(s, failure);
+
+	if (r < 0) {
+		return r;
+	}
+	cycle_phase_set(s->cycle, CYCLE_SYNCED);
+	r = wait_for_flow(s, failure);
+	if (r < 0) {
+		return r;
+	}
+	r = session_step(s, bus_request_state(s->bus, AL_SAFEOP, timeout, error), EXIT_CODE_STATE,
+			 error, failure);
+	if (r < 0) {
+		return r;
+	}
+	session_state_set(s, BUS_SAFEOP);
+	r = wait_for_flow(s, failure);
+	if (r < 0) {
+		return r;
+	}
+	return session_step(s, bus_request_state(s->bus, AL_OP, timeout, error), EXIT_CODE_STATE,
+			    error, failure);
+}

@@ -1,0 +1,163 @@
+/* SPDX-License-Identifier: MIT */
+#include "daemon/machine.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/timex.h>
+
+/* How long it sleeps while the cycle works for it: a frame of its own rides once a cycle. */
+#define WAIT_NS (150 * NS_PER_US)
+
+mono_t machine_now(void)
+{
+	struct platform pf = platform_posix();
+
+	return pf.now(pf.ctx);
+}
+
+static enum packet_wait packet_wait(const struct config *cfg)
+{
+	switch (cfg->cycle_poll) {
+	case CONFIG_POLL_SPIN:
+		return PACKET_WAIT_SPIN;
+	case CONFIG_POLL_SLEEP:
+		return PACKET_WAIT_SLEEP;
+	case CONFIG_POLL_AUTO:
+		break;
+	}
+	return realtime_is_isolated(cfg->cycle_cpu) ? PACKET_WAIT_SPIN : PACKET_WAIT_SLEEP;
+}
+
+static enum exit_code code_of_transport(int r)
+{
+	switch (-r) {
+	case EPERM:
+	case EACCES:
+		return EXIT_CODE_PERMISSION;
+	case ENOMEM:
+	case ENOBUFS:
+		return EXIT_CODE_RESOURCES;
+	default:
+		return EXIT_CODE_INTERFACE;
+	}
+}
+
+static int open_transport(void *ctx, struct transport *ret_transport, struct failure *failure)
+{
+	struct program *pg = ctx;
+	char error[PACKET_ERROR_BYTES] = "";
+	int r = packet_socket_open(pg->cfg.interface, packet_wait(&pg->cfg), ret_transport, error,
+				   sizeof(error));
+
+	if (r < 0) {
+		return failure_set(failure, code_of_transport(r), r, "%s", error);
+	}
+	if (error[0] != '\0' && strcmp(error, pg->link_warning) != 0) {
+		fprintf(stderr, "ecdaqd: warning: %s\n", error);
+		snprintf(pg->link_warning, sizeof(pg->link_warning), "%s", error);
+	}
+	return 0;
+}
+
+static int start_cycle(void *ctx, struct cycle *cycle, struct failure *failure)
+{
+	struct program *pg = ctx;
+	int r = realtime_cycle_start(&pg->realtime, cycle, failure);
+
+	if (r == 0 && pg->realtime.is_pinned) {
+		session_cpu_set(pg->session, (uint32_t)pg->cfg.cycle_cpu);
+	}
+	return r;
+}
+
+static int end_cycle(void *ctx)
+{
+	struct program *pg = ctx;
+
+	return realtime_cycle_end(&pg->realtime);
+}
+
+static int has_cycle_ended(void *ctx)
+{
+	struct program *pg = ctx;
+
+	return realtime_cycle_has_ended(&pg->realtime);
+}
+
+static void wait_shortly(void *ctx, mono_t until)
+{
+	struct platform pf = platform_posix();
+	mono_t soon = mono_add(pf.now(pf.ctx), (span_t){ WAIT_NS });
+
+	(void)ctx;
+	pf.sleep_until(pf.ctx, soon.ns < until.ns ? soon : until);
+}
+
+static void alive(void *ctx)
+{
+	struct program *pg = ctx;
+
+	notify_alive(&pg->notify, machine_now());
+}
+
+static void degraded(void *ctx, enum event_rt which, int err, const char *text)
+{
+	struct program *pg = ctx;
+
+	fprintf(stderr, "ecdaqd: warning: %s\n", text);
+	session_degraded(pg->session, which, err);
+}
+
+static int32_t kernel_tai_offset(void)
+{
+	struct timex tx = { .modes = 0 };
+
+	return adjtimex(&tx) < 0 ? 0 : tx.tai;
+}
+
+int machine_session_create(struct program *pg, struct failure *failure)
+{
+	struct session_spec spec = {
+		.cfg = &pg->cfg,
+		.platform = platform_posix(),
+		.hooks = {
+			.transport_open = open_transport,
+			.cycle_start = start_cycle,
+			.cycle_end = end_cycle,
+			.cycle_has_ended = has_cycle_ended,
+			.wait = wait_shortly,
+			.alive = alive,
+			.ctx = pg,
+		},
+		.segment = pg->options.is_simulated ? HOME_SIMULATED : HOME_REAL,
+		.tai_offset_s = kernel_tai_offset(),
+	};
+
+	return session_create(&spec, &pg->session, failure);
+}
+
+static void check_ring_place(struct program *pg)
+{
+	const struct home *home = session_home(pg->session);
+	char text[CONFIG_PATH_BYTES + 128];
+
+	if (!home->is_tmpfs) {
+		snprintf(text, sizeof(text),
+			 "%s: not on a tmpfs: write-back to the disk will hold the cycle up "
+			 "(runtime.run_dir)",
+			 home->dir);
+		degraded(pg, EVENT_RT_RING_DISK, 0, text);
+	}
+}
+
+void machine_open(struct program *pg)
+{
+	realtime_open(&pg->realtime, &pg->cfg, degraded, pg);
+	check_ring_place(pg);
+}
+
+void machine_close(struct program *pg)
+{
+	realtime_close(&pg->realtime);
+}

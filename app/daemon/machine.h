@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: MIT */
+/* The session of ecdaqd on this machine: its NIC, its clock, its threads. Context: service thread.
+ */
+#ifndef DAEMON_MACHINE_H
+#define DAEMON_MACHINE_H
+
+#include "config/config.h"
+#include "daemon/notify.h"
+#include "daemon/options.h"
+#include "daemon/realtime.h"
+#include "daemon/session.h"
+#include "link/packet_socket.h"
+
+struct program {
+	struct options options;
+	struct config cfg;
+	struct notify notify;
+	struct realtime realtime;
+	struct session *session;
+	int interface_claim;
+	int has_been_up;
+	int is_ready;                          /* READY=1 was sent */
+	char link_warning[PACKET_ERROR_BYTES]; /* said already */
+	enum exit_code waiting_for;            /* said already */
+	uint64_t cycles_before;                /* of earlier sessions, in OP */
+	uint64_t cycles_at_op;
+	mono_t op_since;
+};
+
+mono_t machine_now(void);
+/** Makes pg->session on this machine's hooks. 0 or -errno with @failure. */
+int machine_session_create(struct program *pg, struct failure *failure);
+/** What the session needs of the machine; what cannot be had is reported once. */
+void machine_open(struct program *pg);
+void machine_close(struct program *pg);
+
+#endif
