@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import re
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -20,7 +21,9 @@ def expect_silence(command: list[str]) -> None:
 
 
 def test_c_is_formatted() -> None:
-    expect_silence(["clang-format", "--dry-run", "--Werror", *tools.c_files()])
+    result = tools.run(["clang-format", "--dry-run", "--Werror", *tools.c_files()])
+    unformatted = sorted(set(re.findall(r"^([^:\n]+):\d+:\d+: error", result.stderr, re.MULTILINE)))
+    assert result.returncode == 0, "./build.sh lint --fix mends:\n" + "\n".join(unformatted)
 
 
 def test_python_is_formatted() -> None:
