@@ -152,7 +152,7 @@ static uint64_t put_all(const struct admin_target *t, const struct placed *place
 static enum admin_outcome run_set(const struct admin_target *t, const struct admin_request *rq,
 				  uint32_t uid, struct admin_reply *reply, uint64_t *ret_sequence)
 {
-	struct placed placed[ADMIN_ITEMS];
+	struct placed placed[ADMIN_ITEMS] = { { .channel = 0 } };
 
 	if (!has_op(t, reply)) {
 		emit(t, EVENT_COMMAND_REFUSED, EVENT_NO_SLAVE, -1, reply->result, (int32_t)uid);

@@ -319,8 +319,8 @@ void ring_reader_destroy(struct ring_reader *reader)
 
 static int copy_slot(const struct ring_reader *reader, uint64_t sequence, void *payload)
 {
-	const _Atomic uint64_t *slot = reader->slots +
-				       (sequence & (reader->slot_count - 1)) * reader->slot_words;
+	const _Atomic uint64_t *slot =
+		reader->slots + (sequence & (reader->slot_count - 1)) * reader->slot_words;
 	uint8_t *out = payload;
 	size_t left = reader->header->payload_bytes;
 
