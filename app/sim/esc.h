@@ -1,0 +1,175 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * One EtherCAT slave controller: register file, process RAM, SyncManagers, FMMUs, AL handshake, SII
+ * interface, watchdogs, distributed clock. It has two sides, as the chip has: datagrams from the
+ * wire (esc_datagram) and the PDI (esc_pdi_read, esc_pdi_write). All times are true time in ns, on one axis
+ * for the whole segment; the ESC's own clock runs off it by its ppm. What rests on the data sheet,
+ * on captures, or is our model is said in app/doc/SPECNOTES.md.
+ */
+#ifndef SIM_ESC_H
+#define SIM_ESC_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "wire/datagram.h"
+
+enum esc_dc_kind {
+	ESC_DC_NONE,
+	ESC_DC_RECEIVE_TIMES, /* 0x0900 only: EL2828 */
+	ESC_DC_32,
+	ESC_DC_64,
+};
+
+struct esc_features {
+	uint8_t type;
+	uint8_t revision;
+	uint16_t build;
+	uint8_t fmmu_count;
+	uint8_t sm_count;
+	uint8_t ram_kib;
+	uint8_t port_descriptor;
+	uint16_t features;
+	enum esc_dc_kind dc;
+	int has_sync_unit;     /* 0x0980 to 0x09a7 */
+	unsigned eeprom_bytes_a_read; /* 4 or 8 */
+	int is_device_emulation;
+};
+
+/* ET1100: 8 FMMUs, 8 SMs, 8 KiB, 64-bit DC, four ports. */
+extern const struct esc_features esc_et1100;
+
+enum {
+	ESC_REGISTER_BYTES = 0x1000,
+	ESC_RAM_BYTES = 0x2000,
+	ESC_LIMIT_SM = 16,
+	ESC_LIMIT_FMMU = 16,
+};
+
+/* AL event request bits (0x0220). */
+enum esc_al_event {
+	ESC_AL_EVENT_CONTROL = 1u << 0,
+	ESC_AL_EVENT_SYNC0 = 1u << 2,
+	ESC_AL_EVENT_SYNC1 = 1u << 3,
+	ESC_AL_EVENT_SM_ACTIVATION = 1u << 4,
+	ESC_AL_EVENT_WATCHDOG = 1u << 6,
+	ESC_AL_EVENT_SM0 = 1u << 8,
+};
+
+/* The buffers behind one SyncManager. */
+struct esc_sm {
+	uint16_t start;
+	uint16_t len;
+	uint8_t control;
+	uint8_t is_active;     /* by the master's activate and the PDI's control bit */
+	uint8_t is_mailbox;
+	uint8_t is_ecat_write; /* the master writes, the PDI reads */
+	uint8_t is_full;       /* mailbox */
+	uint8_t has_data;      /* buffered: something was written since activation */
+	uint8_t writer;        /* buffered: index of the writer's buffer, 0 to 2 */
+	uint8_t newest;        /* buffered: last complete one */
+	uint8_t reader;        /* buffered: the one the reader has */
+	uint8_t ecat_repeat;   /* repeat request bit as last seen */
+};
+
+struct esc_fmmu {
+	uint32_t logical_start;
+	uint16_t len;
+	uint8_t logical_start_bit;
+	uint8_t logical_end_bit;
+	uint16_t physical_start;
+	uint8_t physical_start_bit;
+	uint8_t type; /* 1 read, 2 write */
+	uint8_t is_active;
+	uint8_t is_bytewise;
+};
+
+/* The clock: system time s at true time t, and how fast it runs. */
+struct esc_clock {
+	double ppm;            /* of the crystal */
+	double correction;     /* of the time loop control, relative */
+	int64_t base_true_ns;
+	uint64_t base_local_ns;
+	double base_fraction;
+	uint64_t offset_ns;    /* 0x0920 */
+	double diff_filtered_ns;
+	double integral;       /* frequency part of the correction, relative */
+	int64_t last_compare_true_ns;
+	uint8_t time_filter;   /* depth in force: 0x0934 as of the last write to 0x0930 */
+	uint8_t speed_filter;
+	uint16_t speed_start;
+};
+
+struct esc_sync {
+	uint8_t is_running;
+	uint8_t is_single;     /* SYNC0 cycle time 0 */
+	uint64_t next_local_ns;/* system time of the next SYNC0 */
+	int64_t next_true_ns;  /* INT64_MAX: none */
+	uint64_t edges;
+};
+
+/* Called at each SYNC0 edge, at its true time and its system time. */
+typedef void (*esc_sync0_sink)(void *ctx, int64_t t_ns, uint64_t system_time_ns);
+
+struct esc {
+	struct esc_features features;
+	uint8_t reg[ESC_REGISTER_BYTES];
+	uint8_t readable[ESC_REGISTER_BYTES / 8];
+	uint8_t ecat_writable[ESC_REGISTER_BYTES / 8];
+	uint8_t ram[ESC_RAM_BYTES];
+	struct esc_sm sm[ESC_LIMIT_SM];
+	struct esc_fmmu fmmu[ESC_LIMIT_FMMU];
+	struct esc_clock clock;
+	struct esc_sync sync;
+	uint32_t al_event;
+	uint8_t *sii;
+	size_t sii_bytes;
+	int is_eeprom_loaded;
+	int64_t eeprom_busy_until_ns; /* 0: idle */
+	uint16_t eeprom_command;
+	int64_t watchdog_deadline_ns; /* INT64_MAX: not running */
+	esc_sync0_sink sink;
+	void *sink_ctx;
+};
+
+/* When the start of a frame passed this slave. */
+struct esc_frame {
+	int64_t pu_ns;        /* the processing unit */
+	int64_t port_ns[4];   /* each port on the way in; unused ports 0 */
+	uint8_t ports_used;   /* bit n: port n has a link */
+};
+
+/**
+ * Power on with SII contents @sii (kept by reference, writable: the EEPROM). @local_ns is what the clock starts at.
+ */
+void esc_init(struct esc *esc, const struct esc_features *features, uint8_t *sii, size_t sii_bytes,
+	      int64_t t_ns);
+void esc_clock_start(struct esc *esc, int64_t t_ns, uint64_t local_ns, double ppm);
+/** Change the crystal's rate from @t_ns on. */
+void esc_clock_drift(struct esc *esc, int64_t t_ns, double ppm);
+void esc_sync0_to(struct esc *esc, esc_sync0_sink sink, void *ctx);
+
+/** Take part in one datagram of a frame; changes its address, data and working counter in place. */
+void esc_datagram(struct esc *esc, const struct esc_frame *frame, struct ecat_datagram *dg);
+
+/** True time of the ESC's next own event (SYNC0 edge, watchdog, EEPROM done); INT64_MAX: none. */
+int64_t esc_next_event_ns(const struct esc *esc);
+/** Run all own events up to and including @t_ns. */
+void esc_advance(struct esc *esc, int64_t t_ns);
+
+/** System time (0x0910) at true time @t_ns; and the true time at which it will be @system_ns. */
+uint64_t esc_system_time(const struct esc *esc, int64_t t_ns);
+
+/** PDI access. Reading or writing the first and last byte of a SyncManager's area opens and closes its buffer. */
+void esc_pdi_read(struct esc *esc, int64_t t_ns, uint16_t addr, void *buf, size_t len);
+void esc_pdi_write(struct esc *esc, int64_t t_ns, uint16_t addr, const void *buf, size_t len);
+int esc_eeprom_loaded(const struct esc *esc);
+/** Level of the PDI's interrupt: AL event request and mask. */
+int esc_irq(const struct esc *esc);
+
+/** Count an error on @port: 0 invalid frame (0x0300), 1 RX error (0x0301), 2 forwarded (0x0308), 3 lost link (0x0310). */
+void esc_count_error(struct esc *esc, unsigned port, unsigned kind);
+/** Which ports have a link: into DL status (0x0110). */
+void esc_set_links(struct esc *esc, uint8_t ports);
+
+#endif

@@ -1,0 +1,86 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * Faults: what happens to frames and slaves, and when. A plan is a list of lines, from a file, a test or the control
+ * socket of ecdaq-sim:
+ *
+ *   WHEN ACTION [KEY=VALUE...]
+ *   at=2s lose                         one frame, the first after 2 s
+ *   frame=1000 delay by=300us          the 1000th frame
+ *   every=500 double                   each 500th frame
+ *   p=0.001 corrupt                    each frame with this probability
+ *   at=1s for=200ms lose               all frames of that time
+ *   at=3s cut slave=1 / heal slave=1 / power-off slave=0 / power-on slave=0
+ *   at=3s drift slave=1 ppm=80
+ *   at=3s al-error slave=1 code=0x001b
+ *   at=3s port-error slave=1 port=0
+ */
+#ifndef SIM_FAULT_H
+#define SIM_FAULT_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "sim/segment.h"
+
+enum fault_action {
+	FAULT_LOSE,     /* the frame goes through the slaves and is lost on the way back */
+	FAULT_DROP,     /* the frame is lost before the first slave */
+	FAULT_DELAY,    /* it comes back later by @by_ns */
+	FAULT_DOUBLE,   /* it comes back twice */
+	FAULT_TRUNCATE, /* it comes back short */
+	FAULT_CORRUPT,  /* one byte of it is changed */
+	FAULT_CUT,
+	FAULT_HEAL,
+	FAULT_POWER_OFF,
+	FAULT_POWER_ON,
+	FAULT_DRIFT,
+	FAULT_AL_ERROR,
+	FAULT_PORT_ERROR,
+};
+
+enum fault_trigger { FAULT_AT, FAULT_FRAME, FAULT_EVERY, FAULT_PROBABLY };
+
+struct fault {
+	enum fault_trigger trigger;
+	enum fault_action action;
+	int64_t at_ns;       /* FAULT_AT: from the plan's start */
+	int64_t for_ns;      /* 0: once */
+	uint64_t frame;      /* FAULT_FRAME, FAULT_EVERY */
+	double probability;  /* FAULT_PROBABLY */
+	int64_t by_ns;
+	unsigned slave;
+	unsigned port;
+	double ppm;
+	uint16_t code;
+	int is_done;
+};
+
+/* What is to be done with one frame. */
+struct fault_verdict {
+	int is_dropped;  /* before the slaves */
+	int is_lost;     /* behind them */
+	int is_doubled;
+	int64_t delay_ns;
+	size_t truncate_to; /* 0: not */
+	size_t corrupt_at;  /* 0: not */
+	uint8_t corrupt_xor;
+};
+
+struct fault_plan;
+
+struct fault_plan *fault_plan_create(uint64_t seed, int64_t start_ns);
+void fault_plan_destroy(struct fault_plan *plan);
+/** Add one line. 0; -EINVAL with why in @error; empty lines and # comments are fine. */
+int fault_plan_add(struct fault_plan *plan, const char *line, size_t slave_count, char *error,
+		   size_t error_bytes);
+/** Add a file; "FILE:LINE: why" in @error. */
+int fault_plan_load(struct fault_plan *plan, const char *path, size_t slave_count, char *error,
+		    size_t error_bytes);
+/** Times of lines added from now on count from @start_ns. */
+void fault_plan_restart(struct fault_plan *plan, int64_t start_ns);
+
+/** Do what is due to the segment at @t_ns, and say what happens to the frame that is sent now. */
+struct fault_verdict fault_plan_judge(struct fault_plan *plan, struct segment *segment, int64_t t_ns,
+				      size_t frame_len);
+
+#endif

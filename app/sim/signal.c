@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: MIT */
+#include "sim/signal.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+
+#define ADC_FULL_SCALE_V 3.3
+#define ADC_MAX 4095.0
+#define PI 3.14159265358979323846
+
+struct signal_spec signal_default(void)
+{
+	return (struct signal_spec){ .frequency_hz = 1.0, .amplitude_v = 0.5, .offset_v = 1.0 };
+}
+
+double signal_volt(const struct signal_spec *signal, int64_t t_ns)
+{
+	/* Whole seconds apart: at t = years the fraction of a turn needs all digits. */
+	double s = (double)(t_ns / 1000000000);
+	double ns = (double)(t_ns % 1000000000);
+	double turns = fmod(s * signal->frequency_hz, 1.0) + ns * 1e-9 * signal->frequency_hz;
+
+	return signal->offset_v +
+	       signal->amplitude_v * sin(2.0 * PI * turns + signal->phase_rad);
+}
+
+uint16_t signal_adc(const struct signal_spec *signal, int64_t t_ns)
+{
+	double counts = nearbyint(signal_volt(signal, t_ns) / ADC_FULL_SCALE_V * ADC_MAX);
+
+	return (uint16_t)fmin(fmax(counts, 0.0), ADC_MAX);
+}
+
+int signal_parse(const char *text, struct signal_spec *ret_signal)
+{
+	struct signal_spec s = signal_default();
+	double phase_deg = 0;
+	int used = 0;
+	int n = sscanf(text, "sine:%lf:%lf:%lf%n:%lf%n", &s.frequency_hz, &s.amplitude_v,
+		       &s.offset_v, &used, &phase_deg, &used);
+
+	if (n < 3 || text[used] != '\0' || !isfinite(s.frequency_hz) || !isfinite(s.amplitude_v) ||
+	    !isfinite(s.offset_v) || !isfinite(phase_deg) || s.frequency_hz < 0) {
+		return -EINVAL;
+	}
+	s.phase_rad = phase_deg * PI / 180.0;
+	*ret_signal = s;
+	return 0;
+}

@@ -1,0 +1,121 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * A slave's EEPROM (SII, ETG.1000.6 and ETG.2010): identity words, then categories. Bytes may be
+ * anything: every access is bounded, a category that runs past the end ends the walk (T31).
+ * Context: any; nothing allocates.
+ */
+#ifndef WIRE_SII_H
+#define WIRE_SII_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+enum sii_category {
+	SII_CATEGORY_STRINGS = 10,
+	SII_CATEGORY_GENERAL = 30,
+	SII_CATEGORY_FMMU = 40,
+	SII_CATEGORY_SM = 41,
+	SII_CATEGORY_TXPDO = 50,
+	SII_CATEGORY_RXPDO = 51,
+	SII_CATEGORY_DC = 60,
+	SII_CATEGORY_END = 0xffff,
+};
+
+enum sii_limits {
+	SII_CATEGORIES_BYTE = 0x80, /* where the first category header stands */
+	SII_LIMIT_SM = 16,
+	SII_LIMIT_FMMU = 16,
+	SII_LIMIT_PDO = 128,
+	SII_LIMIT_ENTRIES = 1024,
+	SII_NAME_BYTES = 64,
+};
+
+enum sii_mailbox_protocol {
+	SII_MAILBOX_AOE = 0x01,
+	SII_MAILBOX_EOE = 0x02,
+	SII_MAILBOX_COE = 0x04,
+	SII_MAILBOX_FOE = 0x08,
+	SII_MAILBOX_SOE = 0x10,
+	SII_MAILBOX_VOE = 0x20,
+};
+
+struct sii_sm {
+	uint16_t start;
+	uint16_t len;
+	uint8_t control;
+	uint8_t enable;
+	uint8_t type; /* 1 mailbox out, 2 mailbox in, 3 outputs, 4 inputs */
+};
+
+struct sii_entry {
+	uint16_t index;
+	uint8_t subindex;
+	uint8_t bit_len;
+	uint8_t data_type; /* ETG.1020 base data type */
+	uint8_t name;      /* string number */
+};
+
+struct sii_pdo {
+	uint16_t index;
+	uint8_t sm;        /* 0xff: not assigned by default */
+	uint8_t is_tx;     /* TxPDO: the slave's, inputs of the master */
+	uint8_t name;
+	uint16_t first_entry;
+	uint16_t entry_count;
+	uint32_t bits;
+};
+
+/* All of an image that anybody here needs. */
+struct sii {
+	uint16_t pdi_control;
+	uint16_t alias;
+	uint32_t vendor;
+	uint32_t product;
+	uint32_t revision;
+	uint32_t serial;
+	uint16_t mailbox_out_start;
+	uint16_t mailbox_out_len;
+	uint16_t mailbox_in_start;
+	uint16_t mailbox_in_len;
+	uint16_t mailbox_protocols; /* enum sii_mailbox_protocol */
+	uint32_t size_bytes;
+	uint8_t coe_details;
+	uint8_t group_name;   /* string numbers */
+	uint8_t order_name;
+	uint8_t device_name;
+	uint8_t has_general;
+	uint8_t has_dc;
+	struct sii_sm sm[SII_LIMIT_SM];
+	size_t sm_count;
+	uint8_t fmmu[SII_LIMIT_FMMU]; /* 1 outputs, 2 inputs, 3 mailbox state */
+	size_t fmmu_count;
+	struct sii_pdo pdo[SII_LIMIT_PDO];
+	size_t pdo_count;
+	struct sii_entry entry[SII_LIMIT_ENTRIES];
+	size_t entry_count;
+	uint16_t dc_assign_activate; /* of the first DC mode that activates something */
+	uint32_t dc_sync0_cycle_ns;  /* 0: the master's cycle */
+};
+
+/**
+ * The first category of kind @wanted. 0 and where its body is; -ENOENT; -EBADMSG: the walk ran into a category
+ * past the end of the image.
+ */
+int sii_find_category(const uint8_t *image, size_t image_bytes, uint16_t wanted,
+		      size_t *ret_offset, size_t *ret_bytes);
+
+/**
+ * Parse an image. 0; -EBADMSG with one line in @error if it is too short, blank, or a category is damaged.
+ * On failure @ret holds what stood before the damage.
+ */
+int sii_parse(const uint8_t *image, size_t image_bytes, struct sii *ret, char *error,
+	      size_t error_bytes);
+
+/** String @number (1-based) as text, unprintable bytes as '_'; "" for 0 or one that is not there. */
+void sii_string(const uint8_t *image, size_t image_bytes, unsigned number,
+		char ret_text[SII_NAME_BYTES]);
+
+/** CRC-8 over words 0 to 6, which stands in word 7 (ETG.2010). */
+uint8_t sii_checksum(const uint8_t *image);
+
+#endif
