@@ -97,6 +97,8 @@ struct status_page {
 	struct cycle_stats cycle;
 };
 
+#define RECORD_STATUS_MAGIC UINT64_C(0x3163657273716463) /* "cdqsrec1" */
+
 /* What ecdaq-record says of itself ("record-status" in the run directory). [recorder] */
 struct record_status {
 	uint64_t magic;

@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: MIT */
+/* MCAP bytes from and to a file. Context: blocking. */
+#ifndef RECORD_FILE_IO_H
+#define RECORD_FILE_IO_H
+
+#include "record/mcap.h"
+
+/** Append to *@fd, which must stay where it is as long as the io is used. Short writes go on. */
+struct mcap_io file_io(int *fd);
+
+/** Read from *@fd as long as it is now. 0 or -errno. */
+int file_source(int *fd, struct mcap_source *ret_source);
+
+/** fsync the directory at @path, so that names in it are durable. 0 or -errno. */
+int file_sync_dir(const char *path);
+
+#endif

@@ -1,0 +1,303 @@
+/* SPDX-License-Identifier: MIT */
+#include "record/mcap_reader.h"
+
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <zlib.h>
+#include <zstd.h>
+
+#include "base/bytes.h"
+#include "record/mcap_buf.h"
+#include "record/mcap_chunk.h"
+#include "record/mcap_parse.h"
+
+struct mcap_reader {
+	struct mcap_source source;
+	uint64_t offset;         /* of the next top-level record */
+	int has_ended;
+	struct mcap_buf record;  /* the newest top-level record, whole */
+	struct mcap_buf content; /* of the newest chunk, uncompressed, if it was compressed */
+	ZSTD_DCtx *zstd;
+	const uint8_t *inner;    /* content of the chunk being handed out; NULL: none */
+	size_t inner_len;
+	size_t inner_offset;
+	uint64_t chunk_offset;
+};
+
+int mcap_reader_create(const struct mcap_source *source, struct mcap_reader **ret_reader)
+{
+	uint8_t magic[MCAP_MAGIC_BYTES];
+	size_t have = source->bytes < sizeof(magic) ? (size_t)source->bytes : sizeof(magic);
+	struct mcap_reader *r;
+	int err = have > 0 ? source->read_at(source->ctx, 0, magic, have) : 0;
+
+	if (err < 0) {
+		return err;
+	}
+	if (memcmp(magic, MCAP_MAGIC, have) != 0) {
+		return -EPROTO;
+	}
+	if (have < sizeof(magic)) {
+		return -ENODATA;
+	}
+	r = calloc(1, sizeof(*r));
+	if (r == NULL) {
+		return -ENOMEM;
+	}
+	r->source = *source;
+	r->offset = MCAP_MAGIC_BYTES;
+	r->zstd = ZSTD_createDCtx();
+	if (r->zstd == NULL) {
+		mcap_reader_destroy(r);
+		return -ENOMEM;
+	}
+	*ret_reader = r;
+	return 0;
+}
+
+void mcap_reader_destroy(struct mcap_reader *r)
+{
+	if (r == NULL) {
+		return;
+	}
+	ZSTD_freeDCtx(r->zstd);
+	mcap_buf_done(&r->record);
+	mcap_buf_done(&r->content);
+	free(r);
+}
+
+enum is_final { GOES_ON, FINAL };
+
+static int damage(struct mcap_reader *r, uint64_t offset, const char *reason, enum is_final is_final,
+		  struct mcap_item *ret_item)
+{
+	*ret_item = (struct mcap_item){ .kind = MCAP_ITEM_DAMAGE,
+					.offset = offset,
+					.reason = reason,
+					.is_final = is_final == FINAL };
+	if (is_final == FINAL) {
+		r->has_ended = 1;
+	}
+	return 1;
+}
+
+/* The chunk's content, uncompressed, into r->inner. NULL, or what is wrong with it. */
+static const char *open_chunk(struct mcap_reader *r, const struct mcap_chunk_fields *c)
+{
+	size_t len;
+
+	if (c->uncompressed_len > MCAP_LIMIT_RECORD_BYTES) {
+		return "chunk is larger than this reader takes";
+	}
+	if (c->compression.len == 0) {
+		if (c->data_len != c->uncompressed_len) {
+			return "chunk sizes do not agree";
+		}
+		r->inner = c->data;
+	} else if (mcap_text_is(c->compression, "zstd")) {
+		mcap_buf_clear(&r->content);
+		if (mcap_buf_grow(&r->content, (size_t)c->uncompressed_len + 1) == NULL) {
+			return "not enough memory for the chunk";
+		}
+		len = ZSTD_decompressDCtx(r->zstd, r->content.data, (size_t)c->uncompressed_len,
+					  c->data, c->data_len);
+		if (ZSTD_isError(len) || len != c->uncompressed_len) {
+			return "chunk does not decompress";
+		}
+		r->inner = r->content.data;
+	} else {
+		return "chunk has a compression that this reader does not know";
+	}
+	r->inner_len = (size_t)c->uncompressed_len;
+	/* A CRC of 0 says: none. */
+	if (c->crc != 0 && c->crc != (uint32_t)crc32(0, r->inner, (uInt)r->inner_len)) {
+		return "chunk has a wrong CRC";
+	}
+	return NULL;
+}
+
+static int take_chunk(struct mcap_reader *r, struct mcap_item *ret_item)
+{
+	struct mcap_chunk_fields c;
+	uint64_t offset = ret_item->offset;
+	const char *reason = "chunk is malformed";
+
+	r->inner = NULL;
+	if (mcap_parse_chunk(ret_item->record + MCAP_HEAD_BYTES,
+			     ret_item->record_len - MCAP_HEAD_BYTES, &c) == 0) {
+		reason = open_chunk(r, &c);
+	}
+	if (reason != NULL) {
+		r->inner = NULL;
+		return damage(r, offset, reason, GOES_ON, ret_item);
+	}
+	r->inner_offset = 0;
+	r->chunk_offset = offset;
+	ret_item->encoding = c.compression;
+	ret_item->data = r->inner;
+	ret_item->data_len = r->inner_len;
+	return 1;
+}
+
+/* The next record of the open chunk; 0 when there is none left. */
+static int next_inner(struct mcap_reader *r, struct mcap_item *ret_item)
+{
+	struct mcap_inner inner;
+	int got = mcap_chunk_next(r->inner, r->inner_len, &r->inner_offset, &inner);
+
+	if (got == 0) {
+		r->inner = NULL;
+		return 0;
+	}
+	if (got > 0) {
+		*ret_item = (struct mcap_item){
+			.offset = r->chunk_offset,
+			.record = inner.content - MCAP_HEAD_BYTES,
+			.record_len = inner.content_len + MCAP_HEAD_BYTES,
+			.is_inner = 1,
+		};
+		got = mcap_parse_record(ret_item);
+		if (got == 0 && ret_item->kind != MCAP_ITEM_SCHEMA &&
+		    ret_item->kind != MCAP_ITEM_CHANNEL && ret_item->kind != MCAP_ITEM_MESSAGE) {
+			ret_item->kind = MCAP_ITEM_OTHER; /* nothing else belongs into a chunk */
+		}
+	}
+	if (got < 0) {
+		r->inner = NULL;
+		return damage(r, r->chunk_offset, "record in the chunk is malformed", GOES_ON,
+			      ret_item);
+	}
+	return 1;
+}
+
+/* Load the record at r->offset. 1, 0 at the end of the file, -errno; or damage as an item: 2. */
+static int load_record(struct mcap_reader *r, struct mcap_item *ret_item)
+{
+	uint64_t left = r->source.bytes - r->offset;
+	uint8_t head[MCAP_HEAD_BYTES];
+	uint64_t content_len;
+	uint64_t offset = r->offset;
+	int err;
+
+	if (left == 0) {
+		return 0;
+	}
+	if (left < sizeof(head)) {
+		damage(r, offset, "file ends within a record", FINAL, ret_item);
+		return 2;
+	}
+	err = r->source.read_at(r->source.ctx, offset, head, sizeof(head));
+	if (err < 0) {
+		return err;
+	}
+	content_len = get_le64(head + 1);
+	if (head[0] == 0 || (head[0] > MCAP_OP_DATA_END && head[0] < MCAP_OP_PRIVATE)) {
+		damage(r, offset, "no record where one should start", FINAL, ret_item);
+		return 2;
+	}
+	if (content_len > left - sizeof(head)) {
+		damage(r, offset, "file ends within a record", FINAL, ret_item);
+		return 2;
+	}
+	r->offset += sizeof(head) + content_len;
+	if (content_len > MCAP_LIMIT_RECORD_BYTES) {
+		damage(r, offset, "record is larger than this reader takes", GOES_ON, ret_item);
+		return 2;
+	}
+	mcap_buf_clear(&r->record);
+	if (mcap_buf_grow(&r->record, sizeof(head) + (size_t)content_len) == NULL) {
+		return -ENOMEM;
+	}
+	err = r->source.read_at(r->source.ctx, offset, r->record.data, r->record.len);
+	if (err < 0) {
+		return err;
+	}
+	*ret_item = (struct mcap_item){ .offset = offset,
+					.record = r->record.data,
+					.record_len = r->record.len };
+	return 1;
+}
+
+int mcap_reader_next(struct mcap_reader *r, struct mcap_item *ret_item)
+{
+	struct mcap_item item = { .record = NULL };
+	int got;
+
+	if (r->inner != NULL && next_inner(r, &item) > 0) {
+		*ret_item = item;
+		return 1;
+	}
+	if (r->has_ended) {
+		return 0;
+	}
+	got = load_record(r, &item);
+	if (got <= 0) {
+		return got;
+	}
+	if (got == 1 && mcap_parse_record(&item) < 0) {
+		damage(r, item.offset, "record is malformed", GOES_ON, &item);
+	}
+	if (item.kind == MCAP_ITEM_CHUNK) {
+		take_chunk(r, &item);
+	}
+	if (item.kind == MCAP_ITEM_DATA_END) {
+		r->has_ended = 1;
+	}
+	*ret_item = item;
+	return 1;
+}
+
+static int check_summary(const struct mcap_source *source, uint64_t start, uint32_t wanted,
+			 enum mcap_ending *ret_ending)
+{
+	uint8_t block[65536];
+	uint64_t end = source->bytes - MCAP_MAGIC_BYTES - 4;
+	uint32_t crc = 0;
+
+	while (start < end) {
+		size_t n = end - start < sizeof(block) ? (size_t)(end - start) : sizeof(block);
+		int err = source->read_at(source->ctx, start, block, n);
+
+		if (err < 0) {
+			return err;
+		}
+		crc = (uint32_t)crc32(crc, block, (uInt)n);
+		start += n;
+	}
+	*ret_ending = crc == wanted ? MCAP_ENDING_GOOD : MCAP_ENDING_BAD;
+	return 0;
+}
+
+int mcap_ending_check(const struct mcap_source *source, enum mcap_ending *ret_ending)
+{
+	uint8_t tail[MCAP_FOOTER_BYTES + MCAP_MAGIC_BYTES];
+	uint64_t tail_at = source->bytes - sizeof(tail);
+	uint64_t summary_start;
+	int err;
+
+	if (source->bytes < MCAP_MAGIC_BYTES + sizeof(tail)) {
+		*ret_ending = MCAP_ENDING_MISSING;
+		return 0;
+	}
+	err = source->read_at(source->ctx, tail_at, tail, sizeof(tail));
+	if (err < 0) {
+		return err;
+	}
+	if (memcmp(tail + MCAP_FOOTER_BYTES, MCAP_MAGIC, MCAP_MAGIC_BYTES) != 0 ||
+	    tail[0] != MCAP_OP_FOOTER || get_le64(tail + 1) != MCAP_FOOTER_BYTES - MCAP_HEAD_BYTES) {
+		*ret_ending = MCAP_ENDING_MISSING;
+		return 0;
+	}
+	summary_start = get_le64(tail + 9);
+	if (summary_start == 0 || get_le32(tail + 25) == 0) {
+		*ret_ending = MCAP_ENDING_GOOD; /* no summary, or none with a CRC: allowed */
+		return 0;
+	}
+	if (summary_start > tail_at || summary_start < MCAP_MAGIC_BYTES) {
+		*ret_ending = MCAP_ENDING_BAD;
+		return 0;
+	}
+	return check_summary(source, summary_start, get_le32(tail + 25), ret_ending);
+}

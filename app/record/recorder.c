@@ -1,0 +1,333 @@
+/* SPDX-License-Identifier: MIT */
+#include "record/recorder.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/timex.h>
+
+#include "base/clock.h"
+#include "base/ring.h"
+#include "record/event_feed.h"
+#include "record/sample_feed.h"
+#include "record/sink.h"
+
+#define LOOK_NS (NS_PER_S / 10) /* for a ring, and between two looks at the status page */
+enum { EVENTS_A_STEP = 256, SAMPLES_A_STEP = 2048 };
+
+struct recorder {
+	struct recorder_options opt;
+	struct sink *sink;
+	struct event_feed *events;
+	struct ring_reader *ring;  /* NULL: waiting for one */
+	struct sample_feed *samples; /* NULL: the ring is done with (or waiting) */
+	struct record_status *page; /* shared, or own while there is no run directory */
+	struct record_status own;
+	int64_t looked_ns;
+	int64_t told_ns;
+	int ring_error;            /* newest reason why no ring is open: told once */
+};
+
+__attribute__((format(printf, 2, 3))) static void say(const struct recorder *rec,
+						      const char *format, ...)
+{
+	char line[512];
+	va_list args;
+
+	va_start(args, format);
+	vsnprintf(line, sizeof(line), format, args);
+	va_end(args);
+	rec->opt.report(rec->opt.report_ctx, line);
+}
+
+int recorder_create(const struct recorder_options *opt, struct recorder **ret_recorder,
+		    char *error, size_t error_bytes)
+{
+	struct recorder *rec = calloc(1, sizeof(*rec));
+	int r;
+
+	if (rec == NULL) {
+		snprintf(error, error_bytes, "%s", strerror(ENOMEM));
+		return -ENOMEM;
+	}
+	rec->opt = *opt;
+	rec->page = &rec->own;
+	rec->looked_ns = INT64_MIN / 2;
+	rec->told_ns = INT64_MIN / 2;
+	rec->events = event_feed_create(opt->events_path);
+	if (rec->events == NULL) {
+		free(rec);
+		snprintf(error, error_bytes, "%s", strerror(ENOMEM));
+		return -ENOMEM;
+	}
+	r = sink_create(opt, &rec->sink, error, error_bytes);
+	if (r < 0) {
+		recorder_destroy(rec);
+		return r;
+	}
+	*ret_recorder = rec;
+	return 0;
+}
+
+void recorder_destroy(struct recorder *rec)
+{
+	if (rec == NULL) {
+		return;
+	}
+	sample_feed_destroy(rec->samples);
+	ring_reader_destroy(rec->ring);
+	event_feed_destroy(rec->events);
+	sink_destroy(rec->sink);
+	if (rec->page != &rec->own) {
+		status_unmap(rec->page, sizeof(*rec->page));
+	}
+	free(rec);
+}
+
+static int64_t now_ns(const struct recorder *rec)
+{
+	return rec->opt.platform.now(rec->opt.platform.ctx).ns;
+}
+
+static void set_u64(_Atomic uint64_t *field, uint64_t value)
+{
+	atomic_store_explicit(field, value, memory_order_relaxed);
+}
+
+static uint32_t state_of(const struct recorder *rec)
+{
+	switch (sink_state(rec->sink)) {
+	case SINK_FULL:
+		return RECORD_DISK_FULL;
+	case SINK_FAILED:
+		return RECORD_FAILED;
+	case SINK_READY:
+		break;
+	}
+	return rec->samples != NULL ? RECORD_RUNNING : RECORD_WAITING;
+}
+
+/* The run directory may come later than the recorder: try until the page is there. */
+static void have_page(struct recorder *rec)
+{
+	struct record_status *page;
+
+	if (rec->page != &rec->own || rec->opt.status_path[0] == '\0') {
+		return;
+	}
+	page = status_create(rec->opt.status_path, RECORD_STATUS_MAGIC, sizeof(*page), 0644);
+	if (page != NULL) {
+		page->pid = rec->own.pid;
+		rec->page = page;
+	}
+}
+
+static void tell(struct recorder *rec, uint32_t state)
+{
+	uint64_t lag = 0;
+
+	have_page(rec);
+	rec->page->pid = rec->opt.pid;
+	if (rec->samples != NULL) {
+		lag = ring_newest(rec->ring) - ring_cursor(rec->ring);
+	}
+	sink_get_status(rec->sink, rec->page);
+	set_u64(&rec->page->lag_cycles, lag);
+	atomic_store_explicit(&rec->page->state, state, memory_order_relaxed);
+	atomic_fetch_add_explicit(&rec->page->heartbeat, 1, memory_order_relaxed);
+}
+
+const struct record_status *recorder_status(const struct recorder *rec)
+{
+	return rec->page;
+}
+
+static struct event_mark event_mark(const struct recorder *rec)
+{
+	const struct store_state *resume = sink_resume_point(rec->sink);
+
+	return (struct event_mark){ .next = resume->event_next, .mono_ns = resume->event_mono_ns };
+}
+
+static void note_ring_error(struct recorder *rec, int error)
+{
+	if (error == rec->ring_error) {
+		return;
+	}
+	rec->ring_error = error;
+	if (error == -ENOENT) {
+		say(rec, "waiting for %s", rec->opt.ring_path);
+	} else if (error < 0) {
+		say(rec, "%s: %s", rec->opt.ring_path,
+		    error == -EPROTO ? "not a sample ring of this version" : strerror(-error));
+	}
+}
+
+/* No ring is open: look for one, ten times a second. */
+static void look_for_ring(struct recorder *rec)
+{
+	int r;
+
+	if (now_ns(rec) - rec->looked_ns < LOOK_NS) {
+		return;
+	}
+	rec->looked_ns = now_ns(rec);
+	if (rec->ring != NULL) {
+		if (!ring_is_replaced(rec->ring)) {
+			return; /* done with this one, or it is no good */
+		}
+		ring_reader_destroy(rec->ring);
+		rec->ring = NULL;
+	}
+	r = ring_reader_open(rec->opt.ring_path, &rec->ring);
+	if (r == 0) {
+		r = sample_feed_create(rec->ring, rec->sink, &rec->samples);
+		if (r == 0) {
+			say(rec, "recording session %" PRIu64 " to %s",
+			    sample_feed_number(rec->samples), rec->opt.dir);
+			if (sample_feed_missed_start(rec->samples) > 0) {
+				say(rec,
+				    "came late: %" PRIu64 " samples had left the ring before",
+				    sample_feed_missed_start(rec->samples));
+			}
+		}
+	}
+	note_ring_error(rec, r);
+}
+
+static void note_tai_offset(struct sample_feed *samples)
+{
+	struct timex t = { .modes = 0 };
+
+	if (adjtimex(&t) >= 0) {
+		sample_feed_note_tai_offset(samples, t.tai);
+	}
+}
+
+/* Events go where samples go: only while a file is open. Returns how many were taken. */
+static int take_events(struct recorder *rec)
+{
+	struct event_mark mark = event_mark(rec);
+	struct event ev;
+	uint64_t sequence;
+	uint64_t lost;
+
+	int taken = 0;
+
+	if (!sink_has_file(rec->sink) || sink_state(rec->sink) != SINK_READY) {
+		return 0;
+	}
+	event_feed_open(rec->events, &mark);
+	while (taken < EVENTS_A_STEP) {
+		int got = event_feed_read(rec->events, &ev, &sequence, &lost);
+
+		if (lost > 0) {
+			sink_count_lost_events(rec->sink, lost);
+		}
+		if (!got) {
+			break;
+		}
+		if (sample_feed_event(rec->samples, &ev, sequence) < 0) {
+			event_feed_unread(rec->events);
+			break;
+		}
+		taken++;
+	}
+	return taken;
+}
+
+static int end_session(struct recorder *rec, const char *reason)
+{
+	int r;
+
+	while (take_events(rec) == EVENTS_A_STEP) {
+	}
+	r = sink_end_session(rec->sink, reason);
+	if (r < 0) {
+		return r;
+	}
+	say(rec, "session %" PRIu64 " ended: %s", sample_feed_number(rec->samples), reason);
+	sample_feed_destroy(rec->samples);
+	rec->samples = NULL;
+	rec->looked_ns = INT64_MIN / 2;
+	tell(rec, RECORD_ENDED);
+	return 0;
+}
+
+static enum recorder_result follow(struct recorder *rec)
+{
+	/* Asked before reading: what was pushed before the producer went is then read. */
+	int is_gone = ring_cursor(rec->ring) >= ring_newest(rec->ring) &&
+		      (ring_is_replaced(rec->ring) || ring_is_orphaned(rec->ring));
+
+	switch (sample_feed_read(rec->samples, SAMPLES_A_STEP)) {
+	case SAMPLE_FEED_MORE:
+		(void)take_events(rec);
+		return RECORDER_BUSY;
+	case SAMPLE_FEED_EMPTY:
+		(void)take_events(rec);
+		if (is_gone && sink_state(rec->sink) == SINK_READY &&
+		    end_session(rec, "producer gone") == 0) {
+			return RECORDER_ENDED;
+		}
+		return RECORDER_IDLE;
+	case SAMPLE_FEED_CLOSED:
+		return end_session(rec, "producer ended") == 0 ? RECORDER_ENDED : RECORDER_IDLE;
+	case SAMPLE_FEED_STUCK:
+		return RECORDER_IDLE;
+	}
+	return RECORDER_IDLE;
+}
+
+enum recorder_result recorder_step(struct recorder *rec)
+{
+	enum recorder_result result = RECORDER_IDLE;
+	int64_t now = now_ns(rec);
+
+	sink_tick(rec->sink, now);
+	if (rec->samples == NULL) {
+		look_for_ring(rec);
+	}
+	if (rec->samples != NULL && sink_take_rewind(rec->sink)) {
+		struct event_mark mark = event_mark(rec);
+
+		sample_feed_rewind(rec->samples);
+		event_feed_seek(rec->events, &mark);
+	}
+	if (rec->samples != NULL && sink_state(rec->sink) == SINK_READY) {
+		result = follow(rec);
+	}
+	if (now - rec->told_ns >= LOOK_NS) {
+		rec->told_ns = now;
+		if (rec->samples != NULL) {
+			note_tai_offset(rec->samples);
+		}
+		if (result != RECORDER_ENDED) {
+			tell(rec, state_of(rec));
+		}
+	}
+	return result;
+}
+
+int recorder_finish(struct recorder *rec)
+{
+	int r = 0;
+
+	if (rec->samples != NULL) {
+		uint64_t until = ring_newest(rec->ring);
+
+		while (sink_state(rec->sink) == SINK_READY && ring_cursor(rec->ring) < until) {
+			uint64_t left = until - ring_cursor(rec->ring);
+
+			sample_feed_read(rec->samples,
+				     left < SAMPLES_A_STEP ? (unsigned)left : SAMPLES_A_STEP);
+			sink_tick(rec->sink, now_ns(rec));
+		}
+		r = end_session(rec, "stopped");
+	}
+	tell(rec, r < 0 ? RECORD_FAILED : RECORD_ENDED);
+	return r;
+}

@@ -1,0 +1,326 @@
+/* SPDX-License-Identifier: MIT */
+#include "record/recover_file.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "record/file_io.h"
+
+/* The note in the file that it was mended, and what is known to be lost. */
+static int put_note(struct mcap_writer *w, const struct recover_outcome *o)
+{
+	char last[24];
+	char cycles[24];
+	char chunks[24];
+	char lost_bytes[24];
+	char damaged[24];
+	const struct mcap_pair pairs[] = {
+		{ "note", "recovered: the file was not closed or was damaged" },
+		{ "lost_after_cycle", last },
+		{ "cycles", cycles },
+		{ "chunks", chunks },
+		{ "lost_bytes", lost_bytes },
+		{ "damaged_records", damaged },
+	};
+
+	snprintf(last, sizeof(last), "%" PRIu64, o->track.last_cycle);
+	snprintf(cycles, sizeof(cycles), "%" PRIu64, o->track.cycles);
+	snprintf(chunks, sizeof(chunks), "%" PRIu64, o->found.chunks);
+	snprintf(lost_bytes, sizeof(lost_bytes), "%" PRIu64, o->found.lost_bytes);
+	snprintf(damaged, sizeof(damaged), "%" PRIu64, o->found.damaged);
+	return mcap_writer_metadata(w, "ecdaq.recovered", pairs,
+				    sizeof(pairs) / sizeof(pairs[0]));
+}
+
+static int note_and_finish(struct mcap_writer *w, const struct recover_outcome *o)
+{
+	int r = put_note(w, o);
+
+	return r < 0 ? r : mcap_writer_finish(w);
+}
+
+static int look(int *fd, struct recover_outcome *o, struct mcap_scan **ret_scan)
+{
+	const struct mcap_visitor visitor = { .item = track_visit, .ctx = &o->track };
+	struct mcap_source source;
+	int r = file_source(fd, &source);
+
+	track_init(&o->track);
+	if (r == 0) {
+		r = mcap_scan_create(&source, &visitor, ret_scan);
+	}
+	if (r == 0) {
+		o->found = *mcap_scan_findings(*ret_scan);
+	}
+	return r;
+}
+
+static int mend(int *fd, struct mcap_scan *scan, const struct recover_outcome *o)
+{
+	struct mcap_io io = file_io(fd);
+	struct mcap_writer *w;
+	int r = mcap_scan_resume(scan, &io, &w);
+
+	if (r < 0) {
+		return r;
+	}
+	r = note_and_finish(w, o);
+	mcap_writer_destroy(w);
+	return r;
+}
+
+int recover_in_place(const char *path, struct recover_outcome *ret_outcome)
+{
+	struct recover_outcome o = { .result = RECOVER_MENDED };
+	struct mcap_scan *scan;
+	int fd = open(path, O_RDWR | O_CLOEXEC);
+	int r;
+
+	if (fd < 0) {
+		return -errno;
+	}
+	r = look(&fd, &o, &scan);
+	if (r < 0) {
+		close(fd);
+		return r;
+	}
+	if (mcap_scan_is_whole(scan)) {
+		o.result = RECOVER_WAS_WHOLE;
+		r = fdatasync(fd) < 0 ? -errno : 0;
+	} else if (o.found.messages == 0 && !o.found.needs_copy) {
+		o.result = RECOVER_EMPTY;
+	} else {
+		r = mend(&fd, scan, &o);
+	}
+	mcap_scan_destroy(scan);
+	if (close(fd) < 0 && r == 0) {
+		r = -errno;
+	}
+	if (r == 0) {
+		*ret_outcome = o;
+	}
+	return r;
+}
+
+static int copy_to(int *fd, const char *output, const struct recover_outcome *o)
+{
+	struct mcap_source source;
+	struct mcap_writer *w;
+	struct mcap_io io;
+	int out = open(output, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+	int r;
+
+	if (out < 0) {
+		return -errno;
+	}
+	io = file_io(&out);
+	r = mcap_writer_create(&io, 0, &w);
+	if (r == 0) {
+		r = file_source(fd, &source);
+		r = r < 0 ? r : mcap_copy_whole(&source, w);
+		r = r < 0 ? r : note_and_finish(w, o);
+		mcap_writer_destroy(w);
+	}
+	if (close(out) < 0 && r == 0) {
+		r = -errno;
+	}
+	if (r < 0) {
+		unlink(output);
+	}
+	return r;
+}
+
+int recover_copy(const char *path, const char *output, struct recover_outcome *ret_outcome)
+{
+	struct recover_outcome o = { .result = RECOVER_COPIED };
+	struct mcap_scan *scan;
+	int fd = open(path, O_RDONLY | O_CLOEXEC);
+	int r;
+
+	if (fd < 0) {
+		return -errno;
+	}
+	r = look(&fd, &o, &scan);
+	if (r == 0) {
+		mcap_scan_destroy(scan);
+		r = copy_to(&fd, output, &o);
+	}
+	close(fd);
+	if (r == 0) {
+		*ret_outcome = o;
+	}
+	return r;
+}
+
+static void say(const struct recover_report *report, const char *name, const char *what)
+{
+	char line[512];
+
+	snprintf(line, sizeof(line), "%s: %s", name, what);
+	report->line(report->ctx, line);
+}
+
+static void say_outcome(const struct recover_report *report, const char *name,
+			const struct recover_outcome *o)
+{
+	char what[320];
+
+	switch (o->result) {
+	case RECOVER_WAS_WHOLE:
+		say(report, name, "was finished but not renamed");
+		return;
+	case RECOVER_EMPTY:
+		say(report, name, "removed, there is no sample in it");
+		return;
+	case RECOVER_MENDED:
+	case RECOVER_COPIED:
+		snprintf(what, sizeof(what),
+			 "recovered %" PRIu64 " cycles up to cycle %" PRIu64 "%s%s", o->track.cycles,
+			 o->track.last_cycle,
+			 o->result == RECOVER_COPIED ? "; the damaged file is kept as .damaged: " : "",
+			 o->result == RECOVER_COPIED && o->found.reason != NULL ? o->found.reason :
+										  "");
+		say(report, name, what);
+		return;
+	}
+}
+
+static void set_state(struct store_state *state, const struct track *t)
+{
+	if (!t->has_session || t->sequence < state->sequence) {
+		return;
+	}
+	*state = (struct store_state){
+		.session = t->session,
+		.next_cycle = t->cycles > 0 ? t->last_cycle + 1 : t->next_at_start,
+		.event_next = t->event_next,
+		.event_mono_ns = t->event_mono_ns,
+		.sequence = t->sequence,
+	};
+}
+
+/* "DIR/NAME.part" to "DIR/NAME<suffix>". */
+static int rename_part(const char *part, const char *suffix)
+{
+	char path[PATH_MAX];
+	size_t stem = strlen(part) - strlen(".part");
+
+	if (snprintf(path, sizeof(path), "%.*s%s", (int)stem, part, suffix) >= (int)sizeof(path)) {
+		return -ENAMETOOLONG;
+	}
+	return rename(part, path) < 0 ? -errno : 0;
+}
+
+/* Damaged before its end: the copy takes its place, the original is kept aside. */
+static int replace_by_copy(const char *part, struct recover_outcome *o)
+{
+	char copy[PATH_MAX];
+	char final[PATH_MAX];
+	size_t stem = strlen(part) - strlen(".part");
+	int r;
+
+	if (snprintf(copy, sizeof(copy), "%s.copy", part) >= (int)sizeof(copy) ||
+	    snprintf(final, sizeof(final), "%.*s.mcap", (int)stem, part) >= (int)sizeof(final)) {
+		return -ENAMETOOLONG;
+	}
+	unlink(copy); /* of an attempt that was cut short */
+	r = recover_copy(part, copy, o);
+	if (r < 0) {
+		return r;
+	}
+	if (rename(copy, final) < 0) {
+		return -errno;
+	}
+	return rename_part(part, ".damaged");
+}
+
+static int recover_part(const struct store *s, const struct store_entry *e,
+			const struct recover_report *report, struct store_state *state)
+{
+	struct recover_outcome o = { .result = RECOVER_EMPTY };
+	char path[PATH_MAX];
+	int r = store_path(store_dir(s), e->name, path, sizeof(path));
+
+	if (r < 0) {
+		return r;
+	}
+	track_init(&o.track);
+	r = recover_in_place(path, &o);
+	if (r == -EXDEV) {
+		r = replace_by_copy(path, &o);
+	} else if (r == -EPROTO) {
+		say(report, e->name, "is not an MCAP file, kept as .damaged");
+		return rename_part(path, ".damaged");
+	} else if (r == -ENODATA || (r == 0 && o.result == RECOVER_EMPTY)) {
+		o.result = RECOVER_EMPTY;
+		r = unlink(path) < 0 ? -errno : 0;
+	} else if (r == 0) {
+		r = rename_part(path, ".mcap");
+	}
+	if (r < 0) {
+		say(report, e->name, strerror(-r));
+		return r;
+	}
+	say_outcome(report, e->name, &o);
+	set_state(state, &o.track);
+	return 0;
+}
+
+/* A finished file that is newer than the state (which was lost, or could not be written) knows better. */
+static void ask_finished(const struct store *s, const struct store_entry *e, int is_newest,
+			 struct store_state *state)
+{
+	struct recover_outcome o = { .result = RECOVER_WAS_WHOLE };
+	struct mcap_scan *scan;
+	char path[PATH_MAX];
+	int fd;
+
+	if (e->sequence <= state->sequence) {
+		return;
+	}
+	fd = !is_newest || store_path(store_dir(s), e->name, path, sizeof(path)) < 0 ?
+		     -1 :
+		     open(path, O_RDONLY | O_CLOEXEC);
+	if (fd >= 0) {
+		if (look(&fd, &o, &scan) == 0) {
+			mcap_scan_destroy(scan);
+			set_state(state, &o.track);
+		}
+		close(fd);
+	}
+	state->sequence = e->sequence;
+}
+
+int recover_store(const struct store *s, const struct recover_report *report,
+		  struct store_state *state)
+{
+	struct store_entry *entries;
+	size_t count;
+	int first = 0;
+	int changed = 0;
+	int r = store_list(store_dir(s), &entries, &count);
+
+	if (r < 0) {
+		return r;
+	}
+	for (size_t i = 0; i < count; i++) {
+		if (!entries[i].is_part) {
+			ask_finished(s, &entries[i], i + 1 == count, state);
+			continue;
+		}
+		changed = 1;
+		r = recover_part(s, &entries[i], report, state);
+		first = first < 0 ? first : r;
+	}
+	free(entries);
+	if (changed && first == 0) {
+		first = file_sync_dir(store_dir(s));
+	}
+	return first;
+}

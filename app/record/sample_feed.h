@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * One run of the master: its samples from the ring into the sink, by cycle number, each mapped to UTC. Gaps are
+ * found, counted and told here. Context: blocking.
+ */
+#ifndef RECORD_SAMPLE_FEED_H
+#define RECORD_SAMPLE_FEED_H
+
+#include "base/event.h"
+#include "base/ring.h"
+#include "record/sink.h"
+
+struct sample_feed;
+
+/**
+ * Begin to read @ring: behind the last recorded cycle if the sink knows this session, else at the oldest slot.
+ * 0; -EPROTO: not a sample ring of this version; -ENOMEM. Both are kept. Free with sample_feed_destroy().
+ */
+int sample_feed_create(struct ring_reader *ring, struct sink *sink, struct sample_feed **ret_session);
+void sample_feed_destroy(struct sample_feed *s);
+uint64_t sample_feed_number(const struct sample_feed *s);
+/** Slots that had left the ring before this session could be read for the first time. */
+uint64_t sample_feed_missed_start(const struct sample_feed *s);
+
+enum sample_feed_result {
+	SAMPLE_FEED_MORE,   /* @most samples were read, there may be more */
+	SAMPLE_FEED_EMPTY,  /* all were read */
+	SAMPLE_FEED_CLOSED, /* all were read, and the producer has closed the ring */
+	SAMPLE_FEED_STUCK,  /* the sink does not take any: come back when it is ready */
+};
+
+/** Read up to @most slots. */
+enum sample_feed_result sample_feed_read(struct sample_feed *s, unsigned most);
+
+/** Read again from where the sink says: what it had is partly lost. */
+void sample_feed_rewind(struct sample_feed *s);
+
+/** Give an event of the master to the sink, with text and time. 0 or -errno. */
+int sample_feed_event(struct sample_feed *s, const struct event *ev, uint64_t sequence);
+
+/** The kernel's TAI offset is @tai_offset_s. */
+void sample_feed_note_tai_offset(struct sample_feed *s, int32_t tai_offset_s);
+
+#endif

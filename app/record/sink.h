@@ -1,0 +1,62 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * Where samples go: the store and the file being written, with all that is due on time (chunk, sync, rotation,
+ * budget) and all that can go wrong. A full disk or a failing one makes the sink not ready; the caller then
+ * leaves samples in the ring and comes back. Context: blocking.
+ */
+#ifndef RECORD_SINK_H
+#define RECORD_SINK_H
+
+#include "base/event.h"
+#include "record/record_file.h"
+#include "record/recover_file.h"
+#include "record/recorder.h"
+#include "record/store.h"
+
+struct sink;
+
+enum sink_state {
+	SINK_READY,
+	SINK_FULL,   /* no space, or less than the reserve; asked again every second */
+	SINK_FAILED, /* another error; every second all is recovered as at start, then it is ready again */
+};
+
+/** Lock the directory and recover what is unfinished. As recorder_create(). */
+int sink_create(const struct recorder_options *opt, struct sink **ret_sink, char *error,
+		size_t error_bytes);
+void sink_destroy(struct sink *s);
+
+/** Where recording is to go on, as the store knows it. */
+const struct store_state *sink_resume_point(const struct sink *s);
+
+/** A session begins: its layout (kept until sink_end_session()) and where it goes on. */
+void sink_begin_session(struct sink *s, const struct layout *layout, uint64_t next_cycle);
+/** Finish the file of the session. 0, or -errno: not ready now; call again when it is. */
+int sink_end_session(struct sink *s, const char *reason);
+
+enum sink_state sink_state(const struct sink *s);
+/** 1 once after a failure was recovered: read again from sink_resume_point(). */
+int sink_take_rewind(struct sink *s);
+
+/** Do what is due at @now_ns (CLOCK_MONOTONIC). Call it often. */
+void sink_tick(struct sink *s, int64_t now_ns);
+
+/* These return 0, or -errno: not taken, the sink is not ready. */
+/** Have a file open, so that what follows goes into one file. */
+int sink_open_file(struct sink *s, uint64_t first_cycle, int64_t utc_ns);
+int sink_sample(struct sink *s, const struct sample_header *header, const uint8_t *image,
+		int64_t utc_ns);
+int sink_event(struct sink *s, const struct messages_event *ev);
+int sink_timemap(struct sink *s, const struct timemap_state *state);
+/** UTC took a step: what follows goes to a new file, so that log times go up inside each. */
+int sink_clock_step(struct sink *s, const struct timemap_state *state);
+
+/** Count a gap of this session. */
+void sink_count_gap(struct sink *s, uint64_t cycles);
+void sink_count_lost_events(struct sink *s, uint64_t events);
+int sink_has_file(const struct sink *s);
+
+/** Put the sink's figures into the status page. */
+void sink_get_status(struct sink *s, struct record_status *page);
+
+#endif

@@ -1,0 +1,325 @@
+/* SPDX-License-Identifier: MIT */
+#include "record/store.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "base/clock.h"
+#include "record/file_io.h"
+
+#define LOCK_NAME ".ecdaq-record.lock"
+#define STATE_NAME ".ecdaq-record.state"
+
+struct store {
+	char dir[PATH_MAX];
+	int lock_fd;
+};
+
+static int make_dirs(const char *dir)
+{
+	char path[PATH_MAX];
+
+	if (snprintf(path, sizeof(path), "%s", dir) >= (int)sizeof(path)) {
+		return -ENAMETOOLONG;
+	}
+	for (char *p = path + 1; *p != '\0'; p++) {
+		if (*p == '/') {
+			*p = '\0';
+			if (mkdir(path, 0755) < 0 && errno != EEXIST) {
+				return -errno;
+			}
+			*p = '/';
+		}
+	}
+	return mkdir(path, 0755) < 0 && errno != EEXIST ? -errno : 0;
+}
+
+static int take_lock(int fd, int64_t *ret_pid)
+{
+	char text[24];
+	ssize_t n;
+
+	if (flock(fd, LOCK_EX | LOCK_NB) == 0) {
+		n = snprintf(text, sizeof(text), "%d\n", (int)getpid());
+		/* The number is a help for people; the lock is what counts. */
+		if (ftruncate(fd, 0) < 0 || pwrite(fd, text, (size_t)n, 0) != n) {
+			return 0;
+		}
+		return 0;
+	}
+	if (errno != EWOULDBLOCK) {
+		return -errno;
+	}
+	n = pread(fd, text, sizeof(text) - 1, 0);
+	text[n > 0 ? n : 0] = '\0';
+	*ret_pid = strtoll(text, NULL, 10);
+	return -EBUSY;
+}
+
+int store_open(const char *dir, struct store **ret_store, int64_t *ret_pid)
+{
+	char path[PATH_MAX];
+	struct store *s;
+	int r = make_dirs(dir);
+
+	if (r < 0) {
+		return r;
+	}
+	r = store_path(dir, LOCK_NAME, path, sizeof(path));
+	if (r < 0) {
+		return r;
+	}
+	s = calloc(1, sizeof(*s));
+	if (s == NULL) {
+		return -ENOMEM;
+	}
+	snprintf(s->dir, sizeof(s->dir), "%s", dir);
+	s->lock_fd = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+	r = s->lock_fd < 0 ? -errno : take_lock(s->lock_fd, ret_pid);
+	if (r < 0) {
+		store_close(s);
+		return r;
+	}
+	*ret_store = s;
+	return 0;
+}
+
+void store_close(struct store *s)
+{
+	if (s == NULL) {
+		return;
+	}
+	if (s->lock_fd >= 0) {
+		close(s->lock_fd);
+	}
+	free(s);
+}
+
+const char *store_dir(const struct store *s)
+{
+	return s->dir;
+}
+
+int store_path(const char *dir, const char *name, char *buf, size_t buf_len)
+{
+	return snprintf(buf, buf_len, "%s/%s", dir, name) >= (int)buf_len ? -ENAMETOOLONG : 0;
+}
+
+void store_make_name(char buf[STORE_NAME_BYTES], int64_t utc_ns, uint64_t session,
+		     uint64_t sequence)
+{
+	time_t s = (time_t)(utc_ns / NS_PER_S);
+	struct tm tm;
+	char when[32];
+
+	if (gmtime_r(&s, &tm) == NULL || strftime(when, sizeof(when), "%Y%m%dT%H%M%SZ", &tm) == 0) {
+		snprintf(when, sizeof(when), "unknown");
+	}
+	/* The session's milliseconds: two runs of the master differ in them. */
+	snprintf(buf, STORE_NAME_BYTES, "ecdaq-%s-%08" PRIx32 "-%06" PRIu64, when,
+		 (uint32_t)(session / (uint64_t)NS_PER_MS), sequence);
+}
+
+int store_parse_name(const char *name, uint64_t *ret_sequence, int *ret_is_part)
+{
+	const char *suffix = strrchr(name, '.');
+	const char *dash = strrchr(name, '-');
+	uint64_t sequence;
+	char *end;
+
+	if (strncmp(name, "ecdaq-", 6) != 0 || suffix == NULL || dash == NULL || dash > suffix ||
+	    strlen(name) >= STORE_NAME_BYTES ||
+	    (strcmp(suffix, ".mcap") != 0 && strcmp(suffix, ".part") != 0)) {
+		return 0;
+	}
+	if (dash[1] < '0' || dash[1] > '9') {
+		return 0;
+	}
+	errno = 0;
+	sequence = strtoull(dash + 1, &end, 10);
+	if (end != suffix || errno != 0) {
+		return 0;
+	}
+	*ret_sequence = sequence;
+	*ret_is_part = strcmp(suffix, ".part") == 0;
+	return 1;
+}
+
+static int by_sequence(const void *a, const void *b)
+{
+	const struct store_entry *x = a;
+	const struct store_entry *y = b;
+
+	if (x->sequence != y->sequence) {
+		return x->sequence < y->sequence ? -1 : 1;
+	}
+	return strcmp(x->name, y->name);
+}
+
+static int append_entry(struct store_entry **entries, size_t *count, const struct store_entry *e)
+{
+	struct store_entry *grown;
+
+	if ((*count & (*count - 1)) == 0) { /* full at each power of two */
+		grown = realloc(*entries, (*count == 0 ? 1 : *count * 2) * sizeof(*grown));
+		if (grown == NULL) {
+			return -ENOMEM;
+		}
+		*entries = grown;
+	}
+	(*entries)[(*count)++] = *e;
+	return 0;
+}
+
+int store_list(const char *dir, struct store_entry **ret_entries, size_t *ret_count)
+{
+	struct store_entry *entries = NULL;
+	size_t count = 0;
+	struct dirent *d;
+	DIR *stream = opendir(dir);
+	int r = 0;
+
+	if (stream == NULL) {
+		return -errno;
+	}
+	while (r == 0 && (d = readdir(stream)) != NULL) {
+		struct store_entry e = { .sequence = 0 };
+		struct stat st;
+
+		if (!store_parse_name(d->d_name, &e.sequence, &e.is_part) ||
+		    fstatat(dirfd(stream), d->d_name, &st, AT_SYMLINK_NOFOLLOW) < 0 ||
+		    !S_ISREG(st.st_mode)) {
+			continue;
+		}
+		memcpy(e.name, d->d_name, strlen(d->d_name) + 1); /* its length was checked */
+		e.bytes = (uint64_t)st.st_size;
+		r = append_entry(&entries, &count, &e);
+	}
+	closedir(stream);
+	if (r < 0) {
+		free(entries);
+		return r;
+	}
+	if (count > 1) {
+		qsort(entries, count, sizeof(entries[0]), by_sequence);
+	}
+	*ret_entries = entries;
+	*ret_count = count;
+	return 0;
+}
+
+int store_load_state(const struct store *s, struct store_state *ret_state)
+{
+	struct store_state state;
+	char path[PATH_MAX];
+	FILE *in;
+	int n;
+
+	if (store_path(s->dir, STATE_NAME, path, sizeof(path)) < 0) {
+		return -ENAMETOOLONG;
+	}
+	in = fopen(path, "re");
+	if (in == NULL) {
+		return -errno;
+	}
+	n = fscanf(in,
+		   "ecdaq-record-state 1 session=%" SCNu64 " next_cycle=%" SCNu64
+		   " event_next=%" SCNu64 " event_mono_ns=%" SCNd64 " sequence=%" SCNu64,
+		   &state.session, &state.next_cycle, &state.event_next, &state.event_mono_ns,
+		   &state.sequence);
+	fclose(in);
+	if (n != 5) {
+		return -EBADMSG;
+	}
+	*ret_state = state;
+	return 0;
+}
+
+int store_save_state(const struct store *s, const struct store_state *state)
+{
+	char path[PATH_MAX];
+	char temporary[PATH_MAX];
+	FILE *out;
+	int r;
+
+	if (store_path(s->dir, STATE_NAME, path, sizeof(path)) < 0 ||
+	    store_path(s->dir, STATE_NAME ".new", temporary, sizeof(temporary)) < 0) {
+		return -ENAMETOOLONG;
+	}
+	out = fopen(temporary, "we");
+	if (out == NULL) {
+		return -errno;
+	}
+	fprintf(out,
+		"ecdaq-record-state 1\nsession=%" PRIu64 "\nnext_cycle=%" PRIu64
+		"\nevent_next=%" PRIu64 "\nevent_mono_ns=%" PRId64 "\nsequence=%" PRIu64 "\n",
+		state->session, state->next_cycle, state->event_next, state->event_mono_ns,
+		state->sequence);
+	errno = 0;
+	r = ferror(out) || fflush(out) != 0 ? -(errno != 0 ? errno : EIO) : 0;
+	if (fclose(out) != 0 && r == 0) {
+		r = -errno;
+	}
+	if (r == 0 && rename(temporary, path) < 0) {
+		r = -errno;
+	}
+	if (r < 0) {
+		unlink(temporary);
+	}
+	return r;
+}
+
+int store_free_bytes(const struct store *s, uint64_t *ret_bytes)
+{
+	struct statvfs fs;
+
+	if (statvfs(s->dir, &fs) < 0) {
+		return -errno;
+	}
+	*ret_bytes = (uint64_t)fs.f_bavail * fs.f_frsize;
+	return 0;
+}
+
+int store_enforce_budget(const struct store *s, uint64_t budget_bytes, uint64_t open_bytes)
+{
+	struct store_entry *entries;
+	uint64_t total = open_bytes;
+	size_t count;
+	int deleted = 0;
+	int r;
+
+	if (budget_bytes == 0) {
+		return 0;
+	}
+	r = store_list(s->dir, &entries, &count);
+	if (r < 0) {
+		return r;
+	}
+	for (size_t i = 0; i < count; i++) {
+		total += entries[i].is_part ? 0 : entries[i].bytes;
+	}
+	for (size_t i = 0; i < count && total > budget_bytes; i++) {
+		char path[PATH_MAX];
+
+		if (entries[i].is_part ||
+		    store_path(s->dir, entries[i].name, path, sizeof(path)) < 0 ||
+		    unlink(path) < 0) {
+			continue;
+		}
+		total -= entries[i].bytes;
+		deleted++;
+	}
+	free(entries);
+	return deleted;
+}

@@ -1,0 +1,66 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The directory of recordings: ecdaq-<UTC>-<session>-<sequence>.mcap, .part while being written. The sequence
+ * counts up over all sessions, so it orders the files even where the clock was wrong. One recorder at a time
+ * (lock file). The state file says where recording is to go on; an unfinished file knows better.
+ * Context: blocking.
+ */
+#ifndef RECORD_STORE_H
+#define RECORD_STORE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+struct store;
+
+enum { STORE_NAME_BYTES = 80 };
+
+struct store_entry {
+	char name[STORE_NAME_BYTES];
+	uint64_t sequence;
+	uint64_t bytes;
+	int is_part;
+};
+
+/* Where to go on. All zero: nothing was recorded yet. */
+struct store_state {
+	uint64_t session;
+	uint64_t next_cycle;
+	uint64_t event_next;
+	int64_t event_mono_ns; /* of the event before that */
+	uint64_t sequence; /* of the newest file */
+};
+
+/**
+ * Make @dir if it is not there, and lock it. 0; -EBUSY: another recorder has it (*@ret_pid, 0 unknown); -errno.
+ * Free with store_close().
+ */
+int store_open(const char *dir, struct store **ret_store, int64_t *ret_pid);
+void store_close(struct store *s);
+const char *store_dir(const struct store *s);
+
+/** Recordings in @dir in order of their sequence; free() *@ret_entries. 0 or -errno. */
+int store_list(const char *dir, struct store_entry **ret_entries, size_t *ret_count);
+
+/** "DIR/NAME" into @buf. 0, -ENAMETOOLONG. */
+int store_path(const char *dir, const char *name, char *buf, size_t buf_len);
+/** A name without suffix. */
+void store_make_name(char buf[STORE_NAME_BYTES], int64_t utc_ns, uint64_t session,
+		     uint64_t sequence);
+/** 1 if @name is one of ours, and then its sequence and whether it is a .part. */
+int store_parse_name(const char *name, uint64_t *ret_sequence, int *ret_is_part);
+
+/** 0, -ENOENT, -EBADMSG (ret untouched on failure). */
+int store_load_state(const struct store *s, struct store_state *ret_state);
+int store_save_state(const struct store *s, const struct store_state *state);
+
+/** Free bytes of the file system for this user. 0 or -errno. */
+int store_free_bytes(const struct store *s, uint64_t *ret_bytes);
+
+/**
+ * Delete the oldest finished recordings until all together with @open_bytes hold @budget_bytes; the newest
+ * finished one goes last. Returns the number of files deleted or -errno.
+ */
+int store_enforce_budget(const struct store *s, uint64_t budget_bytes, uint64_t open_bytes);
+
+#endif
