@@ -57,7 +57,7 @@ BANNED_CALLS: list[tuple[str, str, str]] = [
         "",
     ),
     (r"ato(?:i|l|ll|f)\s*\(", "strtol and its kin, with the end checked", ""),
-    (r"(?:strtok|strtok_r|strsep)\s*\(", "strchr or strcspn", ""),
+    (r"strtok\s*\(", "strtok_r or strcspn", ""),
     (r"(?:usleep|ualarm)\s*\(", "platform sleep_until to an absolute deadline", ""),
     (
         r"(?:nano)?sleep\s*\(",
@@ -87,12 +87,15 @@ FILE_LINES = 400
 # Files that are tables, or a subject that does not fall into two; 800 lines at most. Each with why.
 LONG_FILE_LINES = 800
 LONG_FILES: dict[str, str] = {
+    "app/base/ring.c": "producer and reader share one memory layout and its ordering",
     "app/config/options.c": "the option table, a line a property",
 }
 # Files whose one function is a table of texts.
 LONG_FUNCTIONS: dict[tuple[str, str], str] = {
     ("app/base/event.c", "event_format"): "one text an event",
 }
+
+SLEEPING_TESTS = {"tests/sim/harness/rt_guard_test.c": "sleeps for 0 s, to be caught at it"}
 
 # Hosts and paths are spelt in pieces, so that this file keeps its own rule.
 BANNED_TEXT: list[tuple[str, str]] = [
@@ -110,7 +113,7 @@ BANNED_TEXT: list[tuple[str, str]] = [
         ),
         "host of a package registry: the machine's own configuration names it",
     ),
-    (r"(?<![\w.~-])/" + r"(?:work|root)/", "path of one machine"),
+    (r"(?<![\w.~}-])/" + r"(?:work|root)/", "path of one machine"),
 ]
 
 
@@ -201,7 +204,8 @@ def rule_file_size(source: Source) -> Iterable[Finding]:
     """A file holds one subject."""
     if not source.path.endswith((".c", ".h", ".py", ".sh")):
         return
-    limit = LONG_FILE_LINES if source.path in LONG_FILES else FILE_LINES
+    is_list = source.path.startswith("tests/") and source.is_c  # one sentence after the other
+    limit = LONG_FILE_LINES if is_list or source.path in LONG_FILES else FILE_LINES
     if len(source.lines) > limit:
         yield Finding(source.path, limit + 1, f"{len(source.lines)} lines, {limit} are the limit")
 
@@ -267,7 +271,7 @@ def rule_patch_reason(source: Source) -> Iterable[Finding]:
 
 def rule_test_waits(source: Source) -> Iterable[Finding]:
     """Tests wait for what happens, not for time to pass."""
-    if not source.path.startswith("tests/"):
+    if not source.path.startswith("tests/") or source.path in SLEEPING_TESTS:
         return
     if source.is_c:
         for number, line in enumerate(strip_comments(source.text).splitlines(), 1):

@@ -111,7 +111,8 @@ def test_each_rule_is_shown_to_fail(rule: rules.Rule) -> None:
 
 
 def test_a_source_that_no_list_names_is_found() -> None:
-    built = Source("app/bus/CMakeLists.txt", "ecdaq_module(bus SOURCES a.c deep/b.c)")
+    lines = "set(dir deep)\necdaq_module(bus SOURCES a.c ${dir}/b.c)"
+    built = Source("app/bus/CMakeLists.txt", lines)
     named = [Source("app/bus/a.c", ""), Source("app/bus/deep/b.c", "")]
     assert not list(whole_tree.unlisted_sources([built, *named]))
     for stray in ("app/bus/c.c", "app/bus/b.c", "app/wire/a.c"):

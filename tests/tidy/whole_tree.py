@@ -13,7 +13,11 @@ from project import Finding, Source
 
 def unlisted_sources(files: Sequence[Source]) -> Iterable[Finding]:
     """Every C file below app/ is named in the CMakeLists.txt of its folder or one above."""
-    lists = {f.path.rpartition("/")[0]: f.text for f in files if f.path.endswith("CMakeLists.txt")}
+    lists = {
+        f.path.rpartition("/")[0]: expand_variables(f.text)
+        for f in files
+        if f.path.endswith("CMakeLists.txt")
+    }
     for source in files:
         if not source.path.startswith("app/") or not source.path.endswith(".c"):
             continue
@@ -27,6 +31,13 @@ def unlisted_sources(files: Sequence[Source]) -> Iterable[Finding]:
         )
         if not named:
             yield Finding(source.path, 1, "no CMakeLists.txt names it: it is never built")
+
+
+def expand_variables(text: str) -> str:
+    """CMake text with plain `set(name value)` put in place of ${name}."""
+    for match in re.finditer(r"^set\((\w+) ([\w./-]+)\)", text, re.MULTILINE):
+        text = text.replace(f"${{{match.group(1)}}}", match.group(2))
+    return text
 
 
 def doubled_test_names(files: Sequence[Source]) -> Iterable[Finding]:
