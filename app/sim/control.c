@@ -1,0 +1,57 @@
+/* SPDX-License-Identifier: MIT */
+#include "sim/control.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+int control_open(const char *path, char *error, size_t error_bytes)
+{
+	struct sockaddr_un address = { .sun_family = AF_UNIX };
+	int fd;
+	int r;
+
+	if (strlen(path) >= sizeof(address.sun_path)) {
+		snprintf(error, error_bytes, "--control %s: path too long", path);
+		return -ENAMETOOLONG;
+	}
+	snprintf(address.sun_path, sizeof(address.sun_path), "%s", path);
+	fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+	unlink(path);
+	if (fd < 0 || bind(fd, (struct sockaddr *)&address, sizeof(address)) < 0) {
+		r = -errno;
+		snprintf(error, error_bytes, "--control %s: %s", path, strerror(errno));
+		if (fd >= 0) {
+			close(fd);
+		}
+		return r;
+	}
+	return fd;
+}
+
+void control_serve(int fd, struct fault_plan *plan, size_t slave_count, int64_t now_ns)
+{
+	for (;;) {
+		struct sockaddr_un from;
+		socklen_t from_len = sizeof(from);
+		char line[300];
+		char answer[200];
+		ssize_t n = recvfrom(fd, line, sizeof(line) - 1, 0, (struct sockaddr *)&from, &from_len);
+
+		if (n < 0) {
+			return;
+		}
+		line[n] = '\0';
+		fault_plan_restart(plan, now_ns);
+		snprintf(answer, sizeof(answer), "ok");
+		fault_plan_add(plan, line, slave_count, answer, sizeof(answer));
+		/* Who has no address does not want an answer. */
+		if (from_len > sizeof(sa_family_t)) {
+			(void)!sendto(fd, answer, strlen(answer), MSG_DONTWAIT,
+				      (struct sockaddr *)&from, from_len);
+		}
+	}
+}

@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: MIT */
+/* Fault lines at run time, one a datagram on a Unix socket; answered with "ok" or why not. */
+#ifndef SIM_CONTROL_H
+#define SIM_CONTROL_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "sim/fault.h"
+
+/** The socket or -errno with one line in @error. */
+int control_open(const char *path, char *error, size_t error_bytes);
+/** Take all lines that wait; their times count from @now_ns. Never blocks. */
+void control_serve(int fd, struct fault_plan *plan, size_t slave_count, int64_t now_ns);
+
+#endif

@@ -1,0 +1,87 @@
+/* SPDX-License-Identifier: MIT */
+#include "sim/wire_socket.h"
+
+#include <errno.h>
+#include <net/if.h>
+#include <poll.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <arpa/inet.h>
+#include <linux/if_packet.h>
+
+#include "wire/datagram.h"
+
+static int fail(int fd, char *error, size_t error_bytes, const char *interface, const char *why)
+{
+	int r = -errno;
+
+	snprintf(error, error_bytes, "interface %s: %s", interface, why);
+	if (fd >= 0) {
+		close(fd);
+	}
+	return r;
+}
+
+int wire_socket_open(const char *interface, char *error, size_t error_bytes)
+{
+	unsigned index = if_nametoindex(interface);
+	struct sockaddr_ll address = { .sll_family = AF_PACKET,
+				       .sll_protocol = htons(ECAT_ETHERTYPE),
+				       .sll_ifindex = (int)index };
+	struct packet_mreq promiscuous = { .mr_ifindex = (int)index, .mr_type = PACKET_MR_PROMISC };
+	int one = 1;
+	int fd;
+
+	if (index == 0) {
+		return fail(-1, error, error_bytes, interface, "no such interface");
+	}
+	fd = socket(AF_PACKET, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+	if (fd < 0) {
+		return fail(-1, error, error_bytes, interface,
+			    errno == EPERM ? "no permission for a packet socket (needs CAP_NET_RAW)"
+					   : strerror(errno));
+	}
+	if (setsockopt(fd, SOL_PACKET, PACKET_IGNORE_OUTGOING, &one, sizeof(one)) < 0 ||
+	    setsockopt(fd, SOL_PACKET, PACKET_QDISC_BYPASS, &one, sizeof(one)) < 0 ||
+	    setsockopt(fd, SOL_PACKET, PACKET_ADD_MEMBERSHIP, &promiscuous, sizeof(promiscuous)) < 0 ||
+	    bind(fd, (struct sockaddr *)&address, sizeof(address)) < 0) {
+		return fail(fd, error, error_bytes, interface, strerror(errno));
+	}
+	return fd;
+}
+
+int64_t wire_socket_now_ns(void)
+{
+	struct timespec ts;
+
+	clock_gettime(CLOCK_MONOTONIC, &ts);
+	return ts.tv_sec * INT64_C(1000000000) + ts.tv_nsec;
+}
+
+int wire_socket_receive(int fd, uint8_t *frame, size_t capacity, int64_t timeout_ns,
+			int64_t *ret_t_ns)
+{
+	struct pollfd p = { .fd = fd, .events = POLLIN };
+	struct timespec wait = { .tv_sec = timeout_ns / 1000000000,
+				 .tv_nsec = timeout_ns % 1000000000 };
+	ssize_t n = recv(fd, frame, capacity, 0);
+
+	if (n < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) {
+		if (timeout_ns <= 0) {
+			return 0;
+		}
+		if (ppoll(&p, 1, &wait, NULL) < 0) {
+			return errno == EINTR ? 0 : -errno;
+		}
+		n = recv(fd, frame, capacity, 0);
+	}
+	*ret_t_ns = wire_socket_now_ns();
+	if (n < 0) {
+		return errno == EAGAIN || errno == EINTR ? 0 : -errno;
+	}
+	return (int)n;
+}
