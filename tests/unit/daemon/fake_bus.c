@@ -6,12 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/prng.h"
-
 enum { IMAGE_BYTES = 3, ROUND_TRIP_NS = 20000 };
 
 struct fake_bus fake_bus;
-static struct prng erratic;
 
 static const struct slave_info slaves[] = {
 	{ .name = "a",
@@ -301,8 +298,8 @@ struct exchange_result exchange_run(struct exchange *ex, uint8_t *image, mono_t 
 		return res;
 	}
 	res.dc_time_ns = 100 * NS_PER_S + fake_bus.mono_ns + fake_bus.mono_ns / 20000;
-	if (fake_bus.is_dc_erratic) {
-		res.dc_time_ns += (int64_t)prng_below(&erratic, NS_PER_MS);
+	if (fake_bus.is_dc_running_away) {
+		res.dc_time_ns += fake_bus.mono_ns / 20;
 	}
 	fake_bus.mono_ns += ROUND_TRIP_NS;
 	return res;

@@ -27,9 +27,9 @@ struct fake_bus {
 	int64_t mono_ns;
 	int64_t tai_ns;
 	enum fake_step fails_at;
-	int result;          /* of the step that fails */
-	unsigned lost_every; /* every n-th frame is lost; 0: none */
-	int is_dc_erratic;   /* the reference's time jumps about */
+	int result;             /* of the step that fails */
+	unsigned lost_every;    /* every n-th frame is lost; 0: none */
+	int is_dc_running_away; /* the reference is 5 % fast */
 	struct bus_watch_report report;
 	uint8_t led;         /* as it was on the wire last */
 	char steps[512];     /* what was called, in order, with a blank behind each */

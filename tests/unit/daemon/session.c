@@ -223,7 +223,7 @@ TEST(session, op_is_not_asked_for_without_lock)
 	struct failure failure;
 
 	bench_open(&b);
-	fake_bus.is_dc_erratic = 1;
+	fake_bus.is_dc_running_away = 1;
 	b.cfg.dc_lock_timeout_ns = NS_PER_S;
 	CHECK_EQ(session_bring_up(b.session, &failure), -ETIME);
 	CHECK_EQ(failure.code, EXIT_CODE_CLOCKS);
