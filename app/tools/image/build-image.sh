@@ -1,0 +1,117 @@
+#!/bin/sh
+# SPDX-License-Identifier: MIT
+# The image of a machine, from layers/, recipes/ and kernel-config/. `./build.sh image` calls this.
+set -eu
+
+here=$(CDPATH='' cd -- "$(dirname -- "$0")" && pwd)
+root=$(CDPATH='' cd -- "$here/../../.." && pwd)
+cache=${XDG_CACHE_HOME:-$HOME/.cache}/ecdaq/image
+
+usage()
+{
+	cat <<'USAGE'
+usage: ./build.sh image [--machine MACHINE] [--recipe RECIPE] [--jobs N] [--plan]
+
+Builds the disk image of the appliance: a Debian 13 root file system, our PREEMPT_RT kernel and our
+programs, from the recipes in recipes/ and layers/. Needs Debian 12 or 13 on x86-64 and root (it makes
+chroots, and runs arm64 programs through the kernel's binfmt_misc). What is done is kept, by the hash
+of all that went in: a second run only does what changed.
+
+  --machine MACHINE  qemuarm64 (default): QEMU's virt machine, the segment simulated inside
+  --recipe RECIPE    one recipe instead of the whole image: linux-ecdaq, soem, ecdaq, ecdaq-config
+  --jobs N           tasks at the same time (default: as many as there are cores)
+  --plan             say what would be done, and the hash of each task, and end
+
+The results are in build/image/MACHINE/: the disk (.img, .img.zst for flashing, .bmap), the kernel, its
+command line, the package list (.manifest), the bill of materials (.spdx.json) and .sha256.
+
+environment:
+  ECDAQ_APT_MIRROR  Debian mirror to take packages from (default: the one this machine's apt uses)
+  XDG_CACHE_HOME    ecdaq/image/ below it keeps everything between runs, about 8 GB (default: ~/.cache)
+  PYTHON            Python 3.11 or newer with venv (default: python3)
+USAGE
+}
+
+die()
+{
+	printf 'build.sh: image: %s\n' "$*" >&2
+	exit 1
+}
+
+machine=qemuarm64
+recipe=ecdaq-image
+jobs=$(nproc)
+plan=
+while [ $# -gt 0 ]; do
+	case $1 in
+	--machine | --recipe | --jobs)
+		[ $# -ge 2 ] || die "$1 needs a value"
+		case $1 in
+		--machine) machine=$2 ;;
+		--recipe) recipe=$2 ;;
+		--jobs) jobs=$2 ;;
+		esac
+		shift
+		;;
+	--plan) plan=--dry-run ;;
+	--help | -h)
+		usage
+		exit 0
+		;;
+	*) die "unknown option '$1' (see --help)" ;;
+	esac
+	shift
+done
+
+[ -f "$root/layers/meta-ecdaq/conf/machine/$machine.conf" ] ||
+	die "no machine '$machine'; there are: $(cd "$root/layers/meta-ecdaq/conf/machine" &&
+		printf '%s ' *.conf | sed 's/\.conf//g')"
+case $jobs in
+'' | *[!0-9]* | 0) die "--jobs: '$jobs' is no number of tasks" ;;
+esac
+
+# pip's own environment for BitBake's library, one for each content of requirements.txt.
+need_bitbake()
+{
+	venv=$cache/venv-$("${PYTHON:-python3}" -c 'import sys; print(sys.version, sys.base_prefix)' |
+		cat - "$here/requirements.txt" | sha256sum | cut -c 1-12)
+	[ -f "$venv/.complete" ] || {
+		rm -rf "$venv"
+		"${PYTHON:-python3}" -m venv "$venv" || die "${PYTHON:-python3} cannot make an environment"
+		"$venv/bin/python" -m pip install --quiet --disable-pip-version-check \
+			--requirement "$here/requirements.txt" ||
+			die "pip cannot install app/tools/image/requirements.txt (its reason stands above)"
+		touch "$venv/.complete"
+	}
+}
+
+# arm64 programs (the maintainer scripts of packages) run through QEMU's user mode.
+need_arm64()
+{
+	if ! arch-test arm64 > /dev/null 2>&1; then
+		[ -e /proc/sys/fs/binfmt_misc/register ] ||
+			mount -t binfmt_misc binfmt_misc /proc/sys/fs/binfmt_misc 2> /dev/null ||
+			die "this kernel has no binfmt_misc, which runs arm64 programs"
+		update-binfmts --enable qemu-aarch64 > /dev/null 2>&1 || :
+	fi
+	arch-test arm64 > /dev/null 2>&1 ||
+		die "arm64 programs do not run here: is qemu-user-static installed?"
+}
+
+mkdir -p "$cache" "$root/build/image"
+exec 9> "$cache/lock"
+flock --nonblock 9 || {
+	echo '-- another image build is running; waiting for it' >&2
+	flock 9
+}
+need_bitbake
+if [ -z "$plan" ]; then
+	[ "$(id -u)" = 0 ] || die "needs root (mmdebstrap and chroot); try: sudo ./build.sh image"
+	for tool in mmdebstrap arch-test unshare; do
+		command -v "$tool" > /dev/null 2>&1 || die "$tool is not installed"
+	done
+	need_arm64
+fi
+# shellcheck disable=SC2086 # --dry-run or nothing
+PYTHONDONTWRITEBYTECODE=1 exec nice -n 10 "$venv/bin/python" "$here/bake.py" --machine "$machine" \
+	--cache "$cache" --build "$root/build/image" --jobs "$jobs" $plan "$recipe"

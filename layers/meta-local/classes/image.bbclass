@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: MIT
+# A root file system of IMAGE_PREINSTALL (Debian's) and IMAGE_INSTALL (recipes'), and a disk made of
+# it as WKS_FILE says. Variables as in Isar; the work is done by mmdebstrap and meta-local/lib.
+inherit sdk-run
+
+# An image is of one machine; everything else is shared by machines.
+WORKDIR = "${TMPDIR}/work/${DISTRO}-${DISTRO_ARCH}/${PN}-${MACHINE}"
+STAMP = "${STAMPS_DIR}/${PN}-${MACHINE}"
+IMAGE_FULLNAME = "${PN}-${DISTRO}-${MACHINE}"
+IMAGE_ROOTFS = "${WORKDIR}/rootfs"
+KERNEL_IMAGE_PKG ??= "${@'linux-image-' + d.getVar('KERNEL_NAME') if d.getVar('KERNEL_NAME') else ''}"
+IMAGE_INSTALL += "${KERNEL_IMAGE_PKG}"
+IMAGE_BOOT_FILES ??= ""
+IMAGE_COMPONENTS ??= "main"
+DTB_FILES ??= ""
+# What needs no room on an appliance. Licence texts stay.
+ROOTFS_EXCLUDE ??= "/usr/share/man/* /usr/share/locale/* /usr/share/info/* /usr/share/lintian/* \
+                    /usr/share/bash-completion/* /usr/share/zsh/* /usr/share/bug/* /usr/share/doc/*"
+ROOTFS_INCLUDE ??= "/usr/share/doc/*/copyright"
+
+def image_recipes(d):
+    """The recipes whose packages IMAGE_INSTALL names."""
+    kernel = d.getVar("KERNEL_IMAGE_PKG")
+    names = [n for n in d.getVar("IMAGE_INSTALL").split() if n != kernel]
+    if kernel:
+        names.append("linux-" + d.getVar("KERNEL_NAME"))
+    return names
+
+do_rootfs[depends] += "sdk-chroot:do_bootstrap ${@' '.join(n + ':do_deploy_deb' for n in image_recipes(d))}"
+do_rootfs[cleandirs] = "${WORKDIR}/tar ${WORKDIR}/repo"
+do_rootfs[network] = "1"
+do_rootfs[keep] = "${WORKDIR}/tar"
+python do_rootfs() {
+    import shutil
+    repo = os.path.join(d.getVar("WORKDIR"), "repo")
+    for name in image_recipes(d):
+        folder = os.path.join(d.getVar("REPO_DIR"), name)
+        for deb in sorted(os.listdir(folder)):
+            shutil.copy(os.path.join(folder, deb), repo)
+    bb.build.exec_func("rootfs_index", d)
+    suite = d.getVar("BASE_DISTRO_CODENAME")
+    sources = apt_sources(d, suite, d.getVar("IMAGE_COMPONENTS"))
+    sources.append("deb [trusted=yes] copy:" + repo + " ./")
+    include = ",".join((d.getVar("IMAGE_PREINSTALL") + " " + d.getVar("IMAGE_INSTALL")).split())
+    options = ["--dpkgopt=path-exclude=" + p for p in d.getVar("ROOTFS_EXCLUDE").split()]
+    options += ["--dpkgopt=path-include=" + p for p in d.getVar("ROOTFS_INCLUDE").split()]
+    tar = os.path.join(d.getVar("WORKDIR"), "tar", "rootfs.tar")
+    bb.process.run(
+        ["mmdebstrap", "--mode=root", "--variant=essential", "--format=tar",
+         "--architectures=" + d.getVar("DISTRO_ARCH"), "--include=" + include, *options,
+         "--aptopt=APT::Install-Recommends \"false\"", "--aptopt=Acquire::Retries \"3\"",
+         "--hook-dir=" + os.path.join(d.getVar("LAYERDIR_core"), "lib", "rootfs-hooks"),
+         suite, tar, *sources],
+        log=open(d.getVar("BB_LOGFILE"), "a"))
+}
+do_rootfs[file-checksums] += "${LAYERDIR_core}/lib/rootfs-hooks:True"
+addtask rootfs
+
+rootfs_index() {
+	sdk_run sh -euc 'cd "$1/repo" && dpkg-scanpackages --multiversion . > Packages' index "${PP}"
+}
+
+addtask image after do_rootfs before do_build
+do_image[depends] += "sdk-chroot:do_bootstrap"
+do_image[file-checksums] += "${LAYERDIR_core}/lib/image.py:True ${LAYERDIR_core}/lib/wks.py:True \
+                             ${LAYERDIR_core}/lib/sbom.py:True ${LAYERDIR_core}/lib/make-disk.sh:True \
+                             ${@wks_path(d)}:True"
+do_image[cleandirs] = "${WORKDIR}/disk ${IMAGE_ROOTFS}"
+do_image[keep] = "${WORKDIR}/out"
+do_image[vardeps] += "IMAGE_BOOT_FILES KERNEL_CMDLINE WKS_FILE DTB_FILES"
+
+def wks_path(d):
+    name = d.getVar("WKS_FILE")
+    for folder in d.getVar("BBPATH").split(":"):
+        path = os.path.join(folder, "wic", name)
+        if os.path.exists(path):
+            return path
+    bb.fatal(f"{d.getVar('PN')}: WKS_FILE {name} is in no layer's wic/ folder")
+
+python do_image() {
+    import sys
+    sys.path.insert(0, os.path.join(d.getVar("LAYERDIR_core"), "lib"))
+    import image
+    image.prepare(image.Inputs(
+        work=d.getVar("WORKDIR"), rootfs=d.getVar("IMAGE_ROOTFS"), wks=wks_path(d),
+        name=d.getVar("IMAGE_FULLNAME"), cmdline=d.getVar("KERNEL_CMDLINE"),
+        boot_files=d.getVar("IMAGE_BOOT_FILES").split(),
+        dtb_files=d.getVar("DTB_FILES").split(), version=d.getVar("DISTRO_VERSION"),
+        machine=d.getVar("MACHINE"), epoch=int(d.getVar("SOURCE_DATE_EPOCH"))))
+    bb.build.exec_func("make_disk", d)
+    image.finish(d.getVar("WORKDIR"), d.getVar("IMAGE_FULLNAME"))
+}
+
+make_disk() {
+	cp "${LAYERDIR_core}/lib/make-disk.sh" "${WORKDIR}/disk/"
+	sdk_run sh "${PP}/disk/make-disk.sh" "${PP}"
+}
+
+# The newest image of this machine is laid where people look; a link costs no room.
+addtask deploy after do_image before do_build
+do_deploy[nostamp] = "1"
+do_deploy() {
+	mkdir -p "${DEPLOY_DIR_IMAGE}"
+	for file in "${WORKDIR}"/out/*; do
+		rm -f "${DEPLOY_DIR_IMAGE}/$(basename "$file")"
+		cp --reflink=auto --sparse=always "$file" "${DEPLOY_DIR_IMAGE}/"
+	done
+}

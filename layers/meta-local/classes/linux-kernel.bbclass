@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: MIT
+# A kernel of its own configuration: .cfg files of SRC_URI merged over KERNEL_DEFCONFIG, by the very
+# commands that Isar's class of this name uses. One package, linux-image-${KERNEL_NAME_PROVIDED}.
+inherit dpkg
+
+KERNEL_NAME_PROVIDED ?= "${@d.getVar('BPN').partition('linux-')[2]}"
+KERNEL_DEFCONFIG ??= "defconfig"
+KERNEL_FRAGMENTS = "${@' '.join(os.path.basename(u)[7:] if u.startswith('file:///') else u[7:].split(';')[0] for u in d.getVar('SRC_URI').split() if u.startswith('file://') and u.split(';')[0].endswith('.cfg'))}"
+DEB_KREL = "debian/krel"
+
+do_prepare_build() {
+	rm -rf "${S}/debian"
+	deb_debianize
+	cat > "${S}/debian/control" <<CONTROL
+Source: ${BPN}
+Section: kernel
+Priority: optional
+Standards-Version: ${DEBIAN_STANDARDS_VERSION}
+Maintainer: ${MAINTAINER}
+Build-Depends: debhelper-compat (= ${DEBIAN_COMPAT}), bc, bison, flex, kmod, rsync
+
+Package: linux-image-${KERNEL_NAME_PROVIDED}
+Architecture: ${PACKAGE_ARCH}
+Depends: kmod
+Description: ${DESCRIPTION}
+CONTROL
+	install -d "${S}/debian/fragments"
+	for name in ${KERNEL_FRAGMENTS}; do
+		cp "${WORKDIR}/$name" "${S}/debian/fragments/"
+	done
+	cat > "${S}/debian/rules" <<'RULES'
+#!/usr/bin/make -f
+export ARCH = arm64
+export CROSS_COMPILE = aarch64-linux-gnu-
+export KBUILD_BUILD_TIMESTAMP = @$(SOURCE_DATE_EPOCH)
+export KBUILD_BUILD_USER = ecdaq
+export KBUILD_BUILD_HOST = ecdaq
+unexport CFLAGS CPPFLAGS LDFLAGS CXXFLAGS
+flags = KCFLAGS=-fdebug-prefix-map=$(CURDIR)=. KAFLAGS=-fdebug-prefix-map=$(CURDIR)=.
+kmake = $(MAKE) -s O=build-full $(flags)
+root = $(CURDIR)/debian/@PACKAGE@
+
+%:
+	dh $@
+
+override_dh_auto_configure:
+	mkdir -p build-full
+	$(kmake) defconfig KBUILD_DEFCONFIG=@DEFCONFIG@
+	scripts/kconfig/merge_config.sh -O build-full/ build-full/.config \
+		$(addprefix debian/fragments/,@FRAGMENTS@)
+
+override_dh_auto_build:
+	$(kmake) $(PARALLEL_MAKE) Image modules dtbs
+
+override_dh_auto_install:
+	krel=$$($(MAKE) -s O=build-full kernelrelease) && \
+	install -D -m 644 build-full/arch/arm64/boot/Image $(root)/boot/vmlinux-$$krel && \
+	install -D -m 644 build-full/.config $(root)/boot/config-$$krel && \
+	install -D -m 644 build-full/System.map $(root)/boot/System.map-$$krel && \
+	ln -s vmlinux-$$krel $(root)/boot/vmlinux && \
+	$(kmake) INSTALL_MOD_PATH=$(root)/usr INSTALL_MOD_STRIP=1 modules_install && \
+	rm -f $(root)/usr/lib/modules/$$krel/build && \
+	$(kmake) INSTALL_DTBS_PATH=$(root)/usr/lib/linux-image-$$krel dtbs_install
+
+override_dh_auto_test override_dh_strip override_dh_dwz override_dh_makeshlibs override_dh_shlibdeps:
+RULES
+	sed -i -e 's/@PACKAGE@/linux-image-${KERNEL_NAME_PROVIDED}/' -e 's/@DEFCONFIG@/${KERNEL_DEFCONFIG}/' \
+		-e 's/@FRAGMENTS@/${KERNEL_FRAGMENTS}/' "${S}/debian/rules"
+	chmod 755 "${S}/debian/rules"
+}

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: MIT
+# Work inside the SDK chroot (sdk-chroot.bb). Each call has a mount namespace of its own, in which the
+# chroot lies under an overlay: what a package installs there is gone afterwards, and nothing stays
+# mounted, however the call ends.
+
+# Where a recipe's WORKDIR is seen inside, as in Isar.
+PP = "/home/builder/${BPN}"
+
+# sdk_run [-w] COMMAND [ARGUMENT...]: as root inside; -w also writes to the chroot itself.
+sdk_run() {
+	layer=yes
+	if [ "$1" = -w ]; then
+		layer=no
+		shift
+	fi
+	unshare --mount --pid --fork --kill-child --propagation private \
+		sh -euc '
+		sdk=$1 workdir=$2 pp=$3 ccache=$4 layer=$5
+		shift 5
+		mkdir -p "$workdir" "$ccache"
+		if [ "$layer" = yes ]; then
+			scratch=$workdir/scratch
+			mkdir -p "$scratch"
+			mount -t tmpfs -o mode=755 scratch "$scratch"
+			mkdir "$scratch/upper" "$scratch/work" "$scratch/root"
+			mount -t overlay -o "lowerdir=$sdk,upperdir=$scratch/upper,workdir=$scratch/work" \
+				overlay "$scratch/root"
+			sdk=$scratch/root
+		fi
+		mkdir -p "$sdk$pp" "$sdk/ccache"
+		mount --bind "$workdir" "$sdk$pp"
+		mount --bind "$ccache" "$sdk/ccache"
+		mount -t proc proc "$sdk/proc"
+		mount --bind /dev "$sdk/dev"
+		for file in resolv.conf hosts; do
+			if [ -e "/etc/$file" ]; then
+				cp -L "/etc/$file" "$sdk/etc/$file"
+			fi
+		done
+		exec chroot "$sdk" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 \
+			DEBIAN_FRONTEND=noninteractive SOURCE_DATE_EPOCH="$SOURCE_DATE_EPOCH" \
+			PARALLEL_MAKE="$PARALLEL_MAKE" CCACHE_DIR=/ccache "$@"
+		' sdk-run "${SDK_DIR}" "${WORKDIR}" "${PP}" "${CCACHE_DIR}" "$layer" "$@"
+}
+export PARALLEL_MAKE
+sdk_run[vardepsexclude] = "SDK_DIR WORKDIR CCACHE_DIR"
+
+# The machine's own Debian mirror: $ECDAQ_APT_MIRROR, else what apt is set up with.
+def apt_sources(d, suite, components):
+    import subprocess
+    mirror = d.getVar("ECDAQ_APT_MIRROR")
+    security = None
+    if not mirror:
+        listed = subprocess.run(
+            ["apt-get", "indextargets", "--format", "$(CODENAME) $(SITE)", "Created-By: Packages"],
+            check=True, capture_output=True, text=True).stdout.split("\n")
+        sites = [line.split(" ", 1) for line in listed if " " in line]
+        codenames = ("bookworm", "trixie", "forky", "sid")
+        mirror = next((site for name, site in sites if name in codenames), None)
+        security = next((s for n, s in sites if n.endswith("-security")), None)
+    if not mirror:
+        bb.fatal("no Debian mirror in this machine's apt sources: give one in ECDAQ_APT_MIRROR")
+    lines = [f"deb {mirror} {suite} {components}", f"deb {mirror} {suite}-updates {components}"]
+    if security:
+        lines.append(f"deb {security} {suite}-security {components}")
+    return lines

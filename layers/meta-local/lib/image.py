@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: MIT
+"""From a root file system to the files of an image: what make-disk.sh lays together, and the papers
+that belong to it (package list, bill of materials, checksums)."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import subprocess
+import uuid
+from dataclasses import dataclass
+from pathlib import Path
+
+import sbom
+import wks
+
+NAMESPACE = uuid.UUID("6ba7b811-9dad-11d1-80b4-00c04fd430c8")
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What an image is made of; all paths are on the building machine."""
+
+    work: str
+    rootfs: str
+    wks: str
+    name: str
+    cmdline: str
+    boot_files: list[str]
+    dtb_files: list[str]
+    version: str
+    machine: str
+    epoch: int
+
+
+def _unpack(tar: Path, rootfs: Path) -> None:
+    subprocess.run(
+        ["tar", "-xpf", tar, "--numeric-owner", "--xattrs", "--xattrs-include=*", "-C", rootfs],
+        check=True,
+    )
+
+
+def _deploy_kernel(inputs: Inputs, out: Path) -> None:
+    """Kernel and device trees stand beside the image, as Isar lays them."""
+    rootfs = Path(inputs.rootfs)
+    shutil.copy(rootfs / "boot" / "vmlinux", out / f"{inputs.name}-vmlinux")
+    for dtb in inputs.dtb_files:
+        found = sorted(rootfs.glob(f"usr/lib/linux-image-*/{dtb}"))
+        if not found:
+            raise FileNotFoundError(f"DTB_FILES: {dtb} is not in the kernel package")
+        shutil.copy(found[0], out)
+
+
+def _fill_boot(inputs: Inputs, out: Path, boot: Path) -> None:
+    """The boot partition: IMAGE_BOOT_FILES ("source;target"), cmdline.txt, the ecdaq folder."""
+    for entry in inputs.boot_files:
+        source, _, target = entry.partition(";")
+        found = out / source
+        if not found.exists():
+            found = Path(inputs.rootfs) / source
+        if not found.exists():
+            raise FileNotFoundError(f"IMAGE_BOOT_FILES: {source} is neither deployed nor in the root")
+        place = boot / (target or found.name)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        if found.is_dir():
+            shutil.copytree(found, place, dirs_exist_ok=True)
+        else:
+            shutil.copy(found, place)
+    (boot / "cmdline.txt").write_text(inputs.cmdline + "\n")
+    template = Path(inputs.rootfs) / "usr/share/ecdaq/boot"
+    if template.is_dir():
+        shutil.copytree(template, boot, dirs_exist_ok=True)
+    for path in [boot, *boot.rglob("*")]:
+        os.utime(path, (inputs.epoch, inputs.epoch))
+
+
+def _plan(inputs: Inputs, layout: wks.Layout) -> str:
+    """What make-disk.sh reads: one shell-safe line for the disk, one for each partition."""
+    lines = [f"disk {inputs.name} {layout.table} {uuid.uuid5(NAMESPACE, inputs.name)}"]
+    for part in layout.partitions:
+        given = part.uuid or str(uuid.uuid5(NAMESPACE, f"{inputs.name}/{part.label}"))
+        lines.append(
+            f"part {part.source or 'empty'} {part.fstype or 'none'} {part.label}"
+            f" {part.size_bytes} {given}"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def prepare(inputs: Inputs) -> None:
+    """Lay ready in work/disk what make-disk.sh puts together; papers go to work/out."""
+    work = Path(inputs.work)
+    out = work / "out"
+    shutil.rmtree(out, ignore_errors=True)
+    out.mkdir()
+    tar = work / "tar" / "rootfs.tar"
+    _unpack(tar, Path(inputs.rootfs))
+    _deploy_kernel(inputs, out)
+    layout = wks.parse(Path(inputs.wks))
+    boot = work / "disk" / "boot"
+    boot.mkdir(parents=True)
+    _fill_boot(inputs, out, boot)
+    (work / "disk" / "plan").write_text(_plan(inputs, layout))
+    packages = sbom.installed_packages(Path(inputs.rootfs))
+    (out / f"{inputs.name}.manifest").write_text(sbom.manifest(packages))
+    (out / f"{inputs.name}.spdx.json").write_text(
+        sbom.spdx(packages, inputs.name, inputs.version, inputs.epoch)
+    )
+    (out / f"{inputs.name}.cmdline").write_text(inputs.cmdline + "\n")
+    with tar.open("rb") as stream:
+        digest = hashlib.file_digest(stream, "sha256").hexdigest()
+    (out / f"{inputs.name}.rootfs.sha256").write_text(f"{digest}  rootfs.tar\n")
+
+
+def finish(work: str, name: str) -> None:
+    """Checksums of all that was made."""
+    out = Path(work) / "out"
+    lines = []
+    for path in sorted(p for p in out.iterdir() if p.suffix != ".sha256"):
+        with path.open("rb") as stream:
+            lines.append(f"{hashlib.file_digest(stream, 'sha256').hexdigest()}  {path.name}\n")
+    (out / f"{name}.sha256").write_text("".join(lines))

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: MIT
+"""Package list and bill of materials (SPDX 2.3, JSON) of a Debian root file system."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+DEP5 = re.compile(r"^Format:.*copyright-format", re.MULTILINE)
+LICENSE = re.compile(r"^License:[ \t]*(\S[^\n]*)$", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Package:
+    """One installed package, as dpkg knows it."""
+
+    name: str
+    version: str
+    architecture: str
+    source: str
+    source_version: str
+    maintainer: str
+    homepage: str
+    licenses: tuple[str, ...]
+
+
+def _stanza(text: str) -> dict[str, str]:
+    fields: dict[str, str] = {}
+    for line in text.splitlines():
+        name, colon, value = line.partition(":")
+        if colon and not line.startswith((" ", "\t")):
+            fields[name] = value.strip()
+    return fields
+
+
+def _licenses(rootfs: Path, package: str) -> tuple[str, ...]:
+    """The licences that a machine-readable copyright file names; none where it is prose."""
+    path = rootfs / "usr/share/doc" / package / "copyright"
+    if not path.exists():
+        return ()
+    text = path.read_text(errors="replace")
+    return tuple(sorted(set(LICENSE.findall(text)))) if DEP5.search(text) else ()
+
+
+def installed_packages(rootfs: Path) -> list[Package]:
+    """All packages with status "installed", by name."""
+    packages = []
+    for block in (rootfs / "var/lib/dpkg/status").read_text().split("\n\n"):
+        fields = _stanza(block)
+        if not fields.get("Status", "").endswith(" installed"):
+            continue
+        source, _, rest = fields.get("Source", fields["Package"]).partition(" ")
+        packages.append(
+            Package(
+                name=fields["Package"],
+                version=fields["Version"],
+                architecture=fields["Architecture"],
+                source=source,
+                source_version=rest.strip("()") or fields["Version"],
+                maintainer=fields.get("Maintainer", ""),
+                homepage=fields.get("Homepage", ""),
+                licenses=_licenses(rootfs, fields["Package"]),
+            )
+        )
+    return sorted(packages, key=lambda p: (p.name, p.architecture))
+
+
+def manifest(packages: list[Package]) -> str:
+    """One line a package: name, architecture, version, source and its version."""
+    return "".join(
+        f"{p.name}\t{p.architecture}\t{p.version}\t{p.source}\t{p.source_version}\n"
+        for p in packages
+    )
+
+
+def _entry(package: Package) -> dict[str, object]:
+    known = "; ".join(package.licenses)
+    return {
+        "SPDXID": "SPDXRef-" + re.sub(r"[^A-Za-z0-9.-]", "-", package.name),
+        "name": package.name,
+        "versionInfo": package.version,
+        "supplier": f"Person: {package.maintainer}" if package.maintainer else "NOASSERTION",
+        "downloadLocation": "NOASSERTION",
+        "filesAnalyzed": False,
+        "homepage": package.homepage or "NOASSERTION",
+        "licenseConcluded": "NOASSERTION",
+        "licenseDeclared": "NOASSERTION",
+        "licenseComments": (
+            f"debian/copyright names: {known}"
+            if known
+            else f"see usr/share/doc/{package.name}/copyright in the image"
+        ),
+        "copyrightText": "NOASSERTION",
+        "primaryPackagePurpose": "INSTALL",
+        "externalRefs": [
+            {
+                "referenceCategory": "PACKAGE-MANAGER",
+                "referenceType": "purl",
+                "referenceLocator": (
+                    f"pkg:deb/debian/{package.name}@{package.version}?arch={package.architecture}"
+                ),
+            }
+        ],
+    }
+
+
+def spdx(packages: list[Package], name: str, version: str, epoch: int) -> str:
+    """The document; equal packages give equal bytes."""
+    digest = hashlib.sha256(manifest(packages).encode()).hexdigest()
+    entries = [_entry(p) for p in packages]
+    document = {
+        "spdxVersion": "SPDX-2.3",
+        "dataLicense": "CC0-1.0",
+        "SPDXID": "SPDXRef-DOCUMENT",
+        "name": f"{name}-{version}",
+        "documentNamespace": f"urn:ecdaq:sbom:{name}:{digest}",
+        "creationInfo": {
+            "created": datetime.fromtimestamp(epoch, UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
+            "creators": ["Tool: ecdaq-image"],
+        },
+        "packages": entries,
+        "relationships": [
+            {
+                "spdxElementId": "SPDXRef-DOCUMENT",
+                "relationshipType": "DESCRIBES",
+                "relatedSpdxElement": entry["SPDXID"],
+            }
+            for entry in entries
+        ],
+    }
+    return json.dumps(document, indent=1) + "\n"

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: MIT
+SUMMARY = "Cross-build chroot: amd64 with the arm64 compiler and libraries, and the image tools"
+DESCRIPTION = "Debian of the image's own suite, so that programs link what the image has."
+SECTION = "devel"
+LICENSE = "MIT"
+
+inherit sdk-run
+
+# What recipes build with.
+SDK_PREINSTALL = "crossbuild-essential-${DISTRO_ARCH} ccache cmake debhelper dpkg-dev fakeroot \
+                  ninja-build patch pkgconf python3 xz-utils zstd"
+# What the kernel builds with.
+SDK_PREINSTALL += "bc bison cpio flex kmod libelf-dev libssl-dev rsync"
+# What images are made with.
+SDK_PREINSTALL += "bmap-tools dosfstools e2fsprogs fdisk mtools"
+# What images are booted with.
+SDK_PREINSTALL += "qemu-system-arm"
+# What our programs link; each is a Build-Depends of a recipe, too.
+SDK_PREINSTALL += "libyaml-dev:${DISTRO_ARCH} libzstd-dev:${DISTRO_ARCH} zlib1g-dev:${DISTRO_ARCH} \
+                   libgpiod-dev:${DISTRO_ARCH} cyclonedds-dev:${DISTRO_ARCH} cyclonedds-tools"
+
+do_bootstrap[dirs] = "${TMPDIR}"
+do_bootstrap[network] = "1"
+python do_bootstrap() {
+    import shutil
+    sdk = d.getVar("SDK_DIR")
+    shutil.rmtree(sdk, ignore_errors=True)
+    os.makedirs(os.path.dirname(sdk), exist_ok=True)
+    suite = d.getVar("BASE_DISTRO_CODENAME")
+    sources = apt_sources(d, suite, "main")
+    sources += ["deb-src" + line.removeprefix("deb") for line in sources]
+    include = ",".join(d.getVar("SDK_PREINSTALL").split())
+    bb.process.run(
+        ["mmdebstrap", "--variant=buildd", "--architectures=amd64," + d.getVar("DISTRO_ARCH"),
+         "--include=" + include, "--aptopt=APT::Install-Recommends \"false\"",
+         "--aptopt=Acquire::Retries \"3\"", "--skip=cleanup/apt/lists", suite, sdk, *sources],
+        log=open(d.getVar("BB_LOGFILE"), "a"))
+}
+addtask bootstrap before do_build

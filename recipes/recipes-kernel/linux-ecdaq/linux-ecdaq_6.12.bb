@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: MIT
+SUMMARY = "Linux with PREEMPT_RT for an EtherCAT measurement appliance"
+DESCRIPTION = "Linux ${PV} of Debian, PREEMPT_RT, configured from the fragments in kernel-config"
+HOMEPAGE = "https://www.kernel.org/"
+SECTION = "kernel"
+LICENSE = "GPL-2.0-only WITH Linux-syscall-note"
+LIC_FILES_CHKSUM = "file://COPYING;md5=6bc538ed5bd9a7fc9398086aedcd7e46"
+
+# Debian's source package, the newest of the suite: security updates come with it.
+SRC_URI = "apt://linux \
+           file://base.cfg \
+           file://rt.cfg \
+           file://systemd.cfg \
+           file://net.cfg \
+           file://storage.cfg \
+           file://gpio.cfg \
+           file://watchdog.cfg \
+           file://qemuarm64.cfg \
+           file://raspberrypi4-64.cfg"
+FILESEXTRAPATHS:prepend := "${ECDAQ_TOP}/kernel-config:"
+# One kernel for all machines: what the emulator tests is what a board runs.
+S = "${WORKDIR}/linux"
+
+inherit linux-kernel
+
+KERNEL_NAME_PROVIDED = "ecdaq"
+# "make defconfig KBUILD_DEFCONFIG=defconfig allnoconfig": everything off, then the fragments.
+KERNEL_DEFCONFIG = "defconfig allnoconfig"
