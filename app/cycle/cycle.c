@@ -4,19 +4,9 @@
 #include <errno.h>
 #include <stdatomic.h>
 #include <stdlib.h>
-#include <string.h>
 #include <sys/resource.h>
 
-#include "base/event.h"
-#include "cycle/check.h"
-#include "cycle/dc_servo.h"
-#include "cycle/numbering.h"
-#include "cycle/outputs.h"
-
-#define ADD(field, n)                                                                              \
-	atomic_store_explicit(&(field), atomic_load_explicit(&(field), memory_order_relaxed) + (n), \
-			      memory_order_relaxed)
-#define SET(field, v) atomic_store_explicit(&(field), (v), memory_order_relaxed)
+#include "cycle/cycle_inside.h"
 
 enum {
 	STACK_BYTES = 64 * 1024,     /* touched before the first cycle */
@@ -25,40 +15,6 @@ enum {
 	EVENT_WINDOW_LIMIT = 20,     /* ... at most so many events of one kind */
 	SETTLE_SHARE = 20,           /* slaves have a 20th of the period to put their inputs in place */
 	RIDE_PERCENT = 85,           /* service frames until then */
-};
-
-struct event_gate {
-	uint64_t window;
-	unsigned count;
-};
-
-struct cycle {
-	struct cycle_spec spec;
-	span_t period;
-	int64_t set_point_ns;
-	mono_t deadline;
-	mono_t start;
-	struct dc_servo servo;
-	struct numbering numbering;
-	struct check check;
-	struct outputs outputs;
-	struct sample_header sample; /* of the cycle being made */
-	uint8_t image[LIMIT_IMAGE_BYTES];
-	enum cycle_phase phase;
-	int has_started;
-	int was_fail_safe;
-	int is_latched_safe;         /* overrun policy fail_safe */
-	unsigned lost_in_row;
-	unsigned wkc_low_in_row;
-	uint64_t steps;
-	long faults_at_start;
-	struct event_gate gate[EVENT_COUNT];
-	int result;
-	_Atomic int stop;            /* [any] */
-	_Atomic int wanted_phase;    /* [service] */
-	_Atomic uint64_t dc_sequence;/* [cycle] odd: the pair below is being written */
-	_Atomic int64_t dc_ns;       /* [cycle] */
-	_Atomic int64_t dc_mono_ns;  /* [cycle] */
 };
 
 int cycle_create(const struct cycle_spec *spec, struct cycle **ret_cycle, char *error,
@@ -123,7 +79,7 @@ void cycle_emit(struct cycle *cycle, struct event *ev)
 	ring_push(cycle->spec.events, ev, sizeof(*ev), NULL, 0);
 }
 
-static void emit(struct cycle *cy, enum event_id id, int64_t value, int64_t arg0, int64_t arg1)
+void cycle_note(struct cycle *cy, enum event_id id, int64_t value, int64_t arg0, int64_t arg1)
 {
 	struct event ev = {
 		.id = (uint16_t)id,
@@ -134,58 +90,6 @@ static void emit(struct cycle *cy, enum event_id id, int64_t value, int64_t arg0
 	};
 
 	cycle_emit(cy, &ev);
-}
-
-/* --- numbering: one sample for every SYNC0 edge --- */
-
-static void push_sample(struct cycle *cy)
-{
-	ring_push(cy->spec.samples, &cy->sample, sizeof(cy->sample), cy->image,
-		  cy->spec.plan->image_bytes);
-}
-
-/* The edges that passed while the master was late get a sample, too, with the last known inputs. */
-static void skip_cycles(struct cycle *cy, uint64_t count)
-{
-	struct sample_header kept = cy->sample;
-	uint64_t all = cy->spec.slave_count >= 64 ? UINT64_MAX
-						  : (UINT64_C(1) << cy->spec.slave_count) - 1;
-
-	if (count == 0) {
-		return;
-	}
-	ADD(cy->spec.stats->overruns, 1);
-	ADD(cy->spec.stats->cycles_skipped, count);
-	emit(cy, EVENT_OVERRUN, (int64_t)kept.cycle, (int64_t)count, kept.wake_latency_ns);
-	if (count > NUMBERING_SKIP_LIMIT) {
-		emit(cy, EVENT_NUMBERING_JUMP, (int64_t)(kept.cycle + count), (int64_t)count, 0);
-	} else {
-		for (uint64_t i = 0; i < count; i++) {
-			cy->sample.cycle = kept.cycle + i;
-			cy->sample.dc_time_ns = numbering_dc_time(&cy->numbering, kept.cycle + i);
-			cy->sample.frame_dc_ns = 0;
-			cy->sample.round_trip_ns = -1;
-			cy->sample.wkc = 0;
-			cy->sample.slaves_bad = all;
-			cy->sample.flags |= SAMPLE_SKIPPED;
-			push_sample(cy);
-		}
-	}
-	if (cy->phase == CYCLE_OP) {
-		ADD(cy->spec.stats->samples_bad, count * cy->spec.slave_count);
-		for (size_t i = 0; i < cy->spec.slave_count; i++) {
-			ADD(cy->spec.stats->slave_bad[i], count);
-		}
-	}
-	cy->sample = kept;
-	cy->sample.cycle += count;
-	cy->deadline = mono_add(cy->deadline, (span_t){ (int64_t)count * cy->period.ns });
-	if (cy->spec.cfg->cycle_overrun == CONFIG_OVERRUN_FAIL_SAFE) {
-		cy->is_latched_safe = 1;
-	} else if (cy->spec.cfg->cycle_overrun == CONFIG_OVERRUN_STOP) {
-		cy->result = -ETIME;
-		cycle_stop(cy);
-	}
 }
 
 /* --- wake --- */
@@ -232,7 +136,7 @@ static mono_t wake(struct cycle *cy)
 	}
 	histogram_add(&cy->spec.stats->wake_latency, mono_sub(now, cy->deadline).ns);
 	/* Later than the next SYNC0: the edges in between are lost to this master. */
-	skip_cycles(cy, numbering_skipped(cy->period.ns, cy->set_point_ns,
+	cycle_skip(cy, numbering_skipped(cy->period.ns, cy->set_point_ns,
 					  mono_sub(now, cy->deadline).ns));
 	return now;
 }
@@ -253,204 +157,6 @@ static mono_t receive_deadline(const struct cycle *cy, mono_t now)
 	return wanted.ns < least.ns ? least : wanted;
 }
 
-static void count_frames(struct cycle *cy, const struct exchange_result *res)
-{
-	struct cycle_stats *st = cy->spec.stats;
-
-	ADD(st->cycles, 1);
-	ADD(st->frames_sent, cy->spec.plan->chunk_count);
-	if (res->status == EXCHANGE_NO_FRAME) {
-		ADD(st->frames_lost, 1);
-		cy->sample.flags |= SAMPLE_LOST;
-		cy->lost_in_row++;
-		/* Of a long row the first and then each power of two is enough. */
-		if ((cy->lost_in_row & (cy->lost_in_row - 1)) == 0) {
-			emit(cy, EVENT_FRAME_LOST, (int64_t)cy->sample.cycle, cy->lost_in_row, 0);
-		}
-	} else {
-		cy->lost_in_row = 0;
-		histogram_add(&st->round_trip, res->round_trip.ns);
-	}
-	if (res->late > 0) {
-		ADD(st->frames_late, res->late);
-		cy->sample.flags |= SAMPLE_LATE;
-		emit(cy, EVENT_FRAME_LATE, (int64_t)cy->sample.cycle, res->late_by, 0);
-	}
-	if (res->doubled > 0) {
-		ADD(st->frames_doubled, res->doubled);
-		cy->sample.flags |= SAMPLE_DOUBLED;
-		emit(cy, EVENT_FRAME_DOUBLED, (int64_t)cy->sample.cycle, 0, 0);
-	}
-	ADD(st->frames_foreign, res->foreign);
-}
-
-static void watch_wkc(struct cycle *cy, const struct exchange_result *res)
-{
-	if (res->status == EXCHANGE_WKC_LOW && cy->phase == CYCLE_OP) {
-		ADD(cy->spec.stats->wkc_low, 1);
-		cy->sample.flags |= SAMPLE_WKC_LOW;
-		if (cy->wkc_low_in_row++ == 0) {
-			emit(cy, EVENT_WKC_LOW, (int64_t)cy->sample.cycle, res->wkc,
-			     res->wkc_expected);
-		}
-	} else if (res->status == EXCHANGE_OK && cy->wkc_low_in_row > 0) {
-		emit(cy, EVENT_WKC_OK, (int64_t)cy->sample.cycle, res->wkc, cy->wkc_low_in_row);
-		cy->wkc_low_in_row = 0;
-	}
-}
-
-static void publish_dc(struct cycle *cy, int64_t dc_ns, int64_t mono_ns)
-{
-	uint64_t s = atomic_load_explicit(&cy->dc_sequence, memory_order_relaxed);
-
-	atomic_store_explicit(&cy->dc_sequence, s + 1, memory_order_relaxed);
-	atomic_thread_fence(memory_order_release);
-	SET(cy->dc_ns, dc_ns);
-	SET(cy->dc_mono_ns, mono_ns);
-	atomic_store_explicit(&cy->dc_sequence, s + 2, memory_order_release);
-}
-
-int cycle_dc_now(const struct cycle *cycle, int64_t *ret_dc_ns)
-{
-	const struct platform *pf = &cycle->spec.platform;
-
-	for (int tries = 0; tries < 1000; tries++) {
-		uint64_t s = atomic_load_explicit(&cycle->dc_sequence, memory_order_acquire);
-		int64_t dc_ns = atomic_load_explicit(&cycle->dc_ns, memory_order_relaxed);
-		int64_t mono_ns = atomic_load_explicit(&cycle->dc_mono_ns, memory_order_relaxed);
-
-		atomic_thread_fence(memory_order_acquire);
-		if (s % 2 == 0 &&
-		    atomic_load_explicit(&cycle->dc_sequence, memory_order_relaxed) == s) {
-			if (s == 0) {
-				return -EAGAIN;
-			}
-			*ret_dc_ns = dc_ns + pf->now(pf->ctx).ns - mono_ns;
-			return 0;
-		}
-	}
-	return -EAGAIN;
-}
-
-/* The servo's part: what the frame's DC time says about the next deadline. Returns the correction. */
-static int64_t follow_reference(struct cycle *cy, const struct exchange_result *res)
-{
-	struct cycle_stats *st = cy->spec.stats;
-	enum dc_state before = cy->servo.state;
-	struct dc_servo_result servo;
-
-	if (before == DC_OFF) {
-		return 0;
-	}
-	if (res->status == EXCHANGE_NO_FRAME || res->dc_time_ns == 0) {
-		servo = dc_servo_coast(&cy->servo);
-	} else {
-		servo = dc_servo_update(&cy->servo, res->dc_time_ns,
-					mono_sub(res->sent, cy->deadline).ns);
-		publish_dc(cy, res->dc_time_ns, res->sent.ns);
-		cy->sample.frame_dc_ns = res->dc_time_ns;
-		cy->sample.phase_error_ns = (int32_t)servo.error_ns;
-	}
-	if (cy->servo.state == DC_LOCKED) {
-		if (before != DC_LOCKED) {
-			emit(cy, EVENT_DC_LOCKED, (int64_t)cy->sample.cycle, servo.error_ns, 0);
-		}
-		if (st->dc_lock_ns == 0) {
-			SET(st->dc_lock_ns,
-			    mono_sub((mono_t){ cy->sample.wake_mono_ns }, cy->start).ns);
-		}
-		if (cy->sample.frame_dc_ns != 0) {
-			histogram_add(&st->phase, servo.error_ns);
-		}
-		if (res->dc_diff_ns > st->dc_diff_max_ns) {
-			SET(st->dc_diff_max_ns, res->dc_diff_ns);
-		}
-	} else {
-		cy->sample.flags |= SAMPLE_DC_UNLOCKED;
-		if (before == DC_LOCKED) {
-			ADD(st->dc_unlocks, 1);
-			emit(cy, EVENT_DC_UNLOCKED, (int64_t)cy->sample.cycle, servo.error_ns, 0);
-		}
-	}
-	SET(st->dc_state, cy->servo.state);
-	SET(st->correction_ppb,
-	    (int64_t)(cy->servo.integral_ns * 1e9 / (double)cy->period.ns));
-	return servo.correction_ns;
-}
-
-/*
- * Which SYNC0 edge the frame's inputs belong to, by the DC time at which it passed. 1 if it was in its
- * window; 0 if it passed while the slaves were still putting the edge's inputs in place.
- */
-static int place_in_grid(struct cycle *cy, const struct exchange_result *res)
-{
-	struct numbering_place place;
-
-	if (cy->phase == CYCLE_CLOCKS || res->dc_time_ns == 0 || cy->servo.state == DC_OFF) {
-		return 1;
-	}
-	place = numbering_place(&cy->numbering, cy->sample.cycle, res->dc_time_ns);
-	if (place.was_rebased) {
-		emit(cy, EVENT_NUMBERING_JUMP, (int64_t)cy->sample.cycle, 0, 0);
-		check_restart(&cy->check);
-	}
-	if (place.passed_edges > 0) {
-		skip_cycles(cy, place.passed_edges);
-	}
-	return place.is_in_window;
-}
-
-/* --- judge and hand over --- */
-
-static void count_bad(struct cycle *cy, uint64_t bad, int is_explained)
-{
-	struct cycle_stats *st = cy->spec.stats;
-	uint64_t bad_count = 0;
-
-	for (size_t i = 0; i < cy->spec.slave_count; i++) {
-		if (bad >> i & 1) {
-			bad_count++;
-			ADD(st->slave_bad[i], 1);
-		} else {
-			ADD(st->slave_good[i], 1);
-		}
-	}
-	ADD(st->samples_bad, bad_count);
-	ADD(st->samples_good, cy->spec.slave_count - bad_count);
-	if (!is_explained) {
-		ADD(st->samples_bad_unexplained, bad_count);
-	}
-}
-
-static void judge(struct cycle *cy, const struct exchange_result *res, int is_in_window)
-{
-	uint64_t all = cy->spec.slave_count >= 64 ? UINT64_MAX
-						  : (UINT64_C(1) << cy->spec.slave_count) - 1;
-	struct check_fault fault;
-
-	if (cy->phase != CYCLE_OP) {
-		cy->sample.flags |= SAMPLE_NOT_OP;
-		cy->sample.slaves_bad = all;
-		return;
-	}
-	if (res->status != EXCHANGE_OK || !is_in_window) {
-		cy->sample.slaves_bad = all;
-		count_bad(cy, all, res->status != EXCHANGE_WKC_LOW);
-		return;
-	}
-	cy->sample.slaves_bad = check_image(&cy->check, cy->image, cy->sample.cycle, &fault);
-	if (cy->sample.slaves_bad != 0) {
-		struct event ev = { .id = EVENT_COUNTER_BAD,
-				    .slave_pos = fault.slave_pos,
-				    .value = (int64_t)cy->sample.cycle,
-				    .arg = { (int32_t)fault.seen, (int32_t)fault.expected } };
-
-		cy->sample.flags |= SAMPLE_BAD_COUNTER;
-		cycle_emit(cy, &ev);
-	}
-	count_bad(cy, cy->sample.slaves_bad, 0);
-}
-
 static void choose_outputs(struct cycle *cy, uint8_t *image)
 {
 	int is_live = cy->phase == CYCLE_OP && !cy->is_latched_safe;
@@ -458,7 +164,7 @@ static void choose_outputs(struct cycle *cy, uint8_t *image)
 	int is_fail_safe = !is_live || timed_out > 0;
 
 	if (is_fail_safe && !cy->was_fail_safe) {
-		emit(cy, EVENT_OUTPUT_FAIL_SAFE, 0, (int64_t)timed_out, 0);
+		cycle_note(cy, EVENT_OUTPUT_FAIL_SAFE, 0, (int64_t)timed_out, 0);
 	}
 	cy->was_fail_safe = is_fail_safe;
 	SET(cy->spec.stats->is_fail_safe, (uint32_t)is_fail_safe);
@@ -492,22 +198,21 @@ void cycle_step(struct cycle *cy)
 		cy->sample.flags |= SAMPLE_FAIL_SAFE;
 	}
 	res = exchange_run(cy->spec.exchange, cy->image, receive_deadline(cy, now));
-	count_frames(cy, &res);
-	watch_wkc(cy, &res);
-	correction_ns = follow_reference(cy, &res);
-	is_in_window = place_in_grid(cy, &res);
+	cycle_count_frames(cy, &res);
+	correction_ns = cycle_follow(cy, &res);
+	is_in_window = cycle_place(cy, &res);
 	if (!is_in_window && res.status == EXCHANGE_OK) {
 		ADD(st->frames_late, 1);
 		cy->sample.flags |= SAMPLE_LATE;
 	}
 	outputs_sent(&cy->outputs, cy->sample.cycle);
-	judge(cy, &res, is_in_window);
+	cycle_judge(cy, &res, is_in_window);
 
 	cy->sample.dc_time_ns = numbering_dc_time(&cy->numbering, cy->sample.cycle);
 	cy->sample.wkc = res.wkc;
 	cy->sample.round_trip_ns = res.round_trip.ns < 0 ? -1 : (int32_t)res.round_trip.ns;
 	cy->sample.dc_diff_ns = (int32_t)(res.dc_diff_ns > INT32_MAX ? INT32_MAX : res.dc_diff_ns);
-	push_sample(cy);
+	cycle_push_sample(cy);
 	choose_outputs(cy, cy->image);
 
 	SET(st->cycle_number, cy->sample.cycle);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "image/image.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <inttypes.h>
 #include <math.h>
@@ -40,6 +41,7 @@ uint64_t image_get_raw(const uint8_t *image, const struct channel *ch)
 	unsigned got = 8 - shift;
 	uint64_t raw = (uint64_t)(*p++ >> shift);
 
+	assert(ch->bit_len <= 64);
 	while (got < ch->bit_len) {
 		raw |= (uint64_t)*p++ << got;
 		got += 8;
@@ -68,8 +70,10 @@ void image_set_raw(uint8_t *image, const struct channel *ch, uint64_t raw)
 
 static int64_t sign_extended(const struct channel *ch, uint64_t raw)
 {
-	uint64_t sign = UINT64_C(1) << (ch->bit_len - 1);
+	uint64_t sign;
 
+	assert(ch->bit_len >= 1 && ch->bit_len <= 64);
+	sign = UINT64_C(1) << (ch->bit_len - 1);
 	return (int64_t)((raw ^ sign) - sign);
 }
 

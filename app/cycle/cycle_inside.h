@@ -1,0 +1,81 @@
+/* SPDX-License-Identifier: MIT */
+/* Between the files of the cycle; not for others. */
+#ifndef CYCLE_CYCLE_INSIDE_H
+#define CYCLE_CYCLE_INSIDE_H
+
+#include <stdatomic.h>
+
+#include "base/event.h"
+#include "cycle/check.h"
+#include "cycle/cycle.h"
+#include "cycle/dc_servo.h"
+#include "cycle/numbering.h"
+#include "cycle/outputs.h"
+
+/* The statistics have one writer: no read-modify-write is needed. */
+#define ADD(field, n)                                                                              \
+	atomic_store_explicit(&(field), atomic_load_explicit(&(field), memory_order_relaxed) + (n), \
+			      memory_order_relaxed)
+#define SET(field, v) atomic_store_explicit(&(field), (v), memory_order_relaxed)
+
+
+struct event_gate {
+	uint64_t window;
+	unsigned count;
+};
+
+struct cycle {
+	struct cycle_spec spec;
+	span_t period;
+	int64_t set_point_ns;
+	mono_t deadline;
+	mono_t start;
+	struct dc_servo servo;
+	struct numbering numbering;
+	struct check check;
+	struct outputs outputs;
+	struct sample_header sample; /* of the cycle being made */
+	uint8_t image[LIMIT_IMAGE_BYTES];
+	enum cycle_phase phase;
+	int has_started;
+	int was_fail_safe;
+	int is_latched_safe;         /* overrun policy fail_safe */
+	unsigned lost_in_row;
+	unsigned wkc_low_in_row;
+	uint64_t steps;
+	long faults_at_start;
+	struct event_gate gate[EVENT_COUNT];
+	int result;
+	_Atomic int stop;            /* [any] */
+	_Atomic int wanted_phase;    /* [service] */
+	_Atomic uint64_t dc_sequence;/* [cycle] odd: the pair below is being written */
+	_Atomic int64_t dc_ns;       /* [cycle] */
+	_Atomic int64_t dc_mono_ns;  /* [cycle] */
+};
+
+/* Push an event of this cycle without a slave; arguments are clamped to int32. */
+void cycle_note(struct cycle *cy, enum event_id id, int64_t value, int64_t arg0, int64_t arg1);
+
+/* --- cycle_follow.c: frames and the reference clock --- */
+
+/** Count what became of the cycle's frames. */
+void cycle_count_frames(struct cycle *cy, const struct exchange_result *res);
+/** What the frame's DC time says about the next deadline: the correction, ns. */
+int64_t cycle_follow(struct cycle *cy, const struct exchange_result *res);
+
+/* --- cycle_judge.c: one sample for every SYNC0 edge --- */
+
+/** The mask of all slaves. */
+uint64_t cycle_all_slaves(const struct cycle *cy);
+void cycle_push_sample(struct cycle *cy);
+/** The next @count edges passed while the master was late: each gets a sample with the last known inputs. */
+void cycle_skip(struct cycle *cy, uint64_t count);
+/**
+ * Which SYNC0 edge the frame's inputs belong to, by the DC time at which it passed. 1 if it was in its
+ * window; 0 if it passed while the slaves were still putting the edge's inputs in place.
+ */
+int cycle_place(struct cycle *cy, const struct exchange_result *res);
+/** Is each slave's sample good? Flags and counters say so. */
+void cycle_judge(struct cycle *cy, const struct exchange_result *res, int is_in_window);
+
+#endif

@@ -1,0 +1,124 @@
+/* SPDX-License-Identifier: MIT */
+#include "cycle/cycle_inside.h"
+
+#include <errno.h>
+
+uint64_t cycle_all_slaves(const struct cycle *cy)
+{
+	return cy->spec.slave_count >= 64 ? UINT64_MAX
+					  : (UINT64_C(1) << cy->spec.slave_count) - 1;
+}
+
+void cycle_push_sample(struct cycle *cy)
+{
+	ring_push(cy->spec.samples, &cy->sample, sizeof(cy->sample), cy->image,
+		  cy->spec.plan->image_bytes);
+}
+
+void cycle_skip(struct cycle *cy, uint64_t count)
+{
+	struct sample_header kept = cy->sample;
+	uint64_t all = cycle_all_slaves(cy);
+
+	if (count == 0) {
+		return;
+	}
+	ADD(cy->spec.stats->overruns, 1);
+	ADD(cy->spec.stats->cycles_skipped, count);
+	cycle_note(cy, EVENT_OVERRUN, (int64_t)kept.cycle, (int64_t)count, kept.wake_latency_ns);
+	if (count > NUMBERING_SKIP_LIMIT) {
+		cycle_note(cy, EVENT_NUMBERING_JUMP, (int64_t)(kept.cycle + count), (int64_t)count, 0);
+	} else {
+		for (uint64_t i = 0; i < count; i++) {
+			cy->sample.cycle = kept.cycle + i;
+			cy->sample.dc_time_ns = numbering_dc_time(&cy->numbering, kept.cycle + i);
+			cy->sample.frame_dc_ns = 0;
+			cy->sample.round_trip_ns = -1;
+			cy->sample.wkc = 0;
+			cy->sample.slaves_bad = all;
+			cy->sample.flags |= SAMPLE_SKIPPED;
+			cycle_push_sample(cy);
+		}
+	}
+	if (cy->phase == CYCLE_OP) {
+		ADD(cy->spec.stats->samples_bad, count * cy->spec.slave_count);
+		for (size_t i = 0; i < cy->spec.slave_count; i++) {
+			ADD(cy->spec.stats->slave_bad[i], count);
+		}
+	}
+	cy->sample = kept;
+	cy->sample.cycle += count;
+	cy->deadline = mono_add(cy->deadline, (span_t){ (int64_t)count * cy->period.ns });
+	if (cy->spec.cfg->cycle_overrun == CONFIG_OVERRUN_FAIL_SAFE) {
+		cy->is_latched_safe = 1;
+	} else if (cy->spec.cfg->cycle_overrun == CONFIG_OVERRUN_STOP) {
+		cy->result = -ETIME;
+		cycle_stop(cy);
+	}
+}
+
+int cycle_place(struct cycle *cy, const struct exchange_result *res)
+{
+	struct numbering_place place;
+
+	if (cy->phase == CYCLE_CLOCKS || res->dc_time_ns == 0 || cy->servo.state == DC_OFF) {
+		return 1;
+	}
+	place = numbering_place(&cy->numbering, cy->sample.cycle, res->dc_time_ns);
+	if (place.was_rebased) {
+		cycle_note(cy, EVENT_NUMBERING_JUMP, (int64_t)cy->sample.cycle, 0, 0);
+		check_restart(&cy->check);
+	}
+	if (place.passed_edges > 0) {
+		cycle_skip(cy, place.passed_edges);
+	}
+	return place.is_in_window;
+}
+
+static void count_bad(struct cycle *cy, uint64_t bad, int is_explained)
+{
+	struct cycle_stats *st = cy->spec.stats;
+	uint64_t bad_count = 0;
+
+	for (size_t i = 0; i < cy->spec.slave_count; i++) {
+		if (bad >> i & 1) {
+			bad_count++;
+			ADD(st->slave_bad[i], 1);
+		} else {
+			ADD(st->slave_good[i], 1);
+		}
+	}
+	ADD(st->samples_bad, bad_count);
+	ADD(st->samples_good, cy->spec.slave_count - bad_count);
+	if (!is_explained) {
+		ADD(st->samples_bad_unexplained, bad_count);
+	}
+}
+
+void cycle_judge(struct cycle *cy, const struct exchange_result *res, int is_in_window)
+{
+	uint64_t all = cycle_all_slaves(cy);
+	struct check_fault fault;
+
+	if (cy->phase != CYCLE_OP) {
+		cy->sample.flags |= SAMPLE_NOT_OP;
+		cy->sample.slaves_bad = all;
+		return;
+	}
+	if (res->status != EXCHANGE_OK || !is_in_window) {
+		cy->sample.slaves_bad = all;
+		count_bad(cy, all, res->status != EXCHANGE_WKC_LOW);
+		return;
+	}
+	cy->sample.slaves_bad = check_image(&cy->check, cy->image, cy->sample.cycle, &fault);
+	if (cy->sample.slaves_bad != 0) {
+		struct event ev = { .id = EVENT_COUNTER_BAD,
+				    .slave_pos = fault.slave_pos,
+				    .value = (int64_t)cy->sample.cycle,
+				    .arg = { (int32_t)fault.seen, (int32_t)fault.expected } };
+
+		cy->sample.flags |= SAMPLE_BAD_COUNTER;
+		cycle_emit(cy, &ev);
+	}
+	count_bad(cy, cy->sample.slaves_bad, 0);
+}
