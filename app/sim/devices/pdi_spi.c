@@ -1,0 +1,224 @@
+/* SPDX-License-Identifier: MIT */
+#include "sim/devices/pdi_spi.h"
+
+#include <string.h>
+
+#include "wire/esc_reg.h"
+
+enum spi_command {
+	SPI_NOP = 0,
+	SPI_READ = 2,
+	SPI_READ_WAIT_STATE = 3,
+	SPI_WRITE = 4,
+	SPI_ADDRESS_EXTENSION = 6,
+	SPI_TERMINATION = 0xff,
+	ADDRESS_OCTETS = 2,
+};
+
+void pdi_spi_init(struct pdi_spi *spi, struct esc *esc, int64_t t_ns)
+{
+	memset(spi, 0, sizeof(*spi));
+	spi->esc = esc;
+	spi->now_ns = t_ns;
+}
+
+void pdi_spi_idle_until(struct pdi_spi *spi, int64_t t_ns)
+{
+	if (t_ns > spi->now_ns) {
+		spi->now_ns = t_ns;
+		spi->tenths = 0;
+	}
+}
+
+/* --- posted writes --- */
+
+int64_t pdi_spi_due_ns(const struct pdi_spi *spi)
+{
+	return spi->posted_count == 0 ? INT64_MAX : spi->posted[spi->posted_first].at_ns;
+}
+
+void pdi_spi_settle(struct pdi_spi *spi, int64_t t_ns)
+{
+	while (spi->posted_count > 0 && spi->posted[spi->posted_first].at_ns <= t_ns) {
+		const struct pdi_spi_write *w = &spi->posted[spi->posted_first];
+
+		esc_pdi_write(spi->esc, w->at_ns, w->address, w->data, w->len);
+		spi->posted_first = (spi->posted_first + 1) % PDI_SPI_POSTED;
+		spi->posted_count--;
+	}
+}
+
+static void post(struct pdi_spi *spi)
+{
+	struct pdi_spi_write *w = &spi->write;
+	struct pdi_spi_write *slot;
+
+	if (w->len == 0) {
+		return;
+	}
+	if (spi->posted_count == PDI_SPI_POSTED) {
+		/* More than a real main loop does between two events: the oldest lands early. */
+		pdi_spi_settle(spi, pdi_spi_due_ns(spi));
+	}
+	slot = &spi->posted[(spi->posted_first + spi->posted_count) % PDI_SPI_POSTED];
+	slot->at_ns = spi->now_ns;
+	slot->address = w->address;
+	slot->len = w->len;
+	memcpy(slot->data, w->data, w->len);
+	spi->posted_count++;
+	w->address = (uint16_t)(w->address + w->len);
+	w->len = 0;
+}
+
+/* --- one access --- */
+
+void pdi_spi_select(struct pdi_spi *spi)
+{
+	pdi_spi_settle(spi, spi->now_ns); /* what came before is in order before this */
+	esc_pdi_read(spi->esc, spi->now_ns, ESC_REG_AL_EVENT_REQUEST, spi->al_event,
+		     sizeof(spi->al_event));
+	spi->is_broken = spi->is_selected;
+	spi->is_selected = 1;
+	spi->pos = 0;
+	spi->data_pos = 0;
+	spi->is_terminated = 0;
+	spi->latched_len = 0;
+	spi->write.len = 0;
+}
+
+static void begin(struct pdi_spi *spi, unsigned command, unsigned data_pos)
+{
+	spi->command = (uint8_t)command;
+	spi->data_pos = data_pos;
+	spi->write.address = spi->address;
+	switch (command) {
+	case SPI_NOP:
+	case SPI_READ:
+	case SPI_WRITE:
+		break;
+	case SPI_READ_WAIT_STATE:
+		spi->data_pos++;
+		break;
+	default: /* three bits of the wire; the rest is reserved */
+		spi->is_broken = 1;
+		break;
+	}
+}
+
+/* A[12:5]; A[4:0] and command; after the extension command A[15:13], command and two zeros. */
+static uint8_t take_address(struct pdi_spi *spi, uint8_t out)
+{
+	unsigned at = spi->pos;
+
+	spi->header[at] = out;
+	if (at == 1) {
+		spi->address = (uint16_t)(spi->header[0] << 5 | out >> 3);
+		if ((out & 7) != SPI_ADDRESS_EXTENSION) {
+			begin(spi, out & 7u, ADDRESS_OCTETS);
+		}
+	} else if (at == 2) {
+		spi->address = (uint16_t)(spi->address | (out >> 5) << 13);
+		spi->is_broken |= (out & 3) != 0;
+		begin(spi, out >> 2 & 7u, ADDRESS_OCTETS + 1);
+	}
+	return spi->al_event[at];
+}
+
+/* The 64-bit times are taken as a whole with their first octet (data sheet, 0x0910 and 0x0990). */
+static void latch(struct pdi_spi *spi)
+{
+	int is_time = spi->address >= ESC_REG_DC_RECEIVE_TIME_PORT &&
+		      spi->address < ESC_REG_DC_SYNC1_CYCLE && spi->address % 8 == 0 &&
+		      spi->address != (ESC_REG_DC_SYNC0_STATUS & ~7);
+
+	if (is_time) {
+		spi->latched_len = sizeof(spi->latched);
+		esc_pdi_read(spi->esc, spi->now_ns, spi->address, spi->latched,
+			     sizeof(spi->latched));
+	}
+}
+
+static uint8_t read_octet(struct pdi_spi *spi)
+{
+	unsigned n = spi->pos - spi->data_pos;
+	uint8_t value;
+
+	if (n == 0) {
+		latch(spi);
+	}
+	if (n < spi->latched_len) {
+		return spi->latched[n];
+	}
+	esc_pdi_read(spi->esc, spi->now_ns, (uint16_t)(spi->address + n), &value, 1);
+	return value;
+}
+
+static uint8_t take_data(struct pdi_spi *spi, uint8_t out)
+{
+	if (spi->command == SPI_READ || spi->command == SPI_READ_WAIT_STATE) {
+		spi->is_broken |= spi->is_terminated; /* clocked on after the termination */
+		spi->is_terminated = out == SPI_TERMINATION;
+		return read_octet(spi);
+	}
+	if (spi->command == SPI_WRITE) {
+		if (spi->write.len == PDI_SPI_BURST) {
+			post(spi);
+		}
+		spi->write.data[spi->write.len++] = out;
+	} else {
+		spi->is_broken = 1;
+	}
+	return 0;
+}
+
+static int is_header(const struct pdi_spi *spi)
+{
+	return spi->pos < ADDRESS_OCTETS ||
+	       (spi->pos == ADDRESS_OCTETS && spi->data_pos == 0);
+}
+
+uint8_t pdi_spi_transfer(struct pdi_spi *spi, uint8_t out)
+{
+	uint8_t in = 0;
+
+	spi->octets++;
+	if (!spi->is_selected || spi->is_broken) {
+		in = 0xff; /* MISO is pulled up */
+	} else if (is_header(spi)) {
+		in = take_address(spi, out);
+	} else if (spi->pos >= spi->data_pos) {
+		in = take_data(spi, out);
+	}
+	spi->pos++;
+	spi->tenths += PDI_SPI_OCTET_TENTH_NS;
+	spi->now_ns += spi->tenths / 10;
+	spi->tenths %= 10;
+	return in;
+}
+
+/* A read that is not terminated has already fetched the next octet, with all that reading it does. */
+static void end_read(struct pdi_spi *spi)
+{
+	if (spi->pos > spi->data_pos && !spi->is_terminated) {
+		(void)read_octet(spi);
+		spi->is_broken = 1;
+	}
+}
+
+void pdi_spi_deselect(struct pdi_spi *spi)
+{
+	uint8_t *errors = &spi->esc->reg[ESC_REG_PDI_ERROR];
+
+	if (spi->is_selected && !spi->is_broken) {
+		spi->is_broken = spi->data_pos == 0; /* not even an address */
+		if (spi->command == SPI_READ || spi->command == SPI_READ_WAIT_STATE) {
+			end_read(spi);
+		} else if (spi->command == SPI_WRITE) {
+			post(spi);
+		}
+	}
+	if (spi->is_selected && spi->is_broken && *errors < UINT8_MAX) {
+		(*errors)++;
+	}
+	spi->is_selected = 0;
+}
