@@ -150,6 +150,21 @@ int config_set(struct config *cfg, const char *assignment, char *error, size_t e
 	return 0;
 }
 
+int config_parse_duration(const char *text, int64_t *ret_ns, char *why)
+{
+	static const struct option duration = {
+		.name = "",
+		.type = OPTION_DURATION,
+		.offset = 0,
+		.bytes = sizeof(int64_t),
+		.min = "-36500d",
+		.max = "36500d",
+		.unit = "s",
+	};
+
+	return option_parse(&duration, text, ret_ns, why);
+}
+
 int config_check(const struct config *cfg, char *error, size_t error_bytes)
 {
 	char why[OPTION_WHY_BYTES] = "";

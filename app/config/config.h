@@ -131,6 +131,14 @@ int config_set(struct config *cfg, const char *assignment, char *error, size_t e
  * -EINVAL. */
 int config_check(const struct config *cfg, char *error, size_t error_bytes);
 
+enum { CONFIG_WHY_BYTES = 192 };
+
+/**
+ * A duration as the file has it ("500us", "1.5s"; a plain number is in s), for the command lines of the
+ * programs. 0, or -EINVAL or -ERANGE with the reason in @why (CONFIG_WHY_BYTES), ret untouched.
+ */
+int config_parse_duration(const char *text, int64_t *ret_ns, char *why);
+
 /* What stands in the run directory. */
 #define CONFIG_RUN_SAMPLES "samples"             /* ring of samples */
 #define CONFIG_RUN_EVENTS "events"               /* ring of events */

@@ -1,0 +1,129 @@
+/* SPDX-License-Identifier: MIT */
+#include "cli/admin_client.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/time.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+enum { REPLY_TIMEOUT_S = 20 }; /* an SDO may take its own time-outs */
+
+static enum cli_exit fail_connect(const struct cli *cli, const char *path, int err)
+{
+	switch (err) {
+	case ENOENT:
+	case ENOTDIR:
+	case ECONNREFUSED:
+		return cli_fail(cli, CLI_NO_DAEMON,
+				"admin socket: %s: nobody listens: is ecdaqd running?", path);
+	case EACCES:
+	case EPERM:
+		return cli_fail(cli, CLI_PERMISSION,
+				"admin socket: no permission on %s: be root or in its group", path);
+	default:
+		return cli_fail(cli, CLI_FAILED, "admin socket: %s: %s", path, strerror(err));
+	}
+}
+
+static int connect_to(const char *path)
+{
+	struct timeval timeout = { .tv_sec = REPLY_TIMEOUT_S };
+	struct sockaddr_un address = { .sun_family = AF_UNIX };
+	int fd;
+
+	if (strlen(path) >= sizeof(address.sun_path)) {
+		return -ENAMETOOLONG;
+	}
+	memcpy(address.sun_path, path, strlen(path) + 1);
+	fd = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
+	if (fd < 0) {
+		return -errno;
+	}
+	if (setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof(timeout)) < 0 ||
+	    setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &timeout, sizeof(timeout)) < 0 ||
+	    connect(fd, (const struct sockaddr *)&address, sizeof(address)) < 0) {
+		int r = -errno;
+
+		close(fd);
+		return r;
+	}
+	return fd;
+}
+
+/* 0 with a whole reply, or -errno; -EPROTO: not a reply; -ECONNRESET: ecdaqd went away. */
+static int exchange(int fd, const struct admin_request *request, struct admin_reply *ret_reply)
+{
+	struct admin_reply reply;
+	ssize_t n = send(fd, request, sizeof(*request), MSG_NOSIGNAL);
+
+	if (n < 0) {
+		return -errno;
+	}
+	do {
+		n = recv(fd, &reply, sizeof(reply), 0);
+	} while (n < 0 && errno == EINTR);
+	if (n < 0) {
+		return -errno;
+	}
+	if (n == 0) {
+		return -ECONNRESET;
+	}
+	if ((size_t)n != sizeof(reply) || reply.magic != ADMIN_MAGIC ||
+	    reply.data_len > ADMIN_DATA_BYTES) {
+		return -EPROTO;
+	}
+	reply.text[sizeof(reply.text) - 1] = '\0';
+	*ret_reply = reply;
+	return 0;
+}
+
+enum cli_exit admin_ask(struct cli *cli, struct admin_request *request,
+			struct admin_reply *ret_reply)
+{
+	char path[CONFIG_PATH_BYTES];
+	enum cli_exit result = cli_path(cli, CONFIG_RUN_ADMIN, path);
+	int fd;
+	int r;
+
+	if (result != CLI_OK) {
+		return result;
+	}
+	fd = connect_to(path);
+	if (fd < 0) {
+		return fail_connect(cli, path, -fd);
+	}
+	request->magic = ADMIN_MAGIC;
+	r = exchange(fd, request, ret_reply);
+	close(fd);
+	if (r == -EAGAIN) {
+		return cli_fail(cli, CLI_FAILED, "ecdaqd: no answer within %d s", REPLY_TIMEOUT_S);
+	}
+	if (r == -EPROTO) {
+		return cli_fail(cli, CLI_FAILED,
+				"ecdaqd: its answer is of another version of ecdaq");
+	}
+	if (r == -ECONNRESET || r == -EPIPE) {
+		return cli_fail(cli, CLI_NO_DAEMON, "ecdaqd: hung up without an answer");
+	}
+	return r < 0 ? cli_fail(cli, CLI_FAILED, "ecdaqd: %s", strerror(-r)) : CLI_OK;
+}
+
+enum cli_exit admin_judge(const struct cli *cli, const struct admin_reply *reply)
+{
+	if (reply->result >= 0) {
+		return CLI_OK;
+	}
+	return cli_fail(cli, CLI_REFUSED, "refused: %s",
+			reply->text[0] != '\0' ? reply->text : strerror(-reply->result));
+}
+
+enum cli_exit admin_do(struct cli *cli, struct admin_request *request,
+		       struct admin_reply *ret_reply)
+{
+	enum cli_exit result = admin_ask(cli, request, ret_reply);
+
+	return result == CLI_OK ? admin_judge(cli, ret_reply) : result;
+}

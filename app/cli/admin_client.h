@@ -1,0 +1,23 @@
+/* SPDX-License-Identifier: MIT */
+/* One request to ecdaqd and its answer. Context: blocking. */
+#ifndef CLI_ADMIN_CLIENT_H
+#define CLI_ADMIN_CLIENT_H
+
+#include "admin/protocol.h"
+#include "cli/cli.h"
+
+/**
+ * Send @request (its magic is filled in) and wait for the reply. CLI_OK when there is one, whatever
+ * it says; else the code of a failure that was said.
+ */
+enum cli_exit admin_ask(struct cli *cli, struct admin_request *request,
+			struct admin_reply *ret_reply);
+
+/** CLI_OK if @reply grants what was asked; else say why not: CLI_REFUSED. */
+enum cli_exit admin_judge(const struct cli *cli, const struct admin_reply *reply);
+
+/** Both in one. */
+enum cli_exit admin_do(struct cli *cli, struct admin_request *request,
+		       struct admin_reply *ret_reply);
+
+#endif

@@ -1,0 +1,86 @@
+/* SPDX-License-Identifier: MIT */
+/* ecdaq channels */
+#include <stdio.h>
+
+#include "cli/args.h"
+#include "cli/json.h"
+#include "cli/source.h"
+#include "image/image.h"
+
+static void show(const struct channel *ch)
+{
+	char type[16];
+	char place[24];
+
+	image_type_format(ch, type, sizeof(type));
+	snprintf(place, sizeof(place), "%u.%u", ch->bit_offset / 8, ch->bit_offset % 8);
+	printf("%-28s %-4s %-8s %8s  0x%04x:%02x", ch->name,
+	       ch->direction == CHANNEL_OUTPUT ? "out" : "in", type, place, ch->index,
+	       ch->subindex);
+	if (ch->scale != 1.0 || ch->offset != 0.0) {
+		printf("  * %.9g + %.9g", ch->scale, ch->offset);
+	}
+	printf("%s%s\n", ch->unit[0] == '\0' ? "" : "  ", ch->unit);
+}
+
+static void write_json(struct json *js, const struct channel *ch, const struct samples *samples)
+{
+	char type[16];
+
+	image_type_format(ch, type, sizeof(type));
+	json_object_begin(js, NULL);
+	json_text(js, "name", ch->name);
+	json_text(js, "direction", ch->direction == CHANNEL_OUTPUT ? "output" : "input");
+	json_text(js, "type", type);
+	json_u64(js, "slave", ch->slave_pos);
+	if (ch->slave_pos < samples->meta->slave_count) {
+		json_text(js, "slave_name", samples->slaves[ch->slave_pos].name);
+	}
+	json_u64(js, "index", ch->index);
+	json_u64(js, "subindex", ch->subindex);
+	json_u64(js, "bit_offset", ch->bit_offset);
+	json_u64(js, "bit_length", ch->bit_len);
+	json_text(js, "unit", ch->unit);
+	json_double(js, "scale", ch->scale);
+	json_double(js, "offset", ch->offset);
+	json_object_end(js);
+}
+
+enum cli_exit verb_channels(struct cli *cli, int argc, char **argv)
+{
+	int is_json = 0;
+	const struct args_option options[] = {
+		{ "json", 0, ARGS_FLAG, &is_json, NULL, "a JSON array" },
+	};
+	struct args args = { .options = options, .option_count = 1 };
+	struct samples samples;
+	enum cli_exit result;
+	struct json js;
+
+	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
+		return result;
+	}
+	result = samples_open(cli, &samples);
+	if (result != CLI_OK) {
+		return result;
+	}
+	json_init(&js, stdout);
+	if (is_json) {
+		json_array_begin(&js, NULL);
+	} else {
+		printf("%-28s %-4s %-8s %8s  %s\n", "channel", "dir", "type", "at", "object");
+	}
+	for (uint32_t i = 0; i < samples.meta->channel_count; i++) {
+		if (is_json) {
+			write_json(&js, &samples.channels[i], &samples);
+		} else {
+			show(&samples.channels[i]);
+		}
+	}
+	if (is_json) {
+		json_array_end(&js);
+		json_end_line(&js);
+	}
+	samples_close(&samples);
+	return CLI_OK;
+}

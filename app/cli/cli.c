@@ -1,0 +1,101 @@
+/* SPDX-License-Identifier: MIT */
+#include "cli/cli.h"
+
+#include <errno.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum cli_exit cli_fail(const struct cli *cli, enum cli_exit code, const char *format, ...)
+{
+	char text[1024];
+	va_list args;
+
+	va_start(args, format);
+	vsnprintf(text, sizeof(text), format, args);
+	va_end(args);
+	/* One line, whatever a user, a file or a slave put into it. */
+	for (char *p = text; *p != '\0'; p++) {
+		if ((unsigned char)*p < 0x20 || *p == 0x7f) {
+			*p = '?';
+		}
+	}
+	fflush(stdout);
+	fprintf(stderr, "ecdaq: %s%s%s\n", cli->verb == NULL ? "" : cli->verb->name,
+		cli->verb == NULL ? "" : ": ", text);
+	return code;
+}
+
+enum cli_exit cli_exit_of(int errno_value)
+{
+	switch (errno_value) {
+	case EACCES:
+	case EPERM:
+		return CLI_PERMISSION;
+	case ENOENT:
+	case ENOTDIR:
+	case ECONNREFUSED:
+		return CLI_NO_DAEMON;
+	default:
+		return CLI_FAILED;
+	}
+}
+
+/* Nothing stands where this user's own ecdaqd would be, but the machine's is there: that is meant.
+ */
+static void prefer_the_system(char *dir)
+{
+	static const char system_dir[] = "/run/ecdaq/";
+	char page[CONFIG_PATH_BYTES];
+
+	snprintf(page, sizeof(page), "%.200s%s", dir, CONFIG_RUN_STATUS);
+	if (access(page, F_OK) < 0 && access(system_dir, F_OK) == 0) {
+		memcpy(dir, system_dir, sizeof(system_dir));
+	}
+}
+
+static enum cli_exit find_dir(struct cli *cli)
+{
+	const char *env = getenv("ECDAQ_RUN_DIR");
+	struct config cfg;
+	char error[512];
+
+	config_defaults(&cfg);
+	if (cli->config != NULL && config_load(cli->config, &cfg, error, sizeof(error)) < 0) {
+		return cli_fail(cli, CLI_USAGE, "--config: %s", error);
+	}
+	if (cli->run_dir != NULL) {
+		if (snprintf(cfg.run_dir, sizeof(cfg.run_dir), "%s", cli->run_dir) >=
+		    (int)sizeof(cfg.run_dir)) {
+			return cli_fail(cli, CLI_USAGE, "--run-dir: the path is too long");
+		}
+	}
+	if (config_run_path(&cfg, "", cli->dir, sizeof(cli->dir)) < 0) {
+		return cli_fail(cli, CLI_USAGE, "run directory: the path is too long");
+	}
+	if (cfg.run_dir[0] == '\0' && (env == NULL || env[0] == '\0')) {
+		prefer_the_system(cli->dir);
+	}
+	return CLI_OK;
+}
+
+enum cli_exit cli_path(struct cli *cli, const char *file, char *ret_path)
+{
+	char path[2 * CONFIG_PATH_BYTES];
+	enum cli_exit result;
+
+	if (cli->dir[0] == '\0') {
+		result = find_dir(cli);
+		if (result != CLI_OK) {
+			return result;
+		}
+	}
+	snprintf(path, sizeof(path), "%s%s", cli->dir, file);
+	if (strlen(path) >= CONFIG_PATH_BYTES) {
+		return cli_fail(cli, CLI_USAGE, "run directory: the path is too long");
+	}
+	memcpy(ret_path, path, strlen(path) + 1);
+	return CLI_OK;
+}

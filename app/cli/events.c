@@ -1,0 +1,212 @@
+/* SPDX-License-Identifier: MIT */
+/* ecdaq events */
+#include <errno.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+#include "base/clock.h"
+#include "base/event.h"
+#include "base/ring.h"
+#include "cli/args.h"
+#include "cli/json.h"
+#include "cli/screen.h"
+#include "cli/text.h"
+
+struct events {
+	struct cli *cli;
+	struct ring_reader *reader;
+	int is_json;
+	int is_follow;
+	const char *level;
+	enum event_severity severity; /* this and worse */
+	uint64_t count;               /* the last so many; 0: all */
+};
+
+static const char *const severities[] = { "info", "notice", "warning", "error" };
+
+static int64_t clock_ns(clockid_t clock)
+{
+	struct timespec ts;
+
+	clock_gettime(clock, &ts);
+	return (int64_t)ts.tv_sec * NS_PER_S + ts.tv_nsec;
+}
+
+/* The event's place on today's wall clock: its age by the monotonic clock, which nobody sets. */
+static int64_t utc_of(const struct event *ev)
+{
+	return clock_ns(CLOCK_REALTIME) - (clock_ns(CLOCK_MONOTONIC) - ev->mono_ns);
+}
+
+static void print_json(const struct event *ev, const char *text)
+{
+	struct json js;
+	char utc[TEXT_BYTES];
+
+	json_init(&js, stdout);
+	json_object_begin(&js, NULL);
+	json_text(&js, "event", event_name(ev->id));
+	json_text(&js, "severity", severities[event_severity(ev->id)]);
+	json_text(&js, "utc", text_utc(utc_of(ev), utc));
+	json_i64(&js, "mono_ns", ev->mono_ns);
+	json_i64(&js, "tai_ns", ev->tai_ns);
+	json_u64(&js, "cycle", ev->cycle);
+	if (ev->slave_pos == EVENT_NO_SLAVE) {
+		json_null(&js, "slave");
+	} else {
+		json_u64(&js, "slave", ev->slave_pos);
+	}
+	json_i64(&js, "value", ev->value);
+	json_array_begin(&js, "arg");
+	json_i64(&js, NULL, ev->arg[0]);
+	json_i64(&js, NULL, ev->arg[1]);
+	json_array_end(&js);
+	json_text(&js, "text", text);
+	json_object_end(&js);
+	json_end_line(&js);
+}
+
+static void print(const struct events *events, const struct event *ev)
+{
+	char text[256];
+	char utc[TEXT_BYTES];
+
+	if (event_severity(ev->id) < events->severity) {
+		return;
+	}
+	event_format(ev, text, sizeof(text));
+	if (events->is_json) {
+		print_json(ev, text);
+	} else {
+		printf("%s  %-7s  %s\n", text_utc(utc_of(ev), utc),
+		       severities[event_severity(ev->id)], text);
+	}
+}
+
+static void print_lost(const struct events *events, uint64_t lost)
+{
+	struct json js;
+
+	if (!events->is_json) {
+		printf("# %" PRIu64 " events were overwritten before they could be read\n", lost);
+		return;
+	}
+	json_init(&js, stdout);
+	json_object_begin(&js, NULL);
+	json_u64(&js, "missed", lost);
+	json_object_end(&js);
+	json_end_line(&js);
+}
+
+static enum cli_exit run(struct events *events)
+{
+	uint64_t lost = 0;
+	struct event ev;
+
+	for (;;) {
+		switch (ring_read(events->reader, &ev, &lost)) {
+		case RING_OK:
+			print(events, &ev);
+			break;
+		case RING_LOST:
+			print_lost(events, lost);
+			break;
+		case RING_EMPTY:
+			if (!events->is_follow || ring_is_orphaned(events->reader)) {
+				return CLI_OK;
+			}
+			fflush(stdout);
+			screen_wait(20 * NS_PER_MS);
+			if (screen_is_over() || ferror(stdout)) {
+				return CLI_OK;
+			}
+			break;
+		case RING_CLOSED:
+			return CLI_OK;
+		}
+	}
+}
+
+static enum cli_exit open_ring(struct events *events)
+{
+	char path[CONFIG_PATH_BYTES];
+	enum cli_exit result = cli_path(events->cli, CONFIG_RUN_EVENTS, path);
+	int r;
+
+	if (result != CLI_OK) {
+		return result;
+	}
+	r = ring_reader_open(path, &events->reader);
+	if (r == -ENOENT || r == -ENOTDIR) {
+		return cli_fail(events->cli, CLI_NO_DAEMON,
+				"events: %s is not there: is ecdaqd running?", path);
+	}
+	if (r == -EACCES || r == -EPERM) {
+		return cli_fail(events->cli, CLI_PERMISSION,
+				"events: no permission to read %s: be root or in its group", path);
+	}
+	if (r == 0 && (strcmp(ring_kind(events->reader), "event") != 0 ||
+		       ring_payload_bytes(events->reader) != sizeof(struct event))) {
+		ring_reader_destroy(events->reader);
+		r = -EPROTO;
+	}
+	if (r == -EPROTO) {
+		return cli_fail(events->cli, CLI_FAILED,
+				"events: %s is of another version of ecdaq, or damaged", path);
+	}
+	return r < 0 ? cli_fail(events->cli, CLI_FAILED, "events: %s: %s", path, strerror(-r))
+		     : CLI_OK;
+}
+
+static enum cli_exit parse_level(struct events *events)
+{
+	if (events->level == NULL) {
+		return CLI_OK;
+	}
+	for (unsigned i = 0; i < sizeof(severities) / sizeof(severities[0]); i++) {
+		if (strcmp(severities[i], events->level) == 0) {
+			events->severity = (enum event_severity)i;
+			return CLI_OK;
+		}
+	}
+	return cli_fail(events->cli, CLI_USAGE,
+			"--level: %s: is none of info, notice, warning, error", events->level);
+}
+
+enum cli_exit verb_events(struct cli *cli, int argc, char **argv)
+{
+	struct events events = { .cli = cli };
+	const struct args_option options[] = {
+		{ "follow", 'f', ARGS_FLAG, &events.is_follow, NULL, "go on with what comes" },
+		{ "count", 'n', ARGS_COUNT, &events.count, "N", "begin with the last N" },
+		{ "level", 'l', ARGS_TEXT, &events.level, "LEVEL",
+		  "info, notice, warning or error: this and worse" },
+		{ "json", 0, ARGS_FLAG, &events.is_json, NULL, "a JSON object an event" },
+	};
+	struct args args = { .options = options, .option_count = 4 };
+	enum cli_exit result;
+	uint64_t oldest;
+
+	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
+		return result;
+	}
+	result = parse_level(&events);
+	if (result != CLI_OK) {
+		return result;
+	}
+	result = open_ring(&events);
+	if (result != CLI_OK) {
+		return result;
+	}
+	oldest = ring_oldest(events.reader);
+	if (events.count > 0 && ring_newest(events.reader) - oldest > events.count) {
+		oldest = ring_newest(events.reader) - events.count;
+	}
+	ring_seek(events.reader, oldest);
+	screen_catch_signals();
+	result = run(&events);
+	ring_reader_destroy(events.reader);
+	return result;
+}

@@ -1,0 +1,87 @@
+/* SPDX-License-Identifier: MIT */
+#include "cli/follow.h"
+
+#include <stddef.h>
+
+#include "base/clock.h"
+#include "cli/screen.h"
+
+enum cli_exit follow_open(struct cli *cli, struct follow *ret_follow)
+{
+	struct follow follow = { .cli = cli, .idle_ns = 5 * NS_PER_MS };
+	char path[CONFIG_PATH_BYTES];
+	enum cli_exit result = samples_open(cli, &follow.samples);
+
+	if (result != CLI_OK) {
+		return result;
+	}
+	if (cli_path(cli, CONFIG_RUN_STATUS, path) == CLI_OK) {
+		follow.page = status_open(path, STATUS_MAGIC, sizeof(*follow.page));
+	}
+	*ret_follow = follow;
+	return CLI_OK;
+}
+
+void follow_close(struct follow *follow)
+{
+	samples_close(&follow->samples);
+	source_status_close(follow->page);
+	follow->page = NULL;
+}
+
+/* The ring is closed. Is its ecdaqd still there, so that another one may follow? */
+static int may_go_on(const struct follow *follow)
+{
+	uint32_t state;
+
+	if (follow->page == NULL || !source_is_alive(follow->page->pid)) {
+		return 0;
+	}
+	state = atomic_load_explicit(&follow->page->bus_state, memory_order_relaxed);
+	return state != BUS_STOPPED && state != BUS_FAILED;
+}
+
+static enum follow_news next_ring(struct follow *follow)
+{
+	struct samples samples;
+
+	if (!ring_is_replaced(follow->samples.reader)) {
+		return may_go_on(follow) ? FOLLOW_IDLE : FOLLOW_ENDED;
+	}
+	/* The path may be empty for a moment. */
+	if (samples_try(follow->cli, &samples) < 0) {
+		return may_go_on(follow) ? FOLLOW_IDLE : FOLLOW_ENDED;
+	}
+	samples_close(&follow->samples);
+	follow->samples = samples;
+	ring_seek(samples.reader, ring_oldest(samples.reader));
+	return FOLLOW_NEW_BUS;
+}
+
+enum follow_news follow_next(struct follow *follow, uint64_t *ret_lost)
+{
+	enum follow_news news = FOLLOW_IDLE;
+
+	if (follow->is_idle) {
+		screen_wait(follow->idle_ns);
+	}
+	if (screen_is_over()) {
+		return FOLLOW_OVER;
+	}
+	switch (ring_read(follow->samples.reader, follow->samples.payload, ret_lost)) {
+	case RING_OK:
+		news = FOLLOW_SAMPLE;
+		break;
+	case RING_LOST:
+		news = FOLLOW_LOST;
+		break;
+	case RING_EMPTY:
+		news = ring_is_orphaned(follow->samples.reader) ? next_ring(follow) : FOLLOW_IDLE;
+		break;
+	case RING_CLOSED:
+		news = next_ring(follow);
+		break;
+	}
+	follow->is_idle = news == FOLLOW_IDLE;
+	return news;
+}

@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: MIT */
+/* The sample ring as it fills: what comes next, until ecdaqd or the user ends it. */
+#ifndef CLI_FOLLOW_H
+#define CLI_FOLLOW_H
+
+#include <stdint.h>
+
+#include "base/status.h"
+#include "cli/source.h"
+
+struct follow {
+	struct cli *cli;
+	struct samples samples;
+	const struct status_page *page; /* NULL: cannot be read */
+	int64_t idle_ns;                /* how long to sleep when there is nothing */
+	int is_idle;
+};
+
+enum follow_news {
+	FOLLOW_SAMPLE,  /* samples_header() and samples_image() hold it */
+	FOLLOW_LOST,    /* this reader was too slow; *ret_lost samples are gone */
+	FOLLOW_IDLE,    /* nothing more for now: write out what you have */
+	FOLLOW_NEW_BUS, /* ecdaqd has started the bus anew: look channels up again */
+	FOLLOW_ENDED,   /* ecdaqd has ended */
+	FOLLOW_OVER,    /* the user wants to stop */
+};
+
+/** Stand at the newest sample. CLI_OK, or the code of a failure that was said. */
+enum cli_exit follow_open(struct cli *cli, struct follow *ret_follow);
+void follow_close(struct follow *follow);
+
+enum follow_news follow_next(struct follow *follow, uint64_t *ret_lost);
+
+#endif

@@ -1,0 +1,136 @@
+/* SPDX-License-Identifier: MIT */
+/* ecdaq, the operator's tool: a table of verbs. */
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "cli/args.h"
+#include "cli/cli.h"
+
+static enum cli_exit verb_version(struct cli *cli, int argc, char **argv)
+{
+	struct args args = { .options = NULL };
+	enum cli_exit result;
+
+	if (args_parse(cli, &args, argc, argv, &result) == ARGS_GO) {
+		puts("ecdaq " ECDAQ_VERSION);
+		result = CLI_OK;
+	}
+	return result;
+}
+
+static const struct verb verbs[] = {
+	{ "status", "", "Bus, cycle, slaves and recorder on one screen.",
+	  "After ecdaqd has ended it shows the last known state and says so.\n", verb_status },
+	{ "top", "", "The same, live. Ends with q, Ctrl-C, or ecdaqd.",
+	  "Where standard output is no terminal it prints a line every interval instead.\n",
+	  verb_top },
+	{ "slaves", "", "The slaves: position, identity, AL state.", NULL, verb_slaves },
+	{ "channels", "", "The channel table: what the process image holds.", NULL, verb_channels },
+	{ "watch", "CHANNEL...", "Values of channels as they come, every cycle.",
+	  "CHANNEL may hold * and ?: 'piccolo*.adc'. A sample that is not fresh is marked.\n",
+	  verb_watch },
+	{ "set", "OUTPUT=VALUE...", "Set outputs, all in the same cycle; says in which.",
+	  "VALUE is physical, in the channel's unit; on, off, true, false for BOOL.\n", verb_set },
+	{ "oneshot", "SLAVE|all", "Fire SYNC0 once at a DC time, in one-shot mode.",
+	  "SLAVE is a name or a position. With all, every slave that has an output oneshot_time "
+	  "is\n"
+	  "armed for the same instant.\n",
+	  verb_oneshot },
+	{ "sdo", "read|write SLAVE INDEX:SUB [VALUE]", "Read or write an object of a slave (CoE).",
+	  "ecdaq sdo read piccolo0 0x1018:1 --type UDINT\n"
+	  "ecdaq sdo write 0 0x8000:2 20 --type UINT\n\n"
+	  "INDEX is hexadecimal with 0x; :SUB may be left out for 0. Types: BOOL SINT INT DINT "
+	  "LINT\n"
+	  "USINT UINT UDINT ULINT REAL LREAL, and for reading STRING.\n",
+	  verb_sdo },
+	{ "events", "", "What happened, oldest first.", NULL, verb_events },
+	{ "histogram", "wake|round-trip|phase|work", "A histogram as bars.",
+	  "wake: wake-up latency. round-trip: frame out to frame back. phase: magnitude of the "
+	  "phase\n"
+	  "error, from lock on. work: wake to end of work.\n",
+	  verb_histogram },
+	{ "log", "...", "Recordings: list, info, check, recover, export (see ecdaq log --help).",
+	  NULL, verb_log },
+	{ "clear", "", "Set counters and histograms of ecdaqd to zero.", NULL, verb_clear },
+	{ "stop", "", "Stop the bus and ecdaqd in order.", NULL, verb_stop },
+	{ "version", "", "The version of this program.", NULL, verb_version },
+};
+
+enum { VERB_COUNT = sizeof(verbs) / sizeof(verbs[0]) };
+
+static void help(void)
+{
+	puts("usage: ecdaq [--run-dir DIR] [--config FILE] VERB [OPTION...] [WORD...]\n");
+	for (size_t i = 0; i < VERB_COUNT; i++) {
+		printf("  %-10s %s\n", verbs[i].name, verbs[i].summary);
+	}
+	puts("\n"
+	     "  --run-dir DIR   where ecdaqd's rings, status page and socket are (default: "
+	     "runtime.run_dir\n"
+	     "                  of --config, else $ECDAQ_RUN_DIR, else /run/ecdaq for root, else\n"
+	     "                  /dev/shm/ecdaq-UID, or /run/ecdaq if nothing is there)\n"
+	     "  --config FILE   the ecdaq.yaml of the ecdaqd that is meant\n"
+	     "  --help          this; after a verb: its options\n"
+	     "  --version       the version of this program\n"
+	     "\n"
+	     "Every reading verb takes --json: one JSON value a line.\n"
+	     "\n"
+	     "exit codes: 0 ok, 1 failed, 2 command line, 3 no ecdaqd or nothing of it to read,\n"
+	     "4 refused by ecdaqd or a slave, 5 no permission");
+}
+
+static const struct verb *find_verb(const char *name)
+{
+	for (size_t i = 0; i < VERB_COUNT; i++) {
+		if (strcmp(verbs[i].name, name) == 0) {
+			return &verbs[i];
+		}
+	}
+	return NULL;
+}
+
+/* What was written must have arrived: a full disk is a failure. */
+static enum cli_exit finish(const struct cli *cli, enum cli_exit result)
+{
+	if ((fflush(stdout) != 0 || ferror(stdout)) && result == CLI_OK) {
+		return cli_fail(cli, CLI_FAILED, "standard output: %s", strerror(errno));
+	}
+	return result;
+}
+
+int main(int argc, char **argv)
+{
+	struct cli cli = { .verb = NULL };
+	int i = 1;
+
+	while (i < argc && argv[i][0] == '-') {
+		int taken = args_take_global(&cli, argc, argv, i);
+
+		if (taken < 0) {
+			return CLI_USAGE;
+		}
+		if (strcmp(argv[i], "--help") == 0 || strcmp(argv[i], "-h") == 0) {
+			help();
+			return (int)finish(&cli, CLI_OK);
+		}
+		if (strcmp(argv[i], "--version") == 0) {
+			puts("ecdaq " ECDAQ_VERSION);
+			return (int)finish(&cli, CLI_OK);
+		}
+		if (taken == 0) {
+			return (int)cli_fail(&cli, CLI_USAGE,
+					     "%s: unknown option (see ecdaq --help)", argv[i]);
+		}
+		i += taken;
+	}
+	if (i == argc) {
+		return (int)cli_fail(&cli, CLI_USAGE, "wants a verb (see ecdaq --help)");
+	}
+	cli.verb = find_verb(argv[i]);
+	if (cli.verb == NULL) {
+		return (int)cli_fail(&cli, CLI_USAGE, "%s: no such verb (see ecdaq --help)",
+				     argv[i]);
+	}
+	return (int)finish(&cli, cli.verb->run(&cli, argc - i - 1, argv + i + 1));
+}

@@ -1,0 +1,300 @@
+/* SPDX-License-Identifier: MIT */
+/* ecdaq oneshot: arm SYNC0 of one slave or of all for one instant, and wait for the conversion. */
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "cli/admin_client.h"
+#include "cli/args.h"
+#include "cli/follow.h"
+#include "cli/json.h"
+#include "cli/screen.h"
+#include "cli/text.h"
+#include "image/image.h"
+
+/* Entries of the FB1111-Piccolo (DESIGN 5). */
+#define ENTRY_TIME "oneshot_time"
+#define ENTRY_SAMPLE_TIME "sample_time"
+#define ENTRY_ADC "adc"
+/* A slave's own reading of its SYNC0 edge may differ from the time armed by less than this. */
+#define EDGE_TOLERANCE_NS (1 * NS_PER_US)
+/* How long after its instant a conversion may take to come back. */
+#define WAIT_SLACK_NS (2 * NS_PER_S)
+
+struct shot {
+	uint16_t slave_pos;
+	const char *name;
+	int sample_time; /* channels; -1: none */
+	int adc;
+	int is_done;
+	uint64_t cycle;     /* in which the command took effect, then in which the value came */
+	int64_t at_ns;      /* the instant that was armed */
+	int64_t sampled_ns; /* when the slave says that it sampled */
+	uint64_t value;
+};
+
+struct oneshot {
+	struct cli *cli;
+	struct follow follow;
+	int64_t at_ns;
+	int64_t in_ns;
+	int has_at;
+	int is_wait;
+	int is_json;
+	struct shot shot[LIMIT_SLAVES];
+	unsigned count;
+};
+
+static int find_entry(const struct samples *samples, uint16_t slave_pos, const char *entry)
+{
+	for (uint32_t i = 0; i < samples->meta->channel_count; i++) {
+		const char *dot = strrchr(samples->channels[i].name, '.');
+
+		if (samples->channels[i].slave_pos == slave_pos && dot != NULL &&
+		    strcmp(dot + 1, entry) == 0) {
+			return (int)i;
+		}
+	}
+	return -1;
+}
+
+static void add(struct oneshot *one, uint16_t pos)
+{
+	const struct samples *samples = &one->follow.samples;
+
+	one->shot[one->count++] = (struct shot){
+		.slave_pos = pos,
+		.name = samples->slaves[pos].name,
+		.sample_time = find_entry(samples, pos, ENTRY_SAMPLE_TIME),
+		.adc = find_entry(samples, pos, ENTRY_ADC),
+	};
+}
+
+static enum cli_exit choose(struct oneshot *one, const char *word)
+{
+	const struct samples *samples = &one->follow.samples;
+	enum cli_exit result;
+	uint16_t pos;
+
+	if (strcmp(word, "all") != 0) {
+		if (one->follow.page == NULL) {
+			return cli_fail(one->cli, CLI_NO_DAEMON, "status: cannot be read");
+		}
+		result = source_find_slave(one->cli, one->follow.page, word, &pos);
+		if (result == CLI_OK && pos >= samples->meta->slave_count) {
+			return cli_fail(one->cli, CLI_FAILED, "%s: has no process data yet", word);
+		}
+		if (result == CLI_OK) {
+			add(one, pos);
+		}
+		return result;
+	}
+	for (uint32_t i = 0; i < samples->meta->slave_count; i++) {
+		if (find_entry(samples, (uint16_t)i, ENTRY_TIME) >= 0) {
+			add(one, (uint16_t)i);
+		}
+	}
+	if (one->count == 0) {
+		return cli_fail(one->cli, CLI_FAILED, "all: no slave has an output " ENTRY_TIME);
+	}
+	return CLI_OK;
+}
+
+/* The first slave turns a relative time into an instant; the others get the same instant. */
+static enum cli_exit arm(struct oneshot *one)
+{
+	for (unsigned i = 0; i < one->count; i++) {
+		int is_relative = !one->has_at && i == 0;
+		struct admin_request request = {
+			.verb = ADMIN_ONESHOT,
+			.slave_pos = one->shot[i].slave_pos,
+			.is_relative = (uint8_t)is_relative,
+			.dc_time_ns = is_relative ? one->in_ns : one->at_ns,
+		};
+		struct admin_reply reply;
+		enum cli_exit result = admin_do(one->cli, &request, &reply);
+
+		if (result != CLI_OK) {
+			return result;
+		}
+		one->at_ns = reply.dc_time_ns;
+		one->shot[i].at_ns = reply.dc_time_ns;
+		one->shot[i].cycle = reply.cycle;
+	}
+	return CLI_OK;
+}
+
+/* Does the sample just read hold the conversion? */
+static void look(struct oneshot *one, struct shot *shot)
+{
+	const struct samples *samples = &one->follow.samples;
+	struct sample_header header = samples_header(samples);
+	const uint8_t *image = samples_image(samples);
+	int64_t sampled_ns;
+
+	if (shot->is_done || samples_is_stale(header.flags)) {
+		return;
+	}
+	sampled_ns = (int64_t)image_get_raw(image, &samples->channels[shot->sample_time]);
+	/* What stood there before was sampled earlier. */
+	if (sampled_ns < shot->at_ns - EDGE_TOLERANCE_NS) {
+		return;
+	}
+	shot->is_done = 1;
+	shot->sampled_ns = sampled_ns;
+	shot->cycle = header.cycle;
+	shot->value = image_get_raw(image, &samples->channels[shot->adc]);
+}
+
+static unsigned open_shots(const struct oneshot *one)
+{
+	unsigned open = 0;
+
+	for (unsigned i = 0; i < one->count; i++) {
+		open += !one->shot[i].is_done;
+	}
+	return open;
+}
+
+static enum cli_exit wait_for_all(struct oneshot *one)
+{
+	uint64_t lost;
+
+	screen_catch_signals();
+	while (open_shots(one) > 0) {
+		switch (follow_next(&one->follow, &lost)) {
+		case FOLLOW_SAMPLE:
+			for (unsigned i = 0; i < one->count; i++) {
+				look(one, &one->shot[i]);
+			}
+			if (samples_header(&one->follow.samples).dc_time_ns >
+			    one->at_ns + WAIT_SLACK_NS) {
+				return CLI_OK;
+			}
+			break;
+		case FOLLOW_LOST:
+		case FOLLOW_IDLE:
+			break;
+		case FOLLOW_NEW_BUS:
+		case FOLLOW_ENDED:
+			return cli_fail(one->cli, CLI_FAILED,
+					"the bus was stopped before the conversion");
+		case FOLLOW_OVER:
+			return cli_fail(one->cli, CLI_FAILED, "not waited for");
+		}
+	}
+	return CLI_OK;
+}
+
+static void say_text(const struct oneshot *one, const struct shot *shot)
+{
+	char value[TEXT_BYTES];
+
+	if (!one->is_wait) {
+		printf("%s: armed for DC %" PRId64 " from cycle %" PRIu64 " on\n", shot->name,
+		       shot->at_ns, shot->cycle);
+	} else if (shot->is_done) {
+		text_value(&one->follow.samples.channels[shot->adc], shot->value, value);
+		printf("%s: adc %s, sampled at DC %" PRId64 " (%+" PRId64 " ns), cycle %" PRIu64
+		       "\n",
+		       shot->name, value, shot->sampled_ns, shot->sampled_ns - shot->at_ns,
+		       shot->cycle);
+	}
+}
+
+static void say_json(const struct oneshot *one)
+{
+	struct json js;
+
+	json_init(&js, stdout);
+	json_object_begin(&js, NULL);
+	json_i64(&js, "dc_time_ns", one->at_ns);
+	json_array_begin(&js, "slave");
+	for (unsigned i = 0; i < one->count; i++) {
+		const struct shot *shot = &one->shot[i];
+
+		json_object_begin(&js, NULL);
+		json_u64(&js, "position", shot->slave_pos);
+		json_text(&js, "name", shot->name);
+		json_u64(&js, "cycle", shot->cycle);
+		json_truth(&js, "converted", shot->is_done);
+		if (shot->is_done) {
+			text_value_json(&js, "adc", &one->follow.samples.channels[shot->adc],
+					shot->value, TEXT_PHYSICAL);
+			json_i64(&js, "sample_time", shot->sampled_ns);
+		}
+		json_object_end(&js);
+	}
+	json_array_end(&js);
+	json_object_end(&js);
+	json_end_line(&js);
+}
+
+static enum cli_exit run(struct oneshot *one, const char *word)
+{
+	enum cli_exit result = choose(one, word);
+
+	for (unsigned i = 0; result == CLI_OK && one->is_wait && i < one->count; i++) {
+		if (one->shot[i].sample_time < 0 || one->shot[i].adc < 0) {
+			return cli_fail(one->cli, CLI_FAILED,
+					"--wait: %s has no inputs " ENTRY_ADC
+					" and " ENTRY_SAMPLE_TIME,
+					one->shot[i].name);
+		}
+	}
+	if (result == CLI_OK) {
+		result = arm(one);
+	}
+	if (result == CLI_OK && one->is_wait) {
+		result = wait_for_all(one);
+	}
+	if (result != CLI_OK) {
+		return result;
+	}
+	if (one->is_json) {
+		say_json(one);
+	}
+	for (unsigned i = 0; i < one->count; i++) {
+		if (!one->is_json) {
+			say_text(one, &one->shot[i]);
+		}
+		if (one->is_wait && !one->shot[i].is_done) {
+			result = cli_fail(one->cli, CLI_FAILED, "%s: no conversion came",
+					  one->shot[i].name);
+		}
+	}
+	return result;
+}
+
+enum cli_exit verb_oneshot(struct cli *cli, int argc, char **argv)
+{
+	struct oneshot one = { .cli = cli, .at_ns = INT64_MIN };
+	const struct args_option options[] = {
+		{ "at", 0, ARGS_DC_TIME, &one.at_ns, "DC_NS",
+		  "the instant, DC time in ns since 2000-01-01" },
+		{ "in", 0, ARGS_DURATION, &one.in_ns, "T", "the instant, from now on" },
+		{ "wait", 0, ARGS_FLAG, &one.is_wait, NULL,
+		  "wait for the conversion and show its value" },
+		{ "json", 0, ARGS_FLAG, &one.is_json, NULL, "answer as a JSON object" },
+	};
+	struct args args = {
+		.options = options, .option_count = 4, .operands_min = 1, .operands_max = 1
+	};
+	enum cli_exit result;
+
+	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
+		return result;
+	}
+	one.has_at = one.at_ns != INT64_MIN;
+	if (one.has_at == (one.in_ns > 0)) {
+		return cli_fail(cli, CLI_USAGE, "wants --at or --in");
+	}
+	result = follow_open(cli, &one.follow);
+	if (result == CLI_OK) {
+		result = run(&one, args.operands[0]);
+		follow_close(&one.follow);
+	}
+	return result;
+}

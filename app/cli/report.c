@@ -1,0 +1,270 @@
+/* SPDX-License-Identifier: MIT */
+#include "cli/report.h"
+
+#include <inttypes.h>
+#include <string.h>
+#include <time.h>
+
+#include "base/clock.h"
+#include "base/event.h"
+#include "cli/source.h"
+#include "cli/text.h"
+#include "wire/al.h"
+
+#define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
+
+void report_gather(struct cli *cli, const struct status_page *page,
+		   const struct record_status *record, struct report *ret_report)
+{
+	struct report report = { .page = page, .record = record };
+	struct samples samples;
+
+	report.is_running = source_is_alive(page->pid);
+	report.is_recorder_running = record != NULL && source_is_alive(record->pid);
+	if (samples_try(cli, &samples) == 0) {
+		if (samples.meta->session == page->session &&
+		    ring_peek_newest(samples.reader, samples.payload) == RING_OK) {
+			struct sample_header header = samples_header(&samples);
+
+			report.has_wkc = 1;
+			report.wkc = header.wkc;
+			report.wkc_expected = header.wkc_expected;
+			report.flags = header.flags;
+		}
+		samples_close(&samples);
+	}
+	*ret_report = report;
+}
+
+void report_al_format(uint32_t al_state, char *buf, size_t buf_len)
+{
+	snprintf(buf, buf_len, "%s%s", al_state_to_str((uint16_t)(al_state & AL_STATE_MASK)),
+		 (al_state & AL_ERROR) != 0 ? "+ERROR" : "");
+}
+
+static int64_t tai_now_ns(void)
+{
+	struct timespec ts;
+
+	clock_gettime(CLOCK_TAI, &ts);
+	return (int64_t)ts.tv_sec * NS_PER_S + ts.tv_nsec;
+}
+
+static void write_head(const struct report *report, FILE *out)
+{
+	const struct status_page *page = report->page;
+	uint32_t expected = GET(page->slaves_expected);
+	char buf[TEXT_BYTES];
+
+	if (!report->is_running) {
+		fprintf(out, "ecdaqd has ended (process %" PRId64 " is gone): last known state\n",
+			page->pid);
+	}
+	fprintf(out, "ecdaqd %.32s   %s   ", page->version, bus_state_to_str(GET(page->bus_state)));
+	if (expected != 0 && expected != source_slave_count(page)) {
+		fprintf(out, "%u of %u slaves", source_slave_count(page), expected);
+	} else {
+		fprintf(out, "%u slave%s", source_slave_count(page),
+			source_slave_count(page) == 1 ? "" : "s");
+	}
+	fprintf(out, " on %.32s%s", page->interface, page->is_simulated ? " (simulated)" : "");
+	if (report->is_running) {
+		fprintf(out, "   up %s", text_uptime(tai_now_ns() - page->start_tai_ns, buf));
+	}
+	fputc('\n', out);
+}
+
+static void write_degraded(const struct status_page *page, FILE *out)
+{
+	static const char *const names[EVENT_RT_COUNT] = {
+		[EVENT_RT_PRIORITY] = "priority",        [EVENT_RT_CPU] = "core",
+		[EVENT_RT_MEMORY] = "memory lock",       [EVENT_RT_DMA_LATENCY] = "CPU latency",
+		[EVENT_RT_RING_DISK] = "ring on a disk",
+	};
+	uint32_t bits = GET(page->rt_degraded);
+	const char *separator = "";
+
+	if (bits == 0) {
+		return;
+	}
+	fputs("real time  not granted: ", out);
+	for (unsigned i = 0; i < EVENT_RT_COUNT; i++) {
+		if ((bits >> i & 1) != 0) {
+			fprintf(out, "%s%s", separator, names[i]);
+			separator = ", ";
+		}
+	}
+	fputs("  (see ecdaq events)\n", out);
+}
+
+static void write_cycle(const struct report *report, FILE *out)
+{
+	const struct cycle_stats *st = &report->page->cycle;
+	int64_t lock_ns = GET(st->dc_lock_ns);
+	char buf[TEXT_BYTES];
+
+	fprintf(out, "cycle      %" PRIu64 "   period %s", GET(st->cycle_number),
+		text_ns((int64_t)report->page->period_ns, buf));
+	if (report->has_wkc) {
+		fprintf(out, "   WKC %u/%u", report->wkc, report->wkc_expected);
+	}
+	if (GET(report->page->cycle_cpu) != UINT32_MAX) {
+		fprintf(out, "   core %u", GET(report->page->cycle_cpu));
+	}
+	fputs(GET(st->is_fail_safe) ? "   outputs FAIL-SAFE\n" : "\n", out);
+	fprintf(out, "DC         %s", dc_state_to_str(GET(st->dc_state)));
+	if (lock_ns > 0) {
+		fprintf(out, " after %s", text_ns(lock_ns, buf));
+	}
+	fprintf(out,
+		"   correction %+" PRId64 " ppb   lock lost %" PRIu64 "   largest difference %s\n",
+		GET(st->correction_ppb), GET(st->dc_unlocks),
+		text_ns(GET(st->dc_diff_max_ns), buf));
+	fprintf(out,
+		"frames     sent %" PRIu64 "   lost %" PRIu64 "   late %" PRIu64
+		"   doubled %" PRIu64 "   foreign %" PRIu64 "\n",
+		GET(st->frames_sent), GET(st->frames_lost), GET(st->frames_late),
+		GET(st->frames_doubled), GET(st->frames_foreign));
+	fprintf(out,
+		"cycles     %" PRIu64 "   overruns %" PRIu64 "   skipped %" PRIu64
+		"   WKC low %" PRIu64 "   page faults %" PRIu64 "   rides %" PRIu64 "\n",
+		GET(st->cycles), GET(st->overruns), GET(st->cycles_skipped), GET(st->wkc_low),
+		GET(st->page_faults), GET(st->rides));
+	fprintf(out,
+		"samples    good %" PRIu64 "   bad %" PRIu64 "   of these unexplained %" PRIu64
+		"\n",
+		GET(st->samples_good), GET(st->samples_bad), GET(st->samples_bad_unexplained));
+}
+
+static void write_times(const struct cycle_stats *st, FILE *out)
+{
+	const struct {
+		const char *name;
+		const struct histogram *histogram;
+	} rows[] = { { "wake", &st->wake_latency },
+		     { "round trip", &st->round_trip },
+		     { "phase", &st->phase },
+		     { "work", &st->work } };
+	char p50[TEXT_BYTES];
+	char p999[TEXT_BYTES];
+	char max[TEXT_BYTES];
+
+	fprintf(out, "%-10s %11s %11s %11s\n", "time", "p50", "p99.9", "max");
+	for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+		const struct histogram *h = rows[i].histogram;
+
+		if (GET(h->count) == 0) {
+			fprintf(out, "%-10s %11s %11s %11s\n", rows[i].name, "-", "-", "-");
+			continue;
+		}
+		fprintf(out, "%-10s %11s %11s %11s\n", rows[i].name,
+			text_ns(histogram_percentile(h, 500000), p50),
+			text_ns(histogram_percentile(h, 999000), p999),
+			text_ns(histogram_max_magnitude(h), max));
+	}
+}
+
+static void write_slave(const struct status_page *page, uint32_t index, FILE *out)
+{
+	const struct slave_status *slave = &page->slave[index];
+	struct slave_info info = source_slave(page, index);
+	uint32_t code = GET(slave->al_status_code);
+	char state[24];
+	char diff[TEXT_BYTES] = "-";
+	uint64_t rx = 0;
+	uint64_t links = 0;
+
+	report_al_format(GET(slave->al_state), state, sizeof(state));
+	for (int port = 0; port < 4; port++) {
+		rx += GET(slave->rx_errors[port]);
+		links += GET(slave->lost_links[port]);
+	}
+	if (info.has_dc) {
+		text_ns(GET(slave->dc_diff_ns), diff);
+	}
+	fprintf(out, "%3u %-16s %-13s %12" PRIu64 " %10" PRIu64 " %10s %6" PRIu64 " %6" PRIu64,
+		index, info.name, GET(slave->is_lost) ? "LOST" : state,
+		GET(page->cycle.slave_good[index]), GET(page->cycle.slave_bad[index]),
+		info.is_dc_reference ? "reference" : diff, rx, links);
+	if (code != 0) {
+		fprintf(out, "  0x%04x %s", code, al_status_code_to_str((uint16_t)code));
+	}
+	fputc('\n', out);
+}
+
+static void write_recorder(const struct report *report, FILE *out)
+{
+	const struct record_status *record = report->record;
+	char written[TEXT_BYTES];
+	char left[TEXT_BYTES];
+	char text[512];
+
+	if (record == NULL) {
+		fputs("recorder   none\n", out);
+		return;
+	}
+	fprintf(out,
+		"recorder   %s%s   %" PRIu64 " cycles, %" PRIu64 " gaps (%" PRIu64
+		" missing)   lag %" PRIu64 " cycles   %s written   %s free\n",
+		record_state_to_str(GET(record->state)),
+		report->is_recorder_running ? "" : " (gone)", GET(record->recorded_cycles),
+		GET(record->recorded_gaps), GET(record->cycles_missing), GET(record->lag_cycles),
+		text_bytes(GET(record->bytes_written), written),
+		text_bytes(GET(record->bytes_free), left));
+	status_text_get(&record->text_sequence, record->path, sizeof(record->path), text);
+	if (text[0] != '\0') {
+		fprintf(out, "           %s\n", text);
+	}
+	status_text_get(&record->text_sequence, record->message, sizeof(record->message), text);
+	if (text[0] != '\0') {
+		fprintf(out, "           %s\n", text);
+	}
+}
+
+static void write_message(const struct status_page *page, FILE *out)
+{
+	char text[sizeof(page->message)];
+	char plain[sizeof(text)];
+
+	status_text_get(&page->text_sequence, page->message, sizeof(page->message), text);
+	if (text[0] != '\0') {
+		fprintf(out, "message    %s\n", text_plain(text, plain, sizeof(plain)));
+	}
+}
+
+void report_write_screen(const struct report *report, FILE *out)
+{
+	uint32_t count = source_slave_count(report->page);
+
+	write_head(report, out);
+	write_message(report->page, out);
+	write_degraded(report->page, out);
+	write_cycle(report, out);
+	write_times(&report->page->cycle, out);
+	write_recorder(report, out);
+	if (count > 0) {
+		fprintf(out, "%3s %-16s %-13s %12s %10s %10s %6s %6s\n", "pos", "slave", "state",
+			"good", "bad", "dc diff", "rx err", "links");
+	}
+	for (uint32_t i = 0; i < count; i++) {
+		write_slave(report->page, i, out);
+	}
+}
+
+void report_write_summary(const struct report *report, FILE *out)
+{
+	const struct cycle_stats *st = &report->page->cycle;
+	uint32_t count = source_slave_count(report->page);
+
+	fprintf(out,
+		"%s: %u slave%s, %" PRIu64 " cycles; frames: %" PRIu64 " lost, %" PRIu64
+		" late; %" PRIu64 " overruns; samples: %" PRIu64 " good, %" PRIu64 " bad, %" PRIu64
+		" unexplained; %" PRIu64 " page faults\n",
+		bus_state_to_str(GET(report->page->bus_state)), count, count == 1 ? "" : "s",
+		GET(st->cycles), GET(st->frames_lost), GET(st->frames_late), GET(st->overruns),
+		GET(st->samples_good), GET(st->samples_bad), GET(st->samples_bad_unexplained),
+		GET(st->page_faults));
+	write_times(st, out);
+	write_recorder(report, out);
+	write_message(report->page, out);
+}

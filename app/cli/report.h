@@ -1,0 +1,40 @@
+/* SPDX-License-Identifier: MIT */
+/* The state of ecdaqd and ecdaq-record, gathered once and shown as a screen, a summary or JSON. */
+#ifndef CLI_REPORT_H
+#define CLI_REPORT_H
+
+#include <stdio.h>
+
+#include "base/status.h"
+#include "cli/json.h"
+
+struct report {
+	const struct status_page *page;
+	const struct record_status *record; /* NULL: no recorder was started */
+	int is_running;                     /* ecdaqd's process is there */
+	int is_recorder_running;
+	int has_wkc; /* the newest sample could be read */
+	uint16_t wkc;
+	uint16_t wkc_expected;
+	uint32_t flags; /* of the newest sample */
+};
+
+struct cli;
+/** Look at the rest of the run directory; @page and @record as they were mapped. */
+void report_gather(struct cli *cli, const struct status_page *page,
+		   const struct record_status *record, struct report *ret_report);
+
+/** The screen of `ecdaq status` and `ecdaq top`. */
+void report_write_screen(const struct report *report, FILE *out);
+/** A few lines for the end of a run. */
+void report_write_summary(const struct report *report, FILE *out);
+/** One JSON object, without the end of the line; doc/cli.md lists its keys. */
+void report_write_json(const struct report *report, struct json *js);
+
+/** "OP", "SAFE-OP+ERROR". */
+void report_al_format(uint32_t al_state, char *buf, size_t buf_len);
+
+/** One slave as a JSON object in an array. */
+void report_slave_json(const struct status_page *page, uint32_t index, struct json *js);
+
+#endif

@@ -1,0 +1,40 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The terminal: its size, a screen that is drawn over and over, keys without Enter, and signals as
+ * news. Plain ANSI sequences, no terminal library: it must work on the serial console of the
+ * appliance. One per process. Context: main thread.
+ */
+#ifndef CLI_SCREEN_H
+#define CLI_SCREEN_H
+
+#include <stdint.h>
+
+struct screen_size {
+	int rows;
+	int columns;
+};
+
+/** Is standard output a terminal? */
+int screen_is_terminal(void);
+/** Size of the terminal, or what $LINES and $COLUMNS say, or 24 by 80. */
+struct screen_size screen_size(void);
+/** Does the locale speak UTF-8? */
+int screen_is_utf8(void);
+
+/** SIGINT, SIGTERM and SIGHUP no longer end the program, but screen_is_over() says so. */
+void screen_catch_signals(void);
+int screen_is_over(void);
+
+/** Take the terminal over: another buffer, no cursor, keys one by one. Undone by screen_end(). */
+void screen_begin(void);
+void screen_end(void);
+/** Show @text, lines cut at the terminal's edge, what was there before wiped. */
+void screen_draw(const char *text);
+
+/**
+ * Wait @ns or for a key: its code, or 0. 'q', Ctrl-C and a caught signal make screen_is_over() true
+ * and end the wait. Without screen_begin() no keys are read.
+ */
+int screen_wait(int64_t ns);
+
+#endif

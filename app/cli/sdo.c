@@ -1,0 +1,282 @@
+/* SPDX-License-Identifier: MIT */
+/* ecdaq sdo read, ecdaq sdo write */
+#include <ctype.h>
+#include <errno.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "base/bytes.h"
+#include "cli/admin_client.h"
+#include "cli/args.h"
+#include "cli/json.h"
+#include "cli/sdo_abort.h"
+#include "cli/source.h"
+#include "config/sdo_value.h"
+
+struct sdo {
+	struct cli *cli;
+	const char *type; /* as given; NULL: none */
+	int is_json;
+	struct admin_request request;
+	struct admin_reply reply;
+};
+
+/* "0x1018:1": hexadecimal with 0x, else decimal; the subindex may be left out. */
+static int parse_object(const char *text, uint16_t *ret_index, uint8_t *ret_subindex)
+{
+	unsigned long index;
+	unsigned long subindex = 0;
+	char *end;
+
+	if (!isdigit((unsigned char)text[0])) {
+		return -EINVAL;
+	}
+	index = strtoul(text, &end, 0);
+	if (*end == ':' && isdigit((unsigned char)end[1])) {
+		subindex = strtoul(end + 1, &end, 0);
+	}
+	if (*end != '\0' || index == 0 || index > 0xffff || subindex > 0xff) {
+		return -EINVAL;
+	}
+	*ret_index = (uint16_t)index;
+	*ret_subindex = (uint8_t)subindex;
+	return 0;
+}
+
+/* Ask, and say an abort in the words of ETG.1000.6. */
+static enum cli_exit ask(struct sdo *sdo)
+{
+	enum cli_exit result = admin_ask(sdo->cli, &sdo->request, &sdo->reply);
+
+	if (result == CLI_OK && sdo->reply.result < 0 && sdo->reply.sdo_abort != 0) {
+		return cli_fail(sdo->cli, CLI_REFUSED,
+				"slave %u: 0x%04x:%02x: SDO abort 0x%08x: %s",
+				sdo->request.slave_pos, sdo->request.index, sdo->request.subindex,
+				sdo->reply.sdo_abort, sdo_abort_to_str(sdo->reply.sdo_abort));
+	}
+	return result == CLI_OK ? admin_judge(sdo->cli, &sdo->reply) : result;
+}
+
+/* The type that data of @len bytes are shown in when none was given; -1: none fits. */
+static int type_by_length(uint32_t len)
+{
+	switch (len) {
+	case 1:
+		return SDO_USINT;
+	case 2:
+		return SDO_UINT;
+	case 4:
+		return SDO_UDINT;
+	case 8:
+		return SDO_ULINT;
+	default:
+		return -1;
+	}
+}
+
+static uint64_t bits_of(const struct admin_reply *reply)
+{
+	uint8_t padded[8] = { 0 };
+
+	memcpy(padded, reply->data, reply->data_len > 8 ? 8 : reply->data_len);
+	return get_le64(padded);
+}
+
+static void format_hex(const struct admin_reply *reply, char *buf, size_t buf_len)
+{
+	buf[0] = '\0';
+	for (uint32_t i = 0; i < reply->data_len && 3 * i + 4 < buf_len; i++) {
+		snprintf(buf + 3 * i, buf_len - 3 * i, "%02x ", reply->data[i]);
+	}
+	if (buf[0] != '\0') {
+		buf[strlen(buf) - 1] = '\0';
+	}
+}
+
+static void copy_string(const struct admin_reply *reply, int is_terminal, char *buf, size_t buf_len)
+{
+	size_t len = strnlen((const char *)reply->data, reply->data_len);
+
+	snprintf(buf, buf_len, "%.*s", (int)len, (const char *)reply->data);
+	for (char *p = buf; is_terminal && *p != '\0'; p++) {
+		if ((unsigned char)*p < 0x20 || *p == 0x7f) {
+			*p = '?';
+		}
+	}
+}
+
+static void write_json_value(struct json *js, int type, uint64_t bits)
+{
+	char text[32];
+
+	if (type == SDO_BOOL) {
+		json_truth(js, "value", bits != 0);
+	} else if (type == SDO_REAL || type == SDO_LREAL) {
+		sdo_value_format((enum sdo_type)type, bits, text, sizeof(text));
+		json_double(js, "value", strtod(text, NULL));
+	} else if (type == SDO_SINT || type == SDO_INT || type == SDO_DINT || type == SDO_LINT) {
+		sdo_value_format((enum sdo_type)type, bits, text, sizeof(text));
+		json_i64(js, "value", strtoll(text, NULL, 10));
+	} else {
+		json_u64(js, "value", bits);
+	}
+}
+
+/* @type: an enum sdo_type, SDO_TYPES for a string, -1 for none. */
+static void show(const struct sdo *sdo, int type)
+{
+	const struct admin_reply *reply = &sdo->reply;
+	char hex[3 * ADMIN_DATA_BYTES + 1];
+	char text[ADMIN_DATA_BYTES + 1];
+	struct json js;
+
+	format_hex(reply, hex, sizeof(hex));
+	if (!sdo->is_json) {
+		if (type == SDO_TYPES) {
+			copy_string(reply, 1, text, sizeof(text));
+			puts(text);
+		} else if (type >= 0 && sdo->type != NULL) {
+			sdo_value_format((enum sdo_type)type, bits_of(reply), text, sizeof(text));
+			puts(text);
+		} else if (type >= 0) {
+			printf("0x%0*" PRIx64 " %" PRIu64 "\n", (int)(2 * reply->data_len),
+			       bits_of(reply), bits_of(reply));
+		} else {
+			puts(hex);
+		}
+		return;
+	}
+	json_init(&js, stdout);
+	json_object_begin(&js, NULL);
+	json_u64(&js, "slave", sdo->request.slave_pos);
+	json_u64(&js, "index", sdo->request.index);
+	json_u64(&js, "subindex", sdo->request.subindex);
+	json_text(&js, "bytes", hex);
+	if (type == SDO_TYPES) {
+		copy_string(reply, 0, text, sizeof(text));
+		json_text(&js, "value", text);
+	} else if (type >= 0) {
+		write_json_value(&js, type, bits_of(reply));
+	} else {
+		json_null(&js, "value");
+	}
+	json_object_end(&js);
+	json_end_line(&js);
+}
+
+static enum cli_exit find_type(const struct sdo *sdo, int *ret_type)
+{
+	*ret_type = -1;
+	if (sdo->type == NULL) {
+		return CLI_OK;
+	}
+	if (strcasecmp(sdo->type, "STRING") == 0) {
+		*ret_type = SDO_TYPES;
+		return CLI_OK;
+	}
+	*ret_type = sdo_type_find(sdo->type);
+	return *ret_type >= 0
+		       ? CLI_OK
+		       : cli_fail(sdo->cli, CLI_USAGE,
+				  "--type: %s: is none of " SDO_TYPE_WORDS "|STRING", sdo->type);
+}
+
+static enum cli_exit read_object(struct sdo *sdo, int type)
+{
+	enum cli_exit result;
+
+	sdo->request.verb = ADMIN_SDO_READ;
+	result = ask(sdo);
+	if (result != CLI_OK) {
+		return result;
+	}
+	if (type < 0) {
+		type = type_by_length(sdo->reply.data_len);
+	} else if (type != SDO_TYPES &&
+		   sdo_type_bytes((enum sdo_type)type) != sdo->reply.data_len) {
+		return cli_fail(sdo->cli, CLI_FAILED, "--type: the object has %u bytes, %s has %u",
+				sdo->reply.data_len, sdo_type_to_str((enum sdo_type)type),
+				sdo_type_bytes((enum sdo_type)type));
+	}
+	show(sdo, type);
+	return CLI_OK;
+}
+
+static enum cli_exit write_object(struct sdo *sdo, int type, const char *value)
+{
+	uint8_t bytes[8];
+	uint64_t bits;
+	int r;
+
+	if (type < 0 || type == SDO_TYPES) {
+		return cli_fail(sdo->cli, CLI_USAGE,
+				"--type: writing wants one of " SDO_TYPE_WORDS);
+	}
+	r = sdo_value_parse((enum sdo_type)type, value, &bits);
+	if (r < 0) {
+		return cli_fail(sdo->cli, CLI_USAGE, "%s: %s %s", value,
+				r == -ERANGE ? "does not fit into" : "is no",
+				sdo_type_to_str((enum sdo_type)type));
+	}
+	put_le64(bytes, bits);
+	sdo->request.verb = ADMIN_SDO_WRITE;
+	sdo->request.data_len = (uint16_t)sdo_type_bytes((enum sdo_type)type);
+	memcpy(sdo->request.data, bytes, sdo->request.data_len);
+	return ask(sdo);
+}
+
+static enum cli_exit run(struct sdo *sdo, const struct args *args)
+{
+	const struct status_page *page;
+	int is_write = strcmp(args->operands[0], "write") == 0;
+	enum cli_exit result;
+	int type;
+
+	if (!is_write && strcmp(args->operands[0], "read") != 0) {
+		return cli_fail(sdo->cli, CLI_USAGE, "%s: wants read or write", args->operands[0]);
+	}
+	if (args->operand_count != (is_write ? 4 : 3)) {
+		return cli_fail(sdo->cli, CLI_USAGE,
+				is_write ? "write: wants SLAVE INDEX:SUB VALUE"
+					 : "read: wants SLAVE INDEX:SUB");
+	}
+	if (parse_object(args->operands[2], &sdo->request.index, &sdo->request.subindex) < 0) {
+		return cli_fail(sdo->cli, CLI_USAGE, "%s: wants INDEX:SUB such as 0x1018:1",
+				args->operands[2]);
+	}
+	result = find_type(sdo, &type);
+	if (result != CLI_OK) {
+		return result;
+	}
+	result = source_status(sdo->cli, &page);
+	if (result != CLI_OK) {
+		return result;
+	}
+	result = source_find_slave(sdo->cli, page, args->operands[1], &sdo->request.slave_pos);
+	source_status_close(page);
+	if (result != CLI_OK) {
+		return result;
+	}
+	return is_write ? write_object(sdo, type, args->operands[3]) : read_object(sdo, type);
+}
+
+enum cli_exit verb_sdo(struct cli *cli, int argc, char **argv)
+{
+	struct sdo sdo = { .cli = cli };
+	const struct args_option options[] = {
+		{ "type", 't', ARGS_TEXT, &sdo.type, "TYPE", "data type of the object" },
+		{ "json", 0, ARGS_FLAG, &sdo.is_json, NULL, "what was read as a JSON object" },
+	};
+	struct args args = {
+		.options = options, .option_count = 2, .operands_min = 3, .operands_max = 4
+	};
+	enum cli_exit result;
+
+	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
+		return result;
+	}
+	return run(&sdo, &args);
+}

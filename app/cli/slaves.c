@@ -1,0 +1,105 @@
+/* SPDX-License-Identifier: MIT */
+/* ecdaq slaves */
+#include <inttypes.h>
+#include <stdio.h>
+
+#include "cli/args.h"
+#include "cli/report.h"
+#include "cli/source.h"
+#include "cli/text.h"
+#include "wire/al.h"
+
+#define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
+
+static void show(const struct status_page *page, uint32_t index)
+{
+	struct slave_info info = source_slave(page, index);
+	char device[sizeof(info.device)];
+	char state[24];
+
+	report_al_format(GET(page->slave[index].al_state), state, sizeof(state));
+	printf("%2u  %u:%u  %-13s %c  %-16s %s\n", index, info.alias, index,
+	       GET(page->slave[index].is_lost) ? "LOST" : state,
+	       (GET(page->slave[index].al_state) & AL_ERROR) != 0 ? 'E' : '+', info.name,
+	       text_plain(info.device, device, sizeof(device)));
+}
+
+static void show_ports(const char *name, const _Atomic uint32_t *counts)
+{
+	printf("    %-16s", name);
+	for (int port = 0; port < 4; port++) {
+		printf(" %u", GET(counts[port]));
+	}
+	putchar('\n');
+}
+
+static void show_more(const struct status_page *page, uint32_t index)
+{
+	const struct slave_status *slave = &page->slave[index];
+	struct slave_info info = source_slave(page, index);
+	uint32_t code = GET(slave->al_status_code);
+	char buf[TEXT_BYTES];
+
+	printf("    %-16s 0x%08x\n", "vendor", info.vendor);
+	printf("    %-16s 0x%08x\n", "product", info.product);
+	printf("    %-16s 0x%08x\n", "revision", info.revision);
+	printf("    %-16s 0x%08x\n", "serial", info.serial);
+	printf("    %-16s 0x%04x\n", "station address", info.station_addr);
+	printf("    %-16s 0x%04x %s\n", "AL status code", code,
+	       al_status_code_to_str((uint16_t)code));
+	printf("    %-16s %u in, %u out\n", "bits", info.input_bits, info.output_bits);
+	if (info.has_dc) {
+		printf("    %-16s %s%s\n", "DC delay", text_ns(info.dc_delay_ns, buf),
+		       info.is_dc_reference ? " (reference clock)" : "");
+		printf("    %-16s %s\n", "DC difference", text_ns(GET(slave->dc_diff_ns), buf));
+	} else {
+		printf("    %-16s none\n", "DC");
+	}
+	printf("    %-16s %" PRIu64 " good, %" PRIu64 " bad\n", "samples",
+	       GET(page->cycle.slave_good[index]), GET(page->cycle.slave_bad[index]));
+	show_ports("receive errors", slave->rx_errors);
+	show_ports("lost links", slave->lost_links);
+}
+
+enum cli_exit verb_slaves(struct cli *cli, int argc, char **argv)
+{
+	int is_json = 0;
+	int is_verbose = 0;
+	const struct args_option options[] = {
+		{ "json", 0, ARGS_FLAG, &is_json, NULL, "a JSON array" },
+		{ "verbose", 'v', ARGS_FLAG, &is_verbose, NULL,
+		  "identity, clock and error counters" },
+	};
+	struct args args = { .options = options, .option_count = 2 };
+	const struct status_page *page;
+	enum cli_exit result;
+	struct json js;
+
+	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
+		return result;
+	}
+	result = source_status(cli, &page);
+	if (result != CLI_OK) {
+		return result;
+	}
+	json_init(&js, stdout);
+	if (is_json) {
+		json_array_begin(&js, NULL);
+	}
+	for (uint32_t i = 0; i < source_slave_count(page); i++) {
+		if (is_json) {
+			report_slave_json(page, i, &js);
+			continue;
+		}
+		show(page, i);
+		if (is_verbose) {
+			show_more(page, i);
+		}
+	}
+	if (is_json) {
+		json_array_end(&js);
+		json_end_line(&js);
+	}
+	source_status_close(page);
+	return CLI_OK;
+}

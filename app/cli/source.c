@@ -1,0 +1,246 @@
+/* SPDX-License-Identifier: MIT */
+#include "cli/source.h"
+
+#include <errno.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "image/image.h"
+
+/* Say why @path cannot be read. */
+static enum cli_exit fail_open(const struct cli *cli, const char *what, const char *path, int err)
+{
+	switch (err) {
+	case ENOENT:
+	case ENOTDIR:
+		return cli_fail(cli, CLI_NO_DAEMON, "%s: %s is not there: is ecdaqd running?", what,
+				path);
+	case EACCES:
+	case EPERM:
+		return cli_fail(cli, CLI_PERMISSION,
+				"%s: no permission to read %s: be root or in its group", what,
+				path);
+	case EPROTO:
+		return cli_fail(cli, CLI_FAILED,
+				"%s: %s is of another version of ecdaq, or damaged", what, path);
+	default:
+		return cli_fail(cli, CLI_FAILED, "%s: %s: %s", what, path, strerror(err));
+	}
+}
+
+enum cli_exit source_status(struct cli *cli, const struct status_page **ret_page)
+{
+	const struct status_page *page;
+	char path[CONFIG_PATH_BYTES];
+	enum cli_exit result = cli_path(cli, CONFIG_RUN_STATUS, path);
+
+	if (result != CLI_OK) {
+		return result;
+	}
+	page = status_open(path, STATUS_MAGIC, sizeof(*page));
+	if (page == NULL) {
+		return fail_open(cli, "status", path, errno);
+	}
+	*ret_page = page;
+	return CLI_OK;
+}
+
+const struct record_status *source_record(struct cli *cli)
+{
+	char path[CONFIG_PATH_BYTES];
+
+	if (cli_path(cli, CONFIG_RUN_RECORD_STATUS, path) != CLI_OK) {
+		return NULL;
+	}
+	return status_open(path, RECORD_STATUS_MAGIC, sizeof(struct record_status));
+}
+
+void source_status_close(const struct status_page *page)
+{
+	status_unmap(page, sizeof(*page));
+}
+
+void source_record_close(const struct record_status *record)
+{
+	status_unmap(record, sizeof(*record));
+}
+
+int source_is_alive(int64_t pid)
+{
+	return pid > 0 && (kill((pid_t)pid, 0) == 0 || errno == EPERM);
+}
+
+static int is_closed_text(const char *text, size_t len)
+{
+	return memchr(text, 0, len) != NULL;
+}
+
+/* Does the ring's description fit into its meta area, and what it describes into a slot? */
+static int is_sane(const struct ring_reader *reader)
+{
+	size_t bytes;
+	const struct sample_meta *meta = ring_meta(reader, &bytes);
+	const struct slave_info *slaves;
+	const struct channel *channels;
+
+	if (strcmp(ring_kind(reader), "sample") != 0 || bytes < sizeof(*meta) ||
+	    meta->version != SAMPLE_VERSION || meta->slave_count > LIMIT_SLAVES ||
+	    meta->channel_count > LIMIT_CHANNELS ||
+	    bytes < sizeof(*meta) + meta->slave_count * sizeof(*slaves) +
+			    meta->channel_count * sizeof(*channels) ||
+	    ring_payload_bytes(reader) < sizeof(struct sample_header) ||
+	    meta->image_bytes > ring_payload_bytes(reader) - sizeof(struct sample_header)) {
+		return 0;
+	}
+	slaves = sample_meta_slaves(meta);
+	channels = sample_meta_channels(meta);
+	for (uint32_t i = 0; i < meta->slave_count; i++) {
+		if (!is_closed_text(slaves[i].name, sizeof(slaves[i].name)) ||
+		    !is_closed_text(slaves[i].device, sizeof(slaves[i].device))) {
+			return 0;
+		}
+	}
+	for (uint32_t i = 0; i < meta->channel_count; i++) {
+		if (!is_closed_text(channels[i].name, sizeof(channels[i].name)) ||
+		    !is_closed_text(channels[i].unit, sizeof(channels[i].unit)) ||
+		    !image_channel_fits(&channels[i], meta->image_bytes)) {
+			return 0;
+		}
+	}
+	return 1;
+}
+
+int samples_try(struct cli *cli, struct samples *ret_samples)
+{
+	struct samples samples = { .reader = NULL };
+	char path[CONFIG_PATH_BYTES];
+	size_t bytes;
+	int r;
+
+	if (cli_path(cli, CONFIG_RUN_SAMPLES, path) != CLI_OK) {
+		return -ENAMETOOLONG;
+	}
+	r = ring_reader_open(path, &samples.reader);
+	if (r < 0) {
+		return r;
+	}
+	samples.payload = malloc(ring_payload_bytes(samples.reader));
+	if (samples.payload == NULL || !is_sane(samples.reader)) {
+		r = samples.payload == NULL ? -ENOMEM : -EPROTO;
+		samples_close(&samples);
+		return r;
+	}
+	samples.meta = ring_meta(samples.reader, &bytes);
+	samples.slaves = sample_meta_slaves(samples.meta);
+	samples.channels = sample_meta_channels(samples.meta);
+	*ret_samples = samples;
+	return 0;
+}
+
+enum cli_exit samples_open(struct cli *cli, struct samples *ret_samples)
+{
+	char path[CONFIG_PATH_BYTES];
+	enum cli_exit result = cli_path(cli, CONFIG_RUN_SAMPLES, path);
+	int r;
+
+	if (result != CLI_OK) {
+		return result;
+	}
+	r = samples_try(cli, ret_samples);
+	return r < 0 ? fail_open(cli, "samples", path, -r) : CLI_OK;
+}
+
+void samples_close(struct samples *samples)
+{
+	ring_reader_destroy(samples->reader);
+	free(samples->payload);
+	samples->reader = NULL;
+	samples->payload = NULL;
+}
+
+struct sample_header samples_header(const struct samples *samples)
+{
+	struct sample_header header;
+
+	memcpy(&header, samples->payload, sizeof(header));
+	return header;
+}
+
+const uint8_t *samples_image(const struct samples *samples)
+{
+	return samples->payload + sizeof(struct sample_header);
+}
+
+int samples_is_stale(uint32_t flags)
+{
+	return (flags & (SAMPLE_LOST | SAMPLE_WKC_LOW | SAMPLE_SKIPPED)) != 0;
+}
+
+const char *samples_flag_name(unsigned bit)
+{
+	static const char *const names[] = { "lost",        "late",        "wkc_low",
+					     "not_op",      "fail_safe",   "skipped",
+					     "bad_counter", "dc_unlocked", "doubled" };
+
+	return bit < sizeof(names) / sizeof(names[0]) ? names[bit] : NULL;
+}
+
+void samples_flags_format(uint32_t flags, char *buf, size_t buf_len)
+{
+	size_t used = 0;
+
+	buf[0] = '\0';
+	for (unsigned bit = 0; bit < 32 && used < buf_len; bit++) {
+		if ((flags >> bit & 1) != 0 && samples_flag_name(bit) != NULL) {
+			int n = snprintf(buf + used, buf_len - used, "%s%s", used == 0 ? "" : " ",
+					 samples_flag_name(bit));
+
+			used += n < 0 ? 0 : (size_t)n;
+		}
+	}
+}
+
+uint32_t source_slave_count(const struct status_page *page)
+{
+	uint32_t count = atomic_load_explicit(&page->slave_count, memory_order_acquire);
+
+	return count > LIMIT_SLAVES ? LIMIT_SLAVES : count;
+}
+
+struct slave_info source_slave(const struct status_page *page, uint32_t index)
+{
+	struct slave_info info = page->slave[index].info;
+
+	info.name[sizeof(info.name) - 1] = '\0';
+	info.device[sizeof(info.device) - 1] = '\0';
+	return info;
+}
+
+enum cli_exit source_find_slave(const struct cli *cli, const struct status_page *page,
+				const char *text, uint16_t *ret_pos)
+{
+	uint32_t count = source_slave_count(page);
+	unsigned long pos;
+	char *end;
+
+	for (uint32_t i = 0; i < count; i++) {
+		if (strcmp(source_slave(page, i).name, text) == 0) {
+			*ret_pos = (uint16_t)i;
+			return CLI_OK;
+		}
+	}
+	errno = 0;
+	pos = strtoul(text, &end, 10);
+	if (text[0] < '0' || text[0] > '9' || *end != '\0' || errno != 0) {
+		return cli_fail(cli, CLI_FAILED, "%s: no slave of this name (see ecdaq slaves)",
+				text);
+	}
+	if (pos >= count) {
+		return cli_fail(cli, CLI_FAILED, "%s: no slave at this position, there are %u",
+				text, count);
+	}
+	*ret_pos = (uint16_t)pos;
+	return CLI_OK;
+}

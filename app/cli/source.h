@@ -1,0 +1,63 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * Where the reading verbs read: status pages and rings of the run directory, all mapped read-only.
+ * Nothing found there is trusted: a table that does not fit into its ring is refused. What goes
+ * wrong is said (cli_fail).
+ */
+#ifndef CLI_SOURCE_H
+#define CLI_SOURCE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/ring.h"
+#include "base/sample.h"
+#include "base/status.h"
+#include "cli/cli.h"
+
+/** Map ecdaqd's status page. CLI_OK, or the code of a failure that was said. */
+enum cli_exit source_status(struct cli *cli, const struct status_page **ret_page);
+/** The recorder's page, or NULL: it may not have been started. Nothing is said. */
+const struct record_status *source_record(struct cli *cli);
+void source_status_close(const struct status_page *page);
+void source_record_close(const struct record_status *record);
+
+/** Is the process that wrote a page still there? */
+int source_is_alive(int64_t pid);
+
+/* The sample ring with its own description. */
+struct samples {
+	struct ring_reader *reader;
+	const struct sample_meta *meta;
+	const struct slave_info *slaves;
+	const struct channel *channels;
+	uint8_t *payload; /* one slot: a sample_header, then the image */
+};
+
+/** CLI_OK, or the code of a failure that was said. Release with samples_close(). */
+enum cli_exit samples_open(struct cli *cli, struct samples *ret_samples);
+/** The same without a word; 0 or -errno. */
+int samples_try(struct cli *cli, struct samples *ret_samples);
+void samples_close(struct samples *samples);
+
+/** Header and image of the slot that was read last. */
+struct sample_header samples_header(const struct samples *samples);
+const uint8_t *samples_image(const struct samples *samples);
+
+/** Flags that make the inputs of a sample those of an earlier cycle. */
+int samples_is_stale(uint32_t flags);
+
+/** The words of @flags, "lost late", separated by blanks. */
+void samples_flags_format(uint32_t flags, char *buf, size_t buf_len);
+/** The word of bit @bit; NULL for one that has none. */
+const char *samples_flag_name(unsigned bit);
+
+/** The n-th slave of the status page, copied, its texts closed. */
+struct slave_info source_slave(const struct status_page *page, uint32_t index);
+uint32_t source_slave_count(const struct status_page *page);
+
+/** The position that @text names, "piccolo0" or "1", or the code of a failure that was said. */
+enum cli_exit source_find_slave(const struct cli *cli, const struct status_page *page,
+				const char *text, uint16_t *ret_pos);
+
+#endif

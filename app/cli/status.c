@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: MIT */
+/* ecdaq status */
+#include <stdio.h>
+
+#include "cli/args.h"
+#include "cli/report.h"
+#include "cli/source.h"
+
+enum cli_exit verb_status(struct cli *cli, int argc, char **argv)
+{
+	int is_json = 0;
+	int is_summary = 0;
+	const struct args_option options[] = {
+		{ "json", 0, ARGS_FLAG, &is_json, NULL,
+		  "all of it as one JSON object in one line" },
+		{ "summary", 0, ARGS_FLAG, &is_summary, NULL,
+		  "only what one asks at the end of a run" },
+	};
+	struct args args = { .options = options, .option_count = 2 };
+	const struct status_page *page;
+	const struct record_status *record;
+	struct report report;
+	struct json js;
+	enum cli_exit result;
+
+	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
+		return result;
+	}
+	result = source_status(cli, &page);
+	if (result != CLI_OK) {
+		return result;
+	}
+	record = source_record(cli);
+	report_gather(cli, page, record, &report);
+	if (is_json) {
+		json_init(&js, stdout);
+		report_write_json(&report, &js);
+		json_end_line(&js);
+	} else if (is_summary) {
+		report_write_summary(&report, stdout);
+	} else {
+		report_write_screen(&report, stdout);
+	}
+	source_record_close(record);
+	source_status_close(page);
+	return CLI_OK;
+}

@@ -1,0 +1,195 @@
+/* SPDX-License-Identifier: MIT */
+/* ecdaq top: the status screen again and again, or a line an interval. */
+#include <errno.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <sys/stat.h>
+
+#include "base/clock.h"
+#include "cli/args.h"
+#include "cli/report.h"
+#include "cli/screen.h"
+#include "cli/source.h"
+#include "cli/text.h"
+
+#define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
+
+struct top {
+	struct cli *cli;
+	int64_t interval_ns;
+	int64_t wait_ns; /* for ecdaqd to appear */
+	int is_json;
+	int is_live;    /* a screen, not lines */
+	uint64_t count; /* of looks; 0: no end */
+	uint64_t looks;
+	uint64_t cycles_before;
+	uint64_t lost_before;
+};
+
+/* Has another ecdaqd put its page in the place of ours? */
+static int is_replaced(struct top *top, const struct status_page *page)
+{
+	const struct status_page *other;
+	char path[CONFIG_PATH_BYTES];
+	int is_other;
+
+	if (cli_path(top->cli, CONFIG_RUN_STATUS, path) != CLI_OK) {
+		return 0;
+	}
+	other = status_open(path, STATUS_MAGIC, sizeof(*other));
+	is_other = other == NULL || other->session != page->session;
+	source_status_close(other);
+	return is_other;
+}
+
+static void show_screen(const struct report *report)
+{
+	char *text = NULL;
+	size_t len = 0;
+	FILE *out = open_memstream(&text, &len);
+
+	if (out == NULL) {
+		return;
+	}
+	report_write_screen(report, out);
+	fputs("\nq: leave", out);
+	if (fclose(out) == 0) {
+		screen_draw(text);
+	}
+	free(text);
+}
+
+static void show_line(struct top *top, const struct report *report)
+{
+	const struct cycle_stats *st = &report->page->cycle;
+	uint64_t cycles = GET(st->cycles);
+	uint64_t lost = GET(st->frames_lost);
+	char wake[TEXT_BYTES];
+	char trip[TEXT_BYTES];
+	char phase[TEXT_BYTES];
+
+	if (top->looks == 0) {
+		printf("%-10s %12s %8s %8s %8s %8s %8s %11s %11s %11s\n", "state", "cycle",
+		       "+cycles", "+lost", "late", "overruns", "bad", "wake p99.9", "trip p99.9",
+		       "phase p99.9");
+	}
+	printf("%-10s %12" PRIu64 " %8" PRIu64 " %8" PRIu64 " %8" PRIu64 " %8" PRIu64 " %8" PRIu64
+	       " %11s %11s %11s\n",
+	       bus_state_to_str(GET(report->page->bus_state)), GET(st->cycle_number),
+	       top->looks == 0 ? 0 : cycles - top->cycles_before,
+	       top->looks == 0 ? 0 : lost - top->lost_before, GET(st->frames_late),
+	       GET(st->overruns), GET(st->samples_bad),
+	       text_ns(histogram_percentile(&st->wake_latency, 999000), wake),
+	       text_ns(histogram_percentile(&st->round_trip, 999000), trip),
+	       text_ns(histogram_percentile(&st->phase, 999000), phase));
+	fflush(stdout);
+	top->cycles_before = cycles;
+	top->lost_before = lost;
+}
+
+static void show(struct top *top, const struct report *report)
+{
+	struct json js;
+
+	if (top->is_json) {
+		json_init(&js, stdout);
+		report_write_json(report, &js);
+		json_end_line(&js);
+		fflush(stdout);
+	} else if (top->is_live) {
+		show_screen(report);
+	} else {
+		show_line(top, report);
+	}
+	top->looks++;
+}
+
+static enum cli_exit follow(struct top *top, const struct status_page *page)
+{
+	const struct record_status *record;
+	struct report report;
+
+	while (!screen_is_over()) {
+		/* The recorder may come, go and come back. */
+		record = source_record(top->cli);
+		report_gather(top->cli, page, record, &report);
+		show(top, &report);
+		source_record_close(record);
+		if (!report.is_running || is_replaced(top, page) || top->looks == top->count) {
+			break;
+		}
+		screen_wait(top->interval_ns);
+	}
+	screen_end();
+	/* What stood on the screen last is gone with it: leave it in the terminal. */
+	if (top->is_live && !screen_is_over()) {
+		record = source_record(top->cli);
+		report_gather(top->cli, page, record, &report);
+		report_write_screen(&report, stdout);
+		source_record_close(record);
+	}
+	return CLI_OK;
+}
+
+/* ecdaqd may just be starting. */
+static void wait_for_page(struct top *top)
+{
+	const int64_t step_ns = 50 * NS_PER_MS;
+	char path[CONFIG_PATH_BYTES];
+	struct stat st;
+
+	if (cli_path(top->cli, CONFIG_RUN_STATUS, path) != CLI_OK) {
+		return;
+	}
+	for (int64_t waited_ns = 0; waited_ns < top->wait_ns && !screen_is_over();
+	     waited_ns += step_ns) {
+		if (stat(path, &st) == 0 || errno != ENOENT) {
+			return;
+		}
+		screen_wait(step_ns);
+	}
+}
+
+enum cli_exit verb_top(struct cli *cli, int argc, char **argv)
+{
+	struct top top = {
+		.cli = cli,
+		.interval_ns = NS_PER_S / 2,
+		.is_live = screen_is_terminal(),
+		.wait_ns = screen_is_terminal() ? 10 * NS_PER_S : 0,
+	};
+	const struct args_option options[] = {
+		{ "interval", 'i', ARGS_DURATION, &top.interval_ns, "T",
+		  "time between looks (500ms)" },
+		{ "count", 'n', ARGS_COUNT, &top.count, "N", "end after N looks" },
+		{ "wait", 0, ARGS_DURATION, &top.wait_ns, "T",
+		  "how long to wait for an ecdaqd that is not there yet (10s on a terminal, else "
+		  "0s)" },
+		{ "json", 0, ARGS_FLAG, &top.is_json, NULL,
+		  "a line of JSON each look, as of status" },
+	};
+	struct args args = { .options = options, .option_count = 4 };
+	const struct status_page *page;
+	enum cli_exit result;
+
+	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
+		return result;
+	}
+	top.is_live = top.is_live && !top.is_json;
+	screen_catch_signals();
+	wait_for_page(&top);
+	if (screen_is_over()) {
+		return CLI_OK;
+	}
+	result = source_status(cli, &page);
+	if (result != CLI_OK) {
+		return result;
+	}
+	if (top.is_live) {
+		screen_begin();
+	}
+	result = follow(&top, page);
+	source_status_close(page);
+	return result;
+}

@@ -1,0 +1,343 @@
+/* SPDX-License-Identifier: MIT */
+/* ecdaq watch: values of channels as lines, JSON or curves. */
+#include <inttypes.h>
+#include <limits.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+
+#include "base/clock.h"
+#include "cli/args.h"
+#include "cli/choose.h"
+#include "cli/follow.h"
+#include "cli/json.h"
+#include "cli/lines.h"
+#include "cli/plot.h"
+#include "cli/screen.h"
+#include "image/image.h"
+
+#define DRAW_PERIOD_NS (NS_PER_S / 15)
+
+struct watch {
+	struct cli *cli;
+	struct args args;
+	struct follow follow;
+	struct choice choice;
+	struct plot *plot; /* NULL: lines */
+	const char *titles[CHOOSE_LIMIT];
+	int is_json;
+	int is_plot;
+	int is_live; /* the plot has the terminal */
+	int is_raw;
+	int needs_head;
+	uint64_t count; /* of samples; 0: no end */
+	uint64_t every;
+	double rate_hz;
+	int64_t window_ns;
+	uint64_t shown;
+	uint64_t missed;
+	uint64_t next_cycle; /* which should come next; 0: none came yet */
+	int64_t drawn_ns;
+};
+
+static int64_t now_ns(void)
+{
+	struct timespec ts;
+
+	clock_gettime(CLOCK_MONOTONIC, &ts);
+	return (int64_t)ts.tv_sec * NS_PER_S + ts.tv_nsec;
+}
+
+static const struct channel *chosen(const struct watch *watch, unsigned i)
+{
+	return &watch->follow.samples.channels[watch->choice.channel[i]];
+}
+
+/* @missed samples are not there, because @why. */
+static void print_gap(struct watch *watch, uint64_t missed, const char *why)
+{
+	struct json js;
+
+	watch->missed += missed;
+	if (watch->is_plot) {
+		return;
+	}
+	if (!watch->is_json) {
+		printf("# %" PRIu64 " samples missed: %s\n", missed, why);
+		return;
+	}
+	json_init(&js, stdout);
+	json_object_begin(&js, NULL);
+	json_u64(&js, "missed", missed);
+	json_text(&js, "why", why);
+	json_object_end(&js);
+	json_end_line(&js);
+}
+
+/* --- curves --- */
+
+static double plotted_value(const struct watch *watch, const struct channel *ch, uint64_t raw)
+{
+	struct channel plain = *ch;
+
+	if (watch->is_raw) {
+		plain.scale = 1.0;
+		plain.offset = 0.0;
+	}
+	return image_raw_to_physical(&plain, raw);
+}
+
+static void add_to_plot(struct watch *watch, const struct sample_header *header)
+{
+	const struct samples *samples = &watch->follow.samples;
+	int64_t time_ns = header->dc_time_ns != 0
+				  ? header->dc_time_ns
+				  : (int64_t)(header->cycle * samples->meta->period_ns);
+
+	for (unsigned i = 0; i < watch->choice.count; i++) {
+		const struct channel *ch = chosen(watch, i);
+
+		/* A stale input would draw a flat line that never was. */
+		if (ch->direction == CHANNEL_OUTPUT || !lines_is_bad(header, ch)) {
+			plot_add(watch->plot, i, time_ns,
+				 plotted_value(watch, ch,
+					       image_get_raw(samples_image(samples), ch)));
+		}
+	}
+}
+
+static void draw(struct watch *watch)
+{
+	struct screen_size size = screen_size();
+	char *text = NULL;
+	size_t len = 0;
+	FILE *out;
+
+	if (!watch->is_live) {
+		plot_write(watch->plot, size.rows - 1, stdout);
+		return;
+	}
+	out = open_memstream(&text, &len);
+	if (out == NULL) {
+		return;
+	}
+	plot_write(watch->plot, size.rows - 1, out);
+	fprintf(out, "q: leave   cycle %" PRIu64 "   missed %" PRIu64, watch->next_cycle - 1,
+		watch->missed);
+	if (fclose(out) == 0) {
+		screen_draw(text);
+	}
+	free(text);
+	watch->drawn_ns = now_ns();
+}
+
+static void draw_if_due(struct watch *watch)
+{
+	if (watch->is_live && watch->next_cycle > 0 &&
+	    now_ns() - watch->drawn_ns >= DRAW_PERIOD_NS) {
+		draw(watch);
+	}
+}
+
+static enum cli_exit begin_plot(struct watch *watch)
+{
+	struct plot_spec spec = {
+		.panels = watch->choice.count,
+		.titles = watch->titles,
+		.window_ns = watch->window_ns,
+		.columns = screen_size().columns,
+		.style = screen_is_utf8() ? PLOT_BRAILLE : PLOT_ASCII,
+	};
+	struct ring_reader *reader = watch->follow.samples.reader;
+	uint64_t period_ns = watch->follow.samples.meta->period_ns;
+	uint64_t back = period_ns == 0 ? 0 : (uint64_t)watch->window_ns / period_ns;
+
+	for (unsigned i = 0; i < watch->choice.count; i++) {
+		watch->titles[i] = chosen(watch, i)->name;
+	}
+	plot_destroy(watch->plot);
+	watch->plot = plot_create(&spec);
+	if (watch->plot == NULL) {
+		return cli_fail(watch->cli, CLI_FAILED, "out of memory");
+	}
+	/* A live picture starts full: the ring knows what was. */
+	if (watch->is_live) {
+		uint64_t newest = ring_newest(reader);
+		uint64_t oldest = ring_oldest(reader);
+
+		ring_seek(reader, newest - oldest < back ? oldest : newest - back);
+		watch->follow.idle_ns = 20 * NS_PER_MS;
+	}
+	return CLI_OK;
+}
+
+/* --- both --- */
+
+static struct lines lines_of(const struct watch *watch)
+{
+	return (struct lines){
+		.samples = &watch->follow.samples,
+		.choice = &watch->choice,
+		.is_raw = watch->is_raw,
+	};
+}
+
+static enum cli_exit look_up(struct watch *watch)
+{
+	const struct sample_meta *meta = watch->follow.samples.meta;
+	enum cli_exit result =
+		choose_channels(watch->cli, &watch->follow.samples, watch->args.operands,
+				watch->args.operand_count, &watch->choice);
+
+	if (result != CLI_OK) {
+		return result;
+	}
+	if (watch->rate_hz > 0 && meta->period_ns > 0) {
+		double every = round(1e9 / (watch->rate_hz * (double)meta->period_ns));
+
+		watch->every = every < 1 ? 1 : every > 1e15 ? (uint64_t)1e15 : (uint64_t)every;
+	}
+	watch->next_cycle = 0;
+	watch->needs_head = !watch->is_plot && !watch->is_json;
+	return watch->is_plot ? begin_plot(watch) : CLI_OK;
+}
+
+static void take(struct watch *watch)
+{
+	struct sample_header header = samples_header(&watch->follow.samples);
+	struct lines lines = lines_of(watch);
+
+	if (watch->next_cycle != 0 && header.cycle > watch->next_cycle) {
+		print_gap(watch, header.cycle - watch->next_cycle, "the cycle numbers jump");
+	}
+	watch->next_cycle = header.cycle + 1;
+	if (header.cycle % watch->every != 0) {
+		return;
+	}
+	if (watch->is_plot) {
+		add_to_plot(watch, &header);
+		draw_if_due(watch);
+	} else if (watch->is_json) {
+		lines_write_json(&lines);
+	} else {
+		if (watch->needs_head) {
+			lines_write_head(&lines);
+			watch->needs_head = 0;
+		}
+		lines_write_text(&lines);
+	}
+	watch->shown++;
+}
+
+/* What the end of ecdaqd means: bad if it came before all that was asked for. */
+static enum cli_exit ended(const struct watch *watch)
+{
+	if (watch->count > 0) {
+		return cli_fail(watch->cli, CLI_NO_DAEMON,
+				"ecdaqd has ended after %" PRIu64 " of %" PRIu64 " samples",
+				watch->shown, watch->count);
+	}
+	if (watch->shown == 0) {
+		return cli_fail(watch->cli, CLI_NO_DAEMON,
+				"ecdaqd has ended: nothing comes any more");
+	}
+	return CLI_OK;
+}
+
+static enum cli_exit run(struct watch *watch)
+{
+	uint64_t lost = 0;
+	enum cli_exit result;
+
+	while (watch->count == 0 || watch->shown < watch->count) {
+		switch (follow_next(&watch->follow, &lost)) {
+		case FOLLOW_SAMPLE:
+			take(watch);
+			break;
+		case FOLLOW_LOST:
+			print_gap(watch, lost, "this reader is too slow");
+			watch->next_cycle = 0;
+			break;
+		case FOLLOW_IDLE:
+			fflush(stdout);
+			draw_if_due(watch);
+			if (ferror(stdout)) {
+				return CLI_OK; /* main() says why */
+			}
+			break;
+		case FOLLOW_NEW_BUS:
+			result = look_up(watch);
+			if (result != CLI_OK) {
+				return result;
+			}
+			break;
+		case FOLLOW_ENDED:
+			return ended(watch);
+		case FOLLOW_OVER:
+			return CLI_OK;
+		}
+	}
+	return CLI_OK;
+}
+
+static enum cli_exit begin(struct watch *watch)
+{
+	enum cli_exit result = follow_open(watch->cli, &watch->follow);
+
+	if (result != CLI_OK) {
+		return result;
+	}
+	result = look_up(watch);
+	if (result == CLI_OK) {
+		screen_catch_signals();
+		if (watch->is_live) {
+			screen_begin();
+		}
+		result = run(watch);
+		screen_end();
+	}
+	if (watch->plot != NULL && watch->shown > 0) {
+		watch->is_live = 0;
+		draw(watch);
+	}
+	plot_destroy(watch->plot);
+	follow_close(&watch->follow);
+	return result;
+}
+
+enum cli_exit verb_watch(struct cli *cli, int argc, char **argv)
+{
+	struct watch watch = { .cli = cli, .every = 1, .window_ns = 5 * NS_PER_S };
+	const struct args_option options[] = {
+		{ "plot", 'p', ARGS_FLAG, &watch.is_plot, NULL,
+		  "curves that scroll, a panel a channel" },
+		{ "window", 'w', ARGS_DURATION, &watch.window_ns, "T",
+		  "time across the plot (5s)" },
+		{ "count", 'n', ARGS_COUNT, &watch.count, "N", "end after N samples" },
+		{ "every", 0, ARGS_COUNT, &watch.every, "N", "only each N-th cycle" },
+		{ "rate", 0, ARGS_NUMBER, &watch.rate_hz, "HZ", "only about so many a second" },
+		{ "raw", 0, ARGS_FLAG, &watch.is_raw, NULL,
+		  "raw counts, not in the channel's unit" },
+		{ "json", 0, ARGS_FLAG, &watch.is_json, NULL, "a JSON object a sample" },
+	};
+	enum cli_exit result;
+
+	watch.args = (struct args){
+		.options = options,
+		.option_count = sizeof(options) / sizeof(options[0]),
+		.operands_min = 1,
+		.operands_max = INT_MAX,
+	};
+	if (args_parse(cli, &watch.args, argc, argv, &result) == ARGS_DONE) {
+		return result;
+	}
+	if (watch.is_plot && watch.is_json) {
+		return cli_fail(cli, CLI_USAGE, "--plot and --json: one or the other");
+	}
+	if (watch.rate_hz > 0 && watch.every > 1) {
+		return cli_fail(cli, CLI_USAGE, "--rate and --every: one or the other");
+	}
+	watch.is_live = watch.is_plot && screen_is_terminal();
+	return begin(&watch);
+}

@@ -1,0 +1,64 @@
+/* SPDX-License-Identifier: MIT */
+/* The parts of the fake ecdaqd: its life (fake_daemon.c), what it shows (fake_page.c), what it
+ * answers (fake_admin.c). */
+#ifndef TESTS_CLI_FAKE_H
+#define TESTS_CLI_FAKE_H
+
+#include <stdint.h>
+#include <time.h>
+
+#include "base/event.h"
+#include "base/ring.h"
+#include "base/sample.h"
+#include "base/status.h"
+#include "config/config.h"
+
+enum { SLAVES = 2, ENTRIES = 6, CHANNELS = SLAVES * ENTRIES };
+enum { OUT_BYTES = 9, IN_BYTES = 13, IMAGE_BYTES = SLAVES * (OUT_BYTES + IN_BYTES) };
+enum { FIRST_CYCLE = 1000, STEP_NS = 1000000 };
+
+struct meta {
+	struct sample_meta head;
+	struct slave_info slave[SLAVES];
+	struct channel channel[CHANNELS];
+};
+
+struct fake {
+	const char *dir;
+	long speed;
+	int has_jump;
+	int has_recorder;
+	const char *admin;
+	unsigned mode;
+	unsigned slaves; /* claimed on the status page */
+	struct meta meta;
+	struct status_page *page;
+	struct record_status *record;
+	struct ring *samples;
+	struct ring *events;
+	int listener;
+	int is_stopped;
+	uint64_t cycle;
+	uint64_t conversions;
+	uint8_t image[IMAGE_BYTES];
+	uint16_t refresh_ms; /* 0x8000:2 */
+	int64_t armed_ns[SLAVES];
+};
+
+int64_t fake_clock_ns(clockid_t clock);
+/** The path of @file in the run directory, until the next call. */
+const char *fake_path(const struct fake *f, const char *file);
+void fake_die(const char *what, int err) __attribute__((noreturn));
+/** The DC time of a cycle. */
+int64_t fake_dc_ns(uint64_t cycle);
+
+void fake_describe(struct fake *f);
+void fake_make_rings(struct fake *f);
+void fake_make_status(struct fake *f);
+void fake_make_record_status(struct fake *f);
+void fake_emit(struct fake *f, enum event_id id, uint16_t slave_pos, int64_t value, int32_t arg);
+
+void fake_listen(struct fake *f);
+void fake_serve_client(struct fake *f);
+
+#endif

@@ -1,0 +1,166 @@
+/* SPDX-License-Identifier: MIT */
+/* What the fake ecdaqd answers. */
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include "admin/protocol.h"
+#include "base/bytes.h"
+#include "base/histogram.h"
+#include "fake.h"
+#include "image/image.h"
+
+void fake_listen(struct fake *f)
+{
+	struct sockaddr_un address = { .sun_family = AF_UNIX };
+
+	f->listener = -1;
+	if (strcmp(f->admin, "none") == 0) {
+		return;
+	}
+	if (strlen(fake_path(f, CONFIG_RUN_ADMIN)) >= sizeof(address.sun_path)) {
+		fake_die("admin", ENAMETOOLONG);
+	}
+	memcpy(address.sun_path, fake_path(f, CONFIG_RUN_ADMIN),
+	       strlen(fake_path(f, CONFIG_RUN_ADMIN)));
+	unlink(address.sun_path);
+	f->listener = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
+	if (f->listener < 0 ||
+	    bind(f->listener, (const struct sockaddr *)&address, sizeof(address)) < 0 ||
+	    chmod(address.sun_path, f->mode) < 0 || listen(f->listener, 4) < 0) {
+		fake_die("admin", errno);
+	}
+}
+
+static void refuse(struct admin_reply *reply, int result, const char *text)
+{
+	reply->result = result;
+	snprintf(reply->text, sizeof(reply->text), "%s", text);
+}
+
+static void answer_set(struct fake *f, const struct admin_request *rq, struct admin_reply *reply)
+{
+	for (uint32_t i = 0; i < rq->count; i++) {
+		int index = image_channel_find(f->meta.channel, CHANNELS, rq->item[i].channel);
+
+		if (index < 0) {
+			refuse(reply, -ENOENT, "no such channel");
+			return;
+		}
+		if (strcmp(rq->item[i].channel, "piccolo1.led") == 0) {
+			refuse(reply, -EPERM, "piccolo1.led: owned by program, not local");
+			return;
+		}
+		image_set_raw(f->image, &f->meta.channel[index], rq->item[i].raw);
+		fake_emit(f, EVENT_OUTPUT_SET, f->meta.channel[index].slave_pos, index, 0);
+	}
+	reply->cycle = f->cycle;
+}
+
+static void answer_oneshot(struct fake *f, const struct admin_request *rq,
+			   struct admin_reply *reply)
+{
+	int64_t now_ns = fake_dc_ns(f->cycle);
+	int64_t at_ns = rq->is_relative ? now_ns + rq->dc_time_ns : rq->dc_time_ns;
+
+	if (at_ns <= now_ns) {
+		refuse(reply, -ETIME, "the time is in the past");
+		return;
+	}
+	f->armed_ns[rq->slave_pos % SLAVES] = at_ns;
+	reply->dc_time_ns = at_ns;
+	reply->cycle = f->cycle;
+}
+
+static void give(struct admin_reply *reply, const void *data, uint32_t len)
+{
+	memcpy(reply->data, data, len);
+	reply->data_len = len;
+}
+
+static void answer_read(struct fake *f, const struct admin_request *rq, struct admin_reply *reply)
+{
+	uint8_t bytes[4];
+
+	if (rq->index == 0x1018 && rq->subindex == 1) {
+		put_le32(bytes, 2);
+		give(reply, bytes, 4);
+	} else if (rq->index == 0x1008 && rq->subindex == 0) {
+		give(reply, "FB1111-Piccolo", 14);
+	} else if (rq->index == 0x8000 && rq->subindex == 2) {
+		put_le16(bytes, f->refresh_ms);
+		give(reply, bytes, 2);
+	} else {
+		refuse(reply, -EIO, "abort");
+		reply->sdo_abort = 0x06020000;
+	}
+}
+
+static void answer_write(struct fake *f, const struct admin_request *rq, struct admin_reply *reply)
+{
+	if (rq->index == 0x8000 && rq->subindex == 2 && rq->data_len == 2) {
+		f->refresh_ms = get_le16(rq->data);
+		return;
+	}
+	refuse(reply, -EIO, "abort");
+	reply->sdo_abort = rq->index == 0x8000 ? 0x08000022 : 0x06020000;
+}
+
+static void clear(struct fake *f)
+{
+	histogram_clear(&f->page->cycle.wake_latency);
+	f->page->cycle.frames_lost = 0;
+}
+
+static void answer(struct fake *f, const struct admin_request *rq, struct admin_reply *reply)
+{
+	*reply = (struct admin_reply){ .magic = ADMIN_MAGIC };
+	switch ((enum admin_verb)rq->verb) {
+	case ADMIN_PING:
+		break;
+	case ADMIN_SET:
+		answer_set(f, rq, reply);
+		break;
+	case ADMIN_ONESHOT:
+		answer_oneshot(f, rq, reply);
+		break;
+	case ADMIN_SDO_READ:
+		answer_read(f, rq, reply);
+		break;
+	case ADMIN_SDO_WRITE:
+		answer_write(f, rq, reply);
+		break;
+	case ADMIN_STOP:
+		f->is_stopped = 1;
+		break;
+	case ADMIN_CLEAR:
+		clear(f);
+		break;
+	}
+}
+
+void fake_serve_client(struct fake *f)
+{
+	int fd = accept(f->listener, NULL, NULL);
+	struct admin_request request;
+	struct admin_reply reply;
+
+	if (fd < 0) {
+		return;
+	}
+	if (recv(fd, &request, sizeof(request), 0) == (ssize_t)sizeof(request) &&
+	    request.magic == ADMIN_MAGIC && strcmp(f->admin, "mute") != 0) {
+		answer(f, &request, &reply);
+		if (strcmp(f->admin, "garbage") == 0) {
+			reply.magic ^= 1;
+		}
+		if (send(fd, &reply, sizeof(reply), MSG_NOSIGNAL) < 0) {
+			perror("test_fake_daemon: send");
+		}
+	}
+	close(fd);
+}

@@ -1,0 +1,201 @@
+/* SPDX-License-Identifier: MIT */
+/* What the fake ecdaqd shows: pages and rings. */
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "base/clock.h"
+#include "fake.h"
+
+int64_t fake_clock_ns(clockid_t clock)
+{
+	struct timespec ts;
+
+	clock_gettime(clock, &ts);
+	return (int64_t)ts.tv_sec * NS_PER_S + ts.tv_nsec;
+}
+
+const char *fake_path(const struct fake *f, const char *file)
+{
+	static char path[CONFIG_PATH_BYTES];
+
+	snprintf(path, sizeof(path), "%s/%s", f->dir, file);
+	return path;
+}
+
+void fake_die(const char *what, int err)
+{
+	fprintf(stderr, "test_fake_daemon: %s: %s\n", what, strerror(err));
+	exit(1);
+}
+
+void fake_describe(struct fake *f)
+{
+	static const struct {
+		const char *name;
+		int type;
+		unsigned bits;
+		unsigned at; /* byte in the slave's outputs or inputs */
+		int is_output;
+	} entries[ENTRIES] = {
+		{ "led", CHANNEL_BOOL, 1, 0, 1 },
+		{ "oneshot_time", CHANNEL_UINT, 64, 1, 1 },
+		{ "adc", CHANNEL_UINT, 16, 0, 0 },
+		{ "counter", CHANNEL_UINT, 16, 2, 0 },
+		{ "sample_time", CHANNEL_UINT, 64, 4, 0 },
+		{ "status", CHANNEL_UINT, 8, 12, 0 },
+	};
+
+	f->meta.head = (struct sample_meta){
+		.version = SAMPLE_VERSION,
+		.slave_count = SLAVES,
+		.channel_count = CHANNELS,
+		.image_bytes = IMAGE_BYTES,
+		.output_bytes = SLAVES * OUT_BYTES,
+		.period_ns = STEP_NS,
+		.session = (uint64_t)fake_clock_ns(CLOCK_TAI),
+	};
+	for (unsigned s = 0; s < SLAVES; s++) {
+		struct slave_info *info = &f->meta.slave[s];
+
+		*info = (struct slave_info){
+			.vendor = 2,
+			.product = 0x04570862,
+			.revision = 0x0258008d,
+			.slave_pos = (uint16_t)s,
+			.station_addr = (uint16_t)(0x1001 + s),
+			.has_dc = 1,
+			.is_dc_reference = s == 0,
+			.dc_delay_ns = (int32_t)s * 310,
+			.counter_channel = (int32_t)(s * ENTRIES + 3),
+			.input_bits = IN_BYTES * 8,
+			.output_bits = OUT_BYTES * 8,
+		};
+		snprintf(info->name, sizeof(info->name), "piccolo%u", s);
+		/* A name in Latin-1, as some vendors have it in their SII. */
+		snprintf(info->device, sizeof(info->device), "FB1111-Piccolo \xb5");
+		for (unsigned e = 0; e < ENTRIES; e++) {
+			struct channel *ch = &f->meta.channel[s * ENTRIES + e];
+			unsigned base = entries[e].is_output ? s * OUT_BYTES
+							     : SLAVES * OUT_BYTES + s * IN_BYTES;
+
+			*ch = (struct channel){
+				.slave_pos = (uint16_t)s,
+				.index = entries[e].is_output ? 0x7000 : 0x6000,
+				.subindex = (uint8_t)(e + 1),
+				.type = (uint8_t)entries[e].type,
+				.direction = (uint8_t)entries[e].is_output,
+				.bit_len = (uint8_t)entries[e].bits,
+				.bit_offset = (base + entries[e].at) * 8,
+				.scale = 1,
+			};
+			snprintf(ch->name, sizeof(ch->name), "piccolo%u.%s", s, entries[e].name);
+		}
+	}
+	/* The first in volts, the second in counts. */
+	f->meta.channel[2].scale = 3.3 / 4096;
+	snprintf(f->meta.channel[2].unit, sizeof(f->meta.channel[2].unit), "V");
+}
+
+void fake_make_status(struct fake *f)
+{
+	struct status_page *page = status_create(fake_path(f, CONFIG_RUN_STATUS), STATUS_MAGIC,
+						 sizeof(*page), f->mode);
+
+	if (page == NULL) {
+		fake_die("status", errno);
+	}
+	f->page = page;
+	page->is_simulated = 1;
+	page->pid = getpid();
+	page->start_tai_ns = fake_clock_ns(CLOCK_TAI) - 83 * NS_PER_S;
+	page->session = f->meta.head.session;
+	page->period_ns = STEP_NS;
+	snprintf(page->version, sizeof(page->version), "0.1.0");
+	snprintf(page->interface, sizeof(page->interface), "ecat0");
+	status_text_set(&page->text_sequence, page->message, sizeof(page->message),
+			"slave 1: \"quoted\"\ttext");
+	page->bus_state = BUS_OP;
+	page->slave_count = f->slaves;
+	page->slaves_expected = SLAVES;
+	page->cycle_cpu = UINT32_MAX;
+	page->rt_degraded = 1u << EVENT_RT_PRIORITY;
+	page->cycle.dc_state = DC_LOCKED;
+	page->cycle.dc_lock_ns = 123456789;
+	page->cycle.dc_diff_max_ns = 42;
+	page->cycle.correction_ppb = -12;
+	for (unsigned s = 0; s < SLAVES; s++) {
+		page->slave[s].info = f->meta.slave[s];
+		page->slave[s].al_state = 8;
+	}
+	page->slave[1].dc_diff_ns = -7;
+	page->slave[1].al_status_code = 0x001b;
+	page->slave[1].rx_errors[0] = 3;
+}
+
+void fake_make_record_status(struct fake *f)
+{
+	struct record_status *record = status_create(fake_path(f, CONFIG_RUN_RECORD_STATUS),
+						     RECORD_STATUS_MAGIC, sizeof(*record), f->mode);
+
+	if (record == NULL) {
+		fake_die("record-status", errno);
+	}
+	f->record = record;
+	record->pid = getpid();
+	record->state = RECORD_RUNNING;
+	record->recorded_cycles = 5000;
+	record->recorded_gaps = 1;
+	record->cycles_missing = 5;
+	record->bytes_free = UINT64_C(3) << 30;
+	status_text_set(&record->text_sequence, record->path, sizeof(record->path),
+			"/var/lib/ecdaq/a.mcap.part");
+}
+
+void fake_make_rings(struct fake *f)
+{
+	struct ring_spec samples = {
+		.kind = "sample",
+		.payload_bytes = sizeof(struct sample_header) + IMAGE_BYTES,
+		.slot_count = 16384,
+		.meta = &f->meta,
+		.meta_bytes = sizeof(f->meta),
+		.period_ns = STEP_NS,
+		.file_mode = f->mode,
+	};
+	struct ring_spec events = {
+		.kind = "event",
+		.payload_bytes = sizeof(struct event),
+		.slot_count = 256,
+		.file_mode = f->mode,
+	};
+	int r;
+
+	samples.path = fake_path(f, CONFIG_RUN_SAMPLES);
+	r = ring_create(&samples, &f->samples);
+	if (r < 0) {
+		fake_die("samples", -r);
+	}
+	events.path = fake_path(f, CONFIG_RUN_EVENTS);
+	r = ring_create(&events, &f->events);
+	if (r < 0) {
+		fake_die("events", -r);
+	}
+}
+
+void fake_emit(struct fake *f, enum event_id id, uint16_t slave_pos, int64_t value, int32_t arg)
+{
+	struct event ev = {
+		.id = (uint16_t)id,
+		.slave_pos = slave_pos,
+		.value = value,
+		.arg = { arg, 0 },
+		.cycle = f->cycle,
+		.mono_ns = fake_clock_ns(CLOCK_MONOTONIC),
+		.tai_ns = fake_clock_ns(CLOCK_TAI),
+	};
+
+	ring_push(f->events, &ev, sizeof(ev), NULL, 0);
+}
