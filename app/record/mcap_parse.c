@@ -133,6 +133,24 @@ static void parse_metadata(struct cursor *c, struct mcap_item *item)
 	}
 }
 
+static void parse_statistics(struct cursor *c, struct mcap_item *item)
+{
+	take(c, 8 + 2 + 4 * 4); /* numbers of records */
+	item->log_time_ns = take_u64(c);
+	item->publish_time_ns = take_u64(c);
+	take_bytes(c, take_u32(c), item);
+}
+
+uint64_t mcap_statistics_count(const struct mcap_item *item, uint16_t id)
+{
+	for (size_t at = 0; at + 10 <= item->data_len; at += 10) {
+		if (get_le16(item->data + at) == id) {
+			return get_le64(item->data + at + 2);
+		}
+	}
+	return 0;
+}
+
 int mcap_parse_record(struct mcap_item *item)
 {
 	struct cursor c = { .at = item->record + MCAP_HEAD_BYTES,
@@ -170,6 +188,10 @@ int mcap_parse_record(struct mcap_item *item)
 	case MCAP_OP_METADATA:
 		item->kind = MCAP_ITEM_METADATA;
 		parse_metadata(&c, item);
+		break;
+	case MCAP_OP_STATISTICS:
+		item->kind = MCAP_ITEM_STATISTICS;
+		parse_statistics(&c, item);
 		break;
 	case MCAP_OP_DATA_END:
 		item->kind = MCAP_ITEM_DATA_END;

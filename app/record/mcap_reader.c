@@ -57,6 +57,34 @@ int mcap_reader_create(const struct mcap_source *source, struct mcap_reader **re
 	return 0;
 }
 
+int mcap_reader_create_summary(const struct mcap_source *source, struct mcap_reader **ret_reader)
+{
+	enum mcap_ending ending;
+	struct mcap_reader *r;
+	uint8_t footer[MCAP_FOOTER_BYTES] = { 0 };
+	int err = mcap_ending_check(source, &ending);
+
+	if (err == 0 && ending != MCAP_ENDING_GOOD) {
+		err = ending == MCAP_ENDING_BAD ? -EBADMSG : -ENODATA;
+	}
+	err = err < 0 ? err : mcap_reader_create(source, &r);
+	if (err < 0) {
+		return err;
+	}
+	err = source->read_at(source->ctx, source->bytes - MCAP_MAGIC_BYTES - sizeof(footer), footer,
+			      sizeof(footer));
+	r->offset = get_le64(footer + MCAP_HEAD_BYTES);
+	if (err == 0 && (r->offset == 0 || r->offset > source->bytes)) {
+		err = -ENODATA;
+	}
+	if (err < 0) {
+		mcap_reader_destroy(r);
+		return err;
+	}
+	*ret_reader = r;
+	return 0;
+}
+
 void mcap_reader_destroy(struct mcap_reader *r)
 {
 	if (r == NULL) {
@@ -242,7 +270,8 @@ int mcap_reader_next(struct mcap_reader *r, struct mcap_item *ret_item)
 	if (item.kind == MCAP_ITEM_CHUNK) {
 		take_chunk(r, &item);
 	}
-	if (item.kind == MCAP_ITEM_DATA_END) {
+	if (item.kind == MCAP_ITEM_DATA_END ||
+	    (item.record != NULL && item.record[0] == MCAP_OP_FOOTER)) {
 		r->has_ended = 1;
 	}
 	*ret_item = item;

@@ -23,6 +23,7 @@ enum mcap_item_kind {
 	MCAP_ITEM_MESSAGE_INDEX, /* id: channel */
 	MCAP_ITEM_ATTACHMENT,    /* name, encoding: media type, data */
 	MCAP_ITEM_METADATA,      /* name, data: pairs */
+	MCAP_ITEM_STATISTICS,    /* log_time_ns, publish_time_ns: of first and last message; data: counts */
 	MCAP_ITEM_OTHER,         /* a record that this reader has no use for */
 	MCAP_ITEM_DATA_END,      /* the last item of a file that was closed */
 	MCAP_ITEM_DAMAGE,        /* reason; the reader goes on behind it if !is_final */
@@ -56,9 +57,11 @@ struct mcap_item {
 
 /** 0; -EPROTO: does not start as an MCAP file; -ENODATA: ends within its magic; or -errno. @source is copied. */
 int mcap_reader_create(const struct mcap_source *source, struct mcap_reader **ret_reader);
+/** The same for the summary section of a closed file; -ENODATA where there is none, -EBADMSG: its CRC is wrong. */
+int mcap_reader_create_summary(const struct mcap_source *source, struct mcap_reader **ret_reader);
 void mcap_reader_destroy(struct mcap_reader *r);
 
-/** The next item: 1; 0 at the end of the data section or of the file; -errno of the I/O, -ENOMEM. */
+/** The next item: 1; 0 at the end of the section or of the file; -errno of the I/O, -ENOMEM. */
 int mcap_reader_next(struct mcap_reader *r, struct mcap_item *ret_item);
 
 enum mcap_ending {
@@ -75,6 +78,9 @@ int mcap_pairs_next(const uint8_t *data, size_t data_len, size_t *offset, struct
 		    struct mcap_text *ret_value);
 /** The value of @key as a zero-terminated copy (cut to fit) in @buf. 0, -ENOENT, -EBADMSG. */
 int mcap_pairs_get(const struct mcap_item *item, const char *key, char *buf, size_t buf_len);
+
+/** Messages of the channel @id by a statistics item; 0 if it does not know it. */
+uint64_t mcap_statistics_count(const struct mcap_item *item, uint16_t id);
 
 /** 1 if @text is exactly @wanted. */
 int mcap_text_is(struct mcap_text text, const char *wanted);

@@ -129,6 +129,7 @@ static int note_record(struct mcap_scan *scan, const struct mcap_item *item)
 	case MCAP_ITEM_DATA_END:
 		scan->has_ended = 1;
 		return 0;
+	case MCAP_ITEM_STATISTICS:
 	case MCAP_ITEM_OTHER:
 	case MCAP_ITEM_DAMAGE:
 		return 0;
@@ -305,6 +306,7 @@ static int copy_item(struct mcap_writer *w, struct mcap_chunk_index *messages,
 	case MCAP_ITEM_METADATA:
 		return mcap_writer_copy(w, item->record, item->record_len);
 	case MCAP_ITEM_MESSAGE_INDEX: /* made anew behind its chunk */
+	case MCAP_ITEM_STATISTICS:
 	case MCAP_ITEM_OTHER:
 	case MCAP_ITEM_DATA_END:
 	case MCAP_ITEM_DAMAGE:

@@ -71,6 +71,7 @@ int record_file_create(const struct record_file_spec *spec, struct record_file *
 	f->fd = -1;
 	f->layout = spec->layout;
 	f->topic = layout_topics(spec->layout, &f->topic_count);
+	f->last_utc_ns = spec->start_utc_ns;
 	f->event_next = spec->event_next;
 	f->event_mono_ns = spec->event_mono_ns;
 	f->buf_len = layout_largest_bytes(spec->layout);

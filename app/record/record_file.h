@@ -35,6 +35,7 @@ struct record_file_spec {
 	uint64_t first_cycle;        /* that it is to start with */
 	uint64_t event_next;
 	int64_t event_mono_ns;
+	uint64_t start_utc_ns;       /* log times start here */
 	const struct timemap_state *timemap;
 	const char *config_path;     /* "" where there is none */
 	const char *config_text;

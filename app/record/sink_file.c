@@ -50,6 +50,7 @@ int sink_open_file(struct sink *s, uint64_t first_cycle, int64_t utc_ns)
 					 .first_cycle = first_cycle,
 					 .event_next = s->resume.event_next,
 					 .event_mono_ns = s->resume.event_mono_ns,
+					 .start_utc_ns = utc_ns > 0 ? (uint64_t)utc_ns : 0,
 					 .timemap = &s->timemap,
 					 .config_path = s->opt.config_path,
 					 .config_text = s->opt.config_text,

@@ -95,6 +95,24 @@ int store_open(const char *dir, struct store **ret_store, int64_t *ret_pid)
 	return 0;
 }
 
+int store_is_locked(const char *dir)
+{
+	char path[PATH_MAX];
+	int is_locked;
+	int fd;
+
+	if (store_path(dir, LOCK_NAME, path, sizeof(path)) < 0) {
+		return 0;
+	}
+	fd = open(path, O_RDONLY | O_CLOEXEC);
+	if (fd < 0) {
+		return 0;
+	}
+	is_locked = flock(fd, LOCK_SH | LOCK_NB) < 0 && errno == EWOULDBLOCK;
+	close(fd);
+	return is_locked;
+}
+
 void store_close(struct store *s)
 {
 	if (s == NULL) {

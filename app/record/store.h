@@ -37,6 +37,8 @@ struct store_state {
  */
 int store_open(const char *dir, struct store **ret_store, int64_t *ret_pid);
 void store_close(struct store *s);
+/** 1 if a recorder works in @dir now. */
+int store_is_locked(const char *dir);
 const char *store_dir(const struct store *s);
 
 /** Recordings in @dir in order of their sequence; free() *@ret_entries. 0 or -errno. */

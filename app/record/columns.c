@@ -1,0 +1,303 @@
+/* SPDX-License-Identifier: MIT */
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/bytes.h"
+#include "record/columns_inside.h"
+#include "record/messages.h"
+
+enum { GOOD_FIELD = 3, FIRST_FIELD = 3 }; /* cycle, dc_time_ns, flags, good: see layout_text.c */
+
+struct columns *columns_create(const char *channels, int is_raw, enum log_format format)
+{
+	struct columns *c = calloc(1, sizeof(*c));
+
+	if (c != NULL) {
+		c->channels = channels;
+		c->is_raw = is_raw;
+		c->format = format;
+		c->cycle_channel = -1;
+	}
+	return c;
+}
+
+void columns_destroy(struct columns *c)
+{
+	if (c == NULL) {
+		return;
+	}
+	for (size_t i = 0; i < c->schema_count; i++) {
+		free(c->schema[i].text);
+	}
+	for (size_t i = 0; i < c->topic_count; i++) {
+		ros2msg_done(&c->topic[i].msg);
+		free(c->topic[i].value);
+	}
+	free(c->schema);
+	free(c->topic);
+	free(c->column);
+	free(c);
+}
+
+/* One more element at the end of *@array, zeroed; NULL without memory. */
+static void *grow(void **array, size_t *count, size_t element_bytes)
+{
+	char *grown;
+
+	if ((*count & (*count - 1)) == 0) { /* full at each power of two */
+		grown = realloc(*array, (*count == 0 ? 1 : *count * 2) * element_bytes);
+		if (grown == NULL) {
+			return NULL;
+		}
+		*array = grown;
+	}
+	grown = (char *)*array + *count * element_bytes;
+	memset(grown, 0, element_bytes);
+	(*count)++;
+	return grown;
+}
+
+static int learn_schema(struct columns *c, const struct mcap_item *item)
+{
+	struct schema *s;
+
+	if (!mcap_text_is(item->encoding, "ros2msg")) {
+		return 0;
+	}
+	s = grow((void **)&c->schema, &c->schema_count, sizeof(*s));
+	if (s == NULL) {
+		return -ENOMEM;
+	}
+	s->id = item->id;
+	s->text = malloc(item->data_len + 1);
+	if (s->text == NULL) {
+		return -ENOMEM;
+	}
+	memcpy(s->text, item->data, item->data_len);
+	s->text_len = item->data_len;
+	return 0;
+}
+
+/* 1 if @name is in the list asked for; a list not given has all. */
+static int is_wanted(const struct columns *c, const char *name)
+{
+	size_t len = strlen(name);
+
+	if (c->channels == NULL) {
+		return 1;
+	}
+	for (const char *at = c->channels; at != NULL; at = strchr(at, ',')) {
+		at += *at == ',';
+		if (strncmp(at, name, len) == 0 && (at[len] == ',' || at[len] == '\0')) {
+			return 1;
+		}
+	}
+	return 0;
+}
+
+static double real_of(const struct mcap_item *item, const char *field, const char *what,
+		      double otherwise)
+{
+	char key[COLUMN_NAME_BYTES];
+	char text[64];
+	char *end;
+	double value;
+
+	snprintf(key, sizeof(key), "%s.%s", field, what);
+	if (mcap_pairs_get(item, key, text, sizeof(text)) < 0) {
+		return otherwise;
+	}
+	value = strtod(text, &end);
+	return end == text || *end != '\0' ? otherwise : value;
+}
+
+static int add_column(struct columns *c, const struct mcap_item *item, size_t topic, size_t field)
+{
+	const char *name = c->topic[topic].msg.field[field].name;
+	struct column col = { .topic = topic, .field = field };
+	struct column *added;
+	char slave[64] = "";
+	char key[COLUMN_NAME_BYTES];
+
+	snprintf(key, sizeof(key), "%s.channel", name);
+	if (mcap_pairs_get(item, key, col.name, sizeof(col.name)) < 0) {
+		/* "good" has no entry of its own, nor have fields of another writer's recording. */
+		mcap_pairs_get(item, "slave", slave, sizeof(slave));
+		snprintf(col.name, sizeof(col.name), "%s.%s", slave, name);
+	}
+	col.scale = real_of(item, name, "scale", 1);
+	col.offset = real_of(item, name, "offset", 0);
+	if (!is_wanted(c, col.name) || c->topic[topic].msg.field[field].type == ROS2MSG_STRING) {
+		return 0;
+	}
+	added = grow((void **)&c->column, &c->column_count, sizeof(col));
+	if (added == NULL) {
+		return -ENOMEM;
+	}
+	*added = col;
+	return 0;
+}
+
+static int learn_topic(struct columns *c, const struct mcap_item *item, const struct schema *schema)
+{
+	struct ros2msg msg;
+	struct topic *t;
+	int r = ros2msg_parse(schema->text, schema->text_len, &msg);
+
+	if (r < 0) {
+		return r == -ENOMEM ? r : 0; /* not one of ours */
+	}
+	if (ros2msg_find(&msg, "cycle") != 0 || ros2msg_find(&msg, "good") != GOOD_FIELD) {
+		ros2msg_done(&msg);
+		return 0;
+	}
+	t = grow((void **)&c->topic, &c->topic_count, sizeof(*t));
+	if (t == NULL) {
+		ros2msg_done(&msg);
+		return -ENOMEM;
+	}
+	t->id = item->id;
+	t->msg = msg;
+	t->value = calloc(msg.count, sizeof(t->value[0]));
+	if (t->value == NULL) {
+		return -ENOMEM;
+	}
+	for (size_t i = FIRST_FIELD; i < msg.count; i++) {
+		r = add_column(c, item, c->topic_count - 1, i);
+		if (r < 0) {
+			return r;
+		}
+	}
+	return 0;
+}
+
+static int learn_channel(struct columns *c, const struct mcap_item *item)
+{
+	if (mcap_text_is(item->name, messages_topic(MESSAGE_CYCLE))) {
+		c->cycle_channel = item->id;
+		return 0;
+	}
+	for (size_t i = 0; i < c->topic_count; i++) {
+		if (c->topic[i].id == item->id) {
+			return 0; /* said again */
+		}
+	}
+	for (size_t i = 0; i < c->schema_count; i++) {
+		if (c->schema[i].id == item->schema_id && mcap_text_is(item->encoding, "cdr")) {
+			return learn_topic(c, item, &c->schema[i]);
+		}
+	}
+	return 0;
+}
+
+int columns_learn(struct columns *c, const struct mcap_item *item)
+{
+	if (c->is_frozen) {
+		return 0;
+	}
+	return item->kind == MCAP_ITEM_SCHEMA ? learn_schema(c, item) : learn_channel(c, item);
+}
+
+static int has_column(const struct columns *c, const char *name, size_t len)
+{
+	for (size_t i = 0; i < c->column_count; i++) {
+		if (strlen(c->column[i].name) == len && memcmp(c->column[i].name, name, len) == 0) {
+			return 1;
+		}
+	}
+	return 0;
+}
+
+int columns_freeze(struct columns *c, char *ret_missing, size_t missing_bytes)
+{
+	const char *at = c->channels;
+
+	if (c->cycle_channel < 0) {
+		return -ENODATA;
+	}
+	while (at != NULL) {
+		size_t len = strcspn(at, ",");
+
+		if (!has_column(c, at, len)) {
+			snprintf(ret_missing, missing_bytes, "%.*s", (int)len, at);
+			return -ENOENT;
+		}
+		at = at[len] == ',' ? at + len + 1 : NULL;
+	}
+	c->is_frozen = 1;
+	return 0;
+}
+
+int columns_is_frozen(const struct columns *c)
+{
+	return c->is_frozen;
+}
+
+int columns_are_equal(const struct columns *a, const struct columns *b)
+{
+	if (a->column_count != b->column_count) {
+		return 0;
+	}
+	for (size_t i = 0; i < a->column_count; i++) {
+		if (strcmp(a->column[i].name, b->column[i].name) != 0) {
+			return 0;
+		}
+	}
+	return 1;
+}
+
+int columns_is_cycle(const struct columns *c, const struct mcap_item *item)
+{
+	return item->id == c->cycle_channel;
+}
+
+int columns_begin_row(struct columns *c, const struct mcap_item *item)
+{
+	/* Header, cycle, dc_time_ns, three times, four figures, flags: see messages.c. */
+	const size_t dc_at = 4 + 8;
+	const size_t flags_at = 4 + 5 * 8 + 4 * 4;
+	uint64_t cycle;
+
+	if (messages_decode_cycle(item->data, item->data_len, &cycle) < 0 ||
+	    item->data_len < flags_at + 4) {
+		c->has_row = 0;
+		return -EBADMSG;
+	}
+	c->row.cycle = cycle;
+	c->row.utc_ns = item->log_time_ns;
+	c->row.dc_time_ns = (int64_t)get_le64(item->data + dc_at);
+	c->row.flags = get_le32(item->data + flags_at);
+	c->has_row = 1;
+	for (size_t i = 0; i < c->topic_count; i++) {
+		c->topic[i].is_fresh = 0;
+	}
+	return 0;
+}
+
+int columns_take(struct columns *c, const struct mcap_item *item)
+{
+	for (size_t i = 0; i < c->topic_count; i++) {
+		struct topic *t = &c->topic[i];
+
+		if (t->id != item->id) {
+			continue;
+		}
+		if (ros2msg_decode(&t->msg, item->data, item->data_len, t->value) < 0) {
+			return -EBADMSG;
+		}
+		t->is_fresh = c->has_row && t->value[0].raw == c->row.cycle;
+		return 0;
+	}
+	return 0;
+}
+
+int columns_has_row(const struct columns *c)
+{
+	return c->has_row;
+}
+
+uint64_t columns_row_cycle(const struct columns *c)
+{
+	return c->row.cycle;
+}

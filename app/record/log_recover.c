@@ -1,0 +1,98 @@
+/* SPDX-License-Identifier: MIT */
+/* ecdaq log recover */
+#include <errno.h>
+#include <inttypes.h>
+#include <limits.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "record/json.h"
+#include "record/log_common.h"
+#include "record/recover_file.h"
+
+static const char *result_to_str(enum recover_result result)
+{
+	switch (result) {
+	case RECOVER_WAS_WHOLE:
+		return "whole";
+	case RECOVER_MENDED:
+		return "mended";
+	case RECOVER_COPIED:
+		return "copied";
+	case RECOVER_EMPTY:
+		return "empty";
+	}
+	return "unknown";
+}
+
+static void put_result(FILE *out, const char *path, const struct recover_outcome *o,
+		       enum log_format format)
+{
+	if (format == LOG_JSON) {
+		fprintf(out, "{\"file\":");
+		json_string(out, path);
+		fprintf(out,
+			",\"result\":\"%s\",\"cycles\":%" PRIu64 ",\"last_cycle\":%" PRIu64
+			",\"chunks\":%" PRIu64 ",\"messages\":%" PRIu64 ",\"lost_bytes\":%" PRIu64
+			",\"damaged_records\":%" PRIu64 "}\n",
+			result_to_str(o->result), o->track.cycles, o->track.last_cycle,
+			o->found.chunks, o->found.messages, o->found.lost_bytes, o->found.damaged);
+		return;
+	}
+	fprintf(out, "%s: %s: %" PRIu64 " chunks, %" PRIu64 " messages, %" PRIu64 " cycles", path,
+		result_to_str(o->result), o->found.chunks, o->found.messages, o->track.cycles);
+	if (o->track.cycles > 0) {
+		fprintf(out, ", lost after cycle %" PRIu64, o->track.last_cycle);
+	}
+	fprintf(out, ", %" PRIu64 " bytes given up\n", o->found.lost_bytes);
+}
+
+/* "X.part", mended, becomes "X.mcap" (@ret_path). */
+static int rename_part(const char *path, char ret_path[PATH_MAX])
+{
+	if (snprintf(ret_path, PATH_MAX, "%s", path) >= PATH_MAX) {
+		return -ENAMETOOLONG;
+	}
+	if (!log_part_to_final(ret_path)) {
+		return 0;
+	}
+	if (access(ret_path, F_OK) == 0) { /* not over another recording */
+		return -EEXIST;
+	}
+	return rename(path, ret_path) < 0 ? -errno : 0;
+}
+
+int log_recover(const char *path, const char *output, enum log_format format, FILE *out, FILE *err)
+{
+	struct recover_outcome o = { .result = RECOVER_EMPTY };
+	char final[PATH_MAX];
+	int r;
+
+	if (output != NULL) {
+		r = recover_copy(path, output, &o);
+		if (r == -EEXIST) {
+			return log_fail(err, output, "is there already");
+		}
+		if (r < 0) {
+			return log_fail_errno(err, path, r);
+		}
+		put_result(out, output, &o, format);
+		return log_finish_output(out, err);
+	}
+	if (log_is_recording(path)) {
+		return log_fail(err, path, "is being recorded");
+	}
+	r = recover_in_place(path, &o);
+	if (r < 0) {
+		return log_fail_errno(err, path, r);
+	}
+	if (o.result == RECOVER_EMPTY) {
+		return log_fail(err, path, "there is no whole chunk in it");
+	}
+	r = rename_part(path, final);
+	if (r < 0) {
+		return log_fail(err, final, strerror(-r));
+	}
+	put_result(out, final, &o, format);
+	return log_finish_output(out, err);
+}
