@@ -21,6 +21,7 @@ struct test {
 };
 
 void test_register(struct test *t);
+const struct test *test_first(void);
 void test_fail(const char *file, int line, const char *format, ...)
 	__attribute__((noreturn, format(printf, 3, 4)));
 void test_skip(const char *why) __attribute__((noreturn));

@@ -1,0 +1,111 @@
+/* SPDX-License-Identifier: MIT */
+#include "sim/harness/virtual_bench.h"
+
+#include "base/prng.h"
+#include "harness/test.h"
+#include "sim/devices/fb1111_piccolo.h"
+
+enum {
+	DEFAULT_SLAVES = 2,
+	TRANSMIT_NS = 4000, /* through the host's NIC, one way */
+	DEFAULT_SIGMA_NS = 3000,
+	DEFAULT_PERIOD_NS = 1000000,
+};
+
+static void on_edge(void *ctx, unsigned slave, int64_t t_ns, uint64_t system_time_ns)
+{
+	struct virtual_scope *sc = ctx;
+	int64_t slot = ((int64_t)system_time_ns + sc->period_ns / 2) / sc->period_ns;
+
+	sc->slot[slave] = slot;
+	sc->edge_ns[slave] = t_ns;
+	sc->system_ns[slave] = system_time_ns;
+	sc->edges[slave]++;
+	for (unsigned other = 0; sc->is_measuring && other < LIMIT_SLAVES; other++) {
+		if (other != slave && sc->edges[other] > 0 && sc->slot[other] == slot) {
+			int64_t spread_ns = llabs(t_ns - sc->edge_ns[other]);
+
+			sc->compared++;
+			if (spread_ns > sc->spread_max_ns) {
+				sc->spread_max_ns = spread_ns;
+			}
+		}
+	}
+}
+
+static void make_segment(struct virtual_bench *b)
+{
+	static struct segment_slave_spec slaves[LIMIT_SLAVES];
+	struct prng prng = { b->spec.seed ^ UINT64_C(0x5e9) };
+
+	for (unsigned n = 0; n < b->spec.slaves; n++) {
+		CHECK_EQ(fb1111_piccolo_slave((int)n, &slaves[n]), 0);
+		slaves[n].ppm = b->spec.ppm[n];
+		slaves[n].clock_start_ns = prng_below(&prng, UINT64_C(1) << 52);
+	}
+	CHECK_EQ(segment_create(slaves, b->spec.slaves, 0, &b->segment), 0);
+	segment_sync0_to(b->segment, on_edge, &b->scope);
+}
+
+void virtual_bench_init(struct virtual_bench *bench, const struct virtual_spec *spec)
+{
+	struct in_process_spec host = {
+		.seed = spec->seed,
+		.host_ppm = spec->host_ppm,
+		.tai_start_ns = spec->tai_start_ns,
+		.wake_sigma_ns = spec->wake_sigma_ns,
+		.wake_spike_ns = spec->wake_spike_ns,
+		.spikes_per_million = spec->spikes_per_million,
+		.transmit_ns = TRANSMIT_NS,
+	};
+
+	memset(bench, 0, sizeof(*bench));
+	bench->spec = *spec;
+	if (bench->spec.slaves == 0) {
+		bench->spec.slaves = DEFAULT_SLAVES;
+	}
+	if (spec->tai_start_ns <= 0) {
+		host.tai_start_ns = spec->tai_start_ns == 0 ? VIRTUAL_TAI_START_NS : 0;
+	}
+	if (spec->wake_sigma_ns <= 0) {
+		host.wake_sigma_ns = spec->wake_sigma_ns == 0 ? DEFAULT_SIGMA_NS : 0;
+	}
+	bench->scope.period_ns = DEFAULT_PERIOD_NS;
+	make_segment(bench);
+	bench->faults = fault_plan_create(spec->seed, 0);
+	CHECK(bench->faults != NULL);
+	host.segment = bench->segment;
+	host.faults = bench->faults;
+	CHECK_EQ(in_process_create(&host, &bench->host), 0);
+}
+
+void virtual_bench_done(struct virtual_bench *bench)
+{
+	in_process_destroy(bench->host);
+	fault_plan_destroy(bench->faults);
+	segment_destroy(bench->segment);
+}
+
+int64_t virtual_bench_now_ns(const struct virtual_bench *bench)
+{
+	struct platform pf = in_process_platform(bench->host);
+
+	return in_process_true_ns(bench->host, pf.now(pf.ctx));
+}
+
+void virtual_bench_fault(struct virtual_bench *bench, const char *line)
+{
+	char error[256] = "";
+
+	fault_plan_restart(bench->faults, virtual_bench_now_ns(bench));
+	if (fault_plan_add(bench->faults, line, bench->spec.slaves, error, sizeof(error)) < 0) {
+		test_fail(__FILE__, __LINE__, "fault \"%s\": %s", line, error);
+	}
+}
+
+void virtual_bench_measure(struct virtual_bench *bench)
+{
+	bench->scope.spread_max_ns = 0;
+	bench->scope.compared = 0;
+	bench->scope.is_measuring = 1;
+}

@@ -1,0 +1,61 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * What stands on the table in a test: a line of FB1111-Piccolo boards on virtual time, a host
+ * clock, a plan of faults, and an oscilloscope on every SYNC0 pin. Masters come and go
+ * (virtual_master.h).
+ */
+#ifndef TESTS_SIM_HARNESS_VIRTUAL_BENCH_H
+#define TESTS_SIM_HARNESS_VIRTUAL_BENCH_H
+
+#include <stdint.h>
+
+#include "base/limits.h"
+#include "sim/in_process.h"
+#include "sim/segment.h"
+
+/* 2026-11-19: TAI that the host's clock starts at. */
+#define VIRTUAL_TAI_START_NS (INT64_C(1795000000) * NS_PER_S)
+
+struct virtual_spec {
+	unsigned slaves;          /* 0: 2 */
+	double ppm[LIMIT_SLAVES]; /* crystals, in order */
+	double host_ppm;
+	uint64_t seed;         /* clocks' start, wake latencies, faults */
+	int64_t tai_start_ns;  /* 0: VIRTUAL_TAI_START_NS; -1: 1970 */
+	int64_t wake_sigma_ns; /* 0: 3 us; -1: none */
+	int64_t wake_spike_ns;
+	uint32_t spikes_per_million;
+};
+
+/* The oscilloscope: edges of one slot of the grid, compared between slaves. */
+struct virtual_scope {
+	int64_t period_ns;
+	int is_measuring;
+	int64_t slot[LIMIT_SLAVES];       /* of the newest edge, by its system time */
+	int64_t edge_ns[LIMIT_SLAVES];    /* its true time */
+	uint64_t system_ns[LIMIT_SLAVES]; /* its system time */
+	uint64_t edges[LIMIT_SLAVES];
+	int64_t spread_max_ns; /* largest distance between two slaves, while measuring */
+	uint64_t compared;
+};
+
+struct virtual_bench {
+	struct virtual_spec spec;
+	struct segment *segment;
+	struct in_process *host;
+	struct fault_plan *faults;
+	struct virtual_scope scope;
+};
+
+/** Ends the test if it cannot be built. Free with virtual_bench_done(). */
+void virtual_bench_init(struct virtual_bench *bench, const struct virtual_spec *spec);
+void virtual_bench_done(struct virtual_bench *bench);
+
+/** Add one line of sim/fault.h; its times count from now. */
+void virtual_bench_fault(struct virtual_bench *bench, const char *line);
+/** True time now. */
+int64_t virtual_bench_now_ns(const struct virtual_bench *bench);
+/** Forget what was measured and measure from here on. */
+void virtual_bench_measure(struct virtual_bench *bench);
+
+#endif

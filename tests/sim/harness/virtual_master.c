@@ -1,0 +1,384 @@
+/* SPDX-License-Identifier: MIT */
+#include "sim/harness/virtual_master.h"
+
+#include <errno.h>
+#include <ftw.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include "harness/test.h"
+#include "image/image.h"
+#include "sim/harness/rt_guard.h"
+
+enum {
+	SERVICE_CYCLES = 10, /* the service loop runs once in so many cycles */
+	REPLY_CYCLES = 2000, /* an answer has to come within so many */
+};
+
+#define FNV_START UINT64_C(0xcbf29ce484222325)
+#define FNV_PRIME UINT64_C(0x100000001b3)
+
+/* --- doors: behind them is the simulated world, which may do what the cycle may not --- */
+
+static mono_t door_now(void *ctx)
+{
+	struct virtual_master *vm = ctx;
+	struct platform pf = in_process_platform(vm->bench->host);
+
+	return pf.now(pf.ctx);
+}
+
+static int64_t door_tai(void *ctx)
+{
+	struct virtual_master *vm = ctx;
+	struct platform pf = in_process_platform(vm->bench->host);
+
+	return pf.tai_ns(pf.ctx);
+}
+
+static int open_door(void)
+{
+	int was_armed = rt_guard_is_armed();
+
+	rt_guard_disarm();
+	return was_armed;
+}
+
+static void close_door(int was_armed)
+{
+	if (was_armed) {
+		rt_guard_arm();
+	}
+}
+
+static int door_sleep(void *ctx, mono_t deadline)
+{
+	struct virtual_master *vm = ctx;
+	struct platform pf = in_process_platform(vm->bench->host);
+	int was_armed = open_door();
+	int r = pf.sleep_until(pf.ctx, deadline);
+
+	close_door(was_armed);
+	return r;
+}
+
+static int door_send(void *ctx, const uint8_t *frame, size_t frame_len)
+{
+	struct virtual_master *vm = ctx;
+	struct transport tr = in_process_transport(vm->bench->host);
+	int was_armed = open_door();
+	int r = tr.send(tr.ctx, frame, frame_len);
+
+	close_door(was_armed);
+	return r;
+}
+
+static int door_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadline, mono_t *ret_at)
+{
+	struct virtual_master *vm = ctx;
+	struct transport tr = in_process_transport(vm->bench->host);
+	int was_armed = open_door();
+	int r = tr.receive(tr.ctx, frame, capacity, deadline, ret_at);
+
+	close_door(was_armed);
+	return r;
+}
+
+static int door_is_up(void *ctx)
+{
+	struct virtual_master *vm = ctx;
+	struct transport tr = in_process_transport(vm->bench->host);
+
+	return tr.is_up(tr.ctx);
+}
+
+static void door_destroy(void *ctx)
+{
+	(void)ctx;
+}
+
+/* --- hooks --- */
+
+static int open_transport(void *ctx, struct transport *ret_transport, struct failure *failure)
+{
+	(void)failure;
+	*ret_transport = (struct transport){ .send = door_send,
+					     .receive = door_receive,
+					     .is_up = door_is_up,
+					     .destroy = door_destroy,
+					     .ctx = ctx };
+	return 0;
+}
+
+static int start_cycle(void *ctx, struct cycle *cycle, struct failure *failure)
+{
+	struct virtual_master *vm = ctx;
+
+	(void)failure;
+	vm->cycle = cycle;
+	return 0;
+}
+
+static int end_cycle(void *ctx)
+{
+	struct virtual_master *vm = ctx;
+
+	vm->cycle = NULL;
+	return 0;
+}
+
+static int has_cycle_ended(void *ctx)
+{
+	(void)ctx;
+	return 0;
+}
+
+static void step_cycle(struct virtual_master *vm)
+{
+	rt_guard_arm();
+	cycle_step(vm->cycle);
+	rt_guard_disarm();
+	if (vm->each_cycle != NULL) {
+		vm->each_cycle(vm);
+	}
+}
+
+static void let_pass(void *ctx, mono_t until)
+{
+	struct virtual_master *vm = ctx;
+	struct platform pf = in_process_platform(vm->bench->host);
+
+	if (vm->cycle != NULL) {
+		step_cycle(vm);
+	} else {
+		pf.sleep_until(pf.ctx, until);
+	}
+}
+
+/* --- samples --- */
+
+static void hash_bytes(uint64_t *hash, const uint8_t *bytes, size_t len)
+{
+	for (size_t i = 0; i < len; i++) {
+		*hash = (*hash ^ bytes[i]) * FNV_PRIME;
+	}
+}
+
+static void count_op(struct virtual_result *res, const struct sample_header *h)
+{
+	static const uint32_t reasons = SAMPLE_LOST | SAMPLE_LATE | SAMPLE_SKIPPED | SAMPLE_WKC_LOW;
+
+	res->op++;
+	res->bad += h->slaves_bad != 0;
+	res->bad_unexplained += h->slaves_bad != 0 && (h->flags & reasons) == 0;
+	res->unlocked += (h->flags & SAMPLE_DC_UNLOCKED) != 0;
+	if (llabs((long long)h->phase_error_ns) > res->phase_max_ns) {
+		res->phase_max_ns = llabs((long long)h->phase_error_ns);
+	}
+}
+
+static void count_sample(struct virtual_master *vm, size_t payload_bytes)
+{
+	struct virtual_result *res = &vm->result;
+	struct sample_header h;
+
+	memcpy(&h, vm->newest, sizeof(h));
+	if (res->samples == 0) {
+		res->first_cycle = h.cycle;
+	} else if (h.cycle != res->last_cycle + 1) {
+		res->gaps++;
+	}
+	res->last_cycle = h.cycle;
+	res->samples++;
+	res->lost += (h.flags & SAMPLE_LOST) != 0;
+	res->late += (h.flags & SAMPLE_LATE) != 0;
+	res->doubled += (h.flags & SAMPLE_DOUBLED) != 0;
+	res->skipped += (h.flags & SAMPLE_SKIPPED) != 0;
+	res->wkc_low += (h.flags & SAMPLE_WKC_LOW) != 0;
+	if ((h.flags & SAMPLE_NOT_OP) == 0) {
+		count_op(res, &h);
+	}
+	hash_bytes(&res->hash, vm->newest, payload_bytes);
+}
+
+static void take_samples(struct virtual_master *vm)
+{
+	uint64_t lost = 0;
+	enum ring_result r;
+
+	while ((r = ring_read(vm->samples, vm->newest, &lost)) != RING_EMPTY && r != RING_CLOSED) {
+		if (r == RING_LOST) {
+			test_fail(__FILE__, __LINE__, "the ring ran over: %llu samples",
+				  (unsigned long long)lost);
+		}
+		count_sample(vm, ring_payload_bytes(vm->samples));
+	}
+}
+
+static void open_samples(struct virtual_master *vm)
+{
+	char path[128];
+
+	ring_reader_destroy(vm->samples);
+	vm->samples = NULL;
+	snprintf(path, sizeof(path), "%s/" CONFIG_RUN_SAMPLES, vm->dir);
+	CHECK_EQ(ring_reader_open(path, &vm->samples), 0);
+	ring_seek(vm->samples, ring_oldest(vm->samples));
+}
+
+/* --- life --- */
+
+static void configure(struct virtual_master *vm, const char *const *settings)
+{
+	char error[256] = "";
+
+	config_defaults(&vm->cfg);
+	vm->cfg.ring_depth_ns = 4 * NS_PER_S;
+	snprintf(vm->cfg.run_dir, sizeof(vm->cfg.run_dir), "%s", vm->dir);
+	snprintf(vm->cfg.interface, sizeof(vm->cfg.interface), "virtual");
+	for (size_t i = 0; settings != NULL && settings[i] != NULL; i++) {
+		if (config_set(&vm->cfg, settings[i], error, sizeof(error)) < 0) {
+			test_fail(__FILE__, __LINE__, "%s", error);
+		}
+	}
+	CHECK_EQ(config_check(&vm->cfg, error, sizeof(error)), 0);
+}
+
+void virtual_master_init(struct virtual_master *vm, struct virtual_bench *bench,
+			 const char *const *settings)
+{
+	struct session_spec spec = {
+		.cfg = &vm->cfg,
+		.platform = { .now = door_now,
+			      .tai_ns = door_tai,
+			      .sleep_until = door_sleep,
+			      .ctx = vm },
+		.hooks = { .transport_open = open_transport,
+			   .cycle_start = start_cycle,
+			   .cycle_end = end_cycle,
+			   .cycle_has_ended = has_cycle_ended,
+			   .wait = let_pass,
+			   .ctx = vm },
+		.segment = HOME_SIMULATED,
+	};
+
+	memset(vm, 0, sizeof(*vm));
+	vm->bench = bench;
+	snprintf(vm->dir, sizeof(vm->dir), "/dev/shm/ecdaq-sim-XXXXXX");
+	CHECK(mkdtemp(vm->dir) != NULL);
+	configure(vm, settings);
+	bench->scope.period_ns = vm->cfg.cycle_period_ns;
+	virtual_master_forget(vm);
+	if (session_create(&spec, &vm->session, &vm->failure) < 0) {
+		test_fail(__FILE__, __LINE__, "%s", vm->failure.text);
+	}
+}
+
+static int forget_file(const char *path, const struct stat *st, int kind, struct FTW *ftw)
+{
+	(void)st;
+	(void)kind;
+	(void)ftw;
+	return remove(path);
+}
+
+void virtual_master_kill(struct virtual_master *vm)
+{
+	ring_reader_destroy(vm->samples);
+	vm->samples = NULL;
+	session_destroy(vm->session);
+	vm->session = NULL;
+	nftw(vm->dir, forget_file, 8, FTW_DEPTH | FTW_PHYS);
+}
+
+int virtual_master_bring_up(struct virtual_master *vm)
+{
+	int64_t start_ns = virtual_bench_now_ns(vm->bench);
+	int r = session_bring_up(vm->session, &vm->failure);
+
+	if (r == 0) {
+		vm->op_ns = virtual_bench_now_ns(vm->bench) - start_ns;
+		open_samples(vm);
+		take_samples(vm);
+	}
+	return r;
+}
+
+int virtual_master_run(struct virtual_master *vm, uint64_t cycles)
+{
+	const _Atomic uint64_t *done = &session_page(vm->session)->cycle.cycles;
+	uint64_t end = *done + cycles;
+	int r = SESSION_GOES_ON;
+
+	for (unsigned i = 1; r == SESSION_GOES_ON && *done < end; i++) {
+		step_cycle(vm);
+		if (i % SERVICE_CYCLES == 0) {
+			r = session_service(vm->session, &vm->failure);
+			take_samples(vm);
+		}
+	}
+	take_samples(vm);
+	return r;
+}
+
+int virtual_master_stop(struct virtual_master *vm)
+{
+	int r = session_stop(vm->session, &vm->failure);
+
+	take_samples(vm);
+	session_conclude(vm->session, NULL);
+	return r;
+}
+
+void virtual_master_forget(struct virtual_master *vm)
+{
+	vm->result = (struct virtual_result){ .hash = FNV_START };
+}
+
+const struct sample_header *virtual_master_sample(const struct virtual_master *vm)
+{
+	return (const struct sample_header *)(const void *)vm->newest;
+}
+
+uint64_t virtual_master_value(const struct virtual_master *vm, const char *name)
+{
+	size_t bytes;
+	const struct sample_meta *meta = ring_meta(vm->samples, &bytes);
+	const struct channel *channels = sample_meta_channels(meta);
+	int n = image_channel_find(channels, meta->channel_count, name);
+
+	if (n < 0) {
+		test_fail(__FILE__, __LINE__, "no channel is named %s", name);
+	}
+	return image_get_raw(vm->newest + sizeof(struct sample_header), &channels[n]);
+}
+
+/* --- admin --- */
+
+static int connect_admin(const struct virtual_master *vm)
+{
+	struct sockaddr_un address = { .sun_family = AF_UNIX };
+	int fd = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
+
+	snprintf(address.sun_path, sizeof(address.sun_path), "%s/" CONFIG_RUN_ADMIN, vm->dir);
+	CHECK_EQ(connect(fd, (const struct sockaddr *)&address, sizeof(address)), 0);
+	return fd;
+}
+
+struct admin_reply virtual_master_ask(struct virtual_master *vm,
+				      const struct admin_request *request)
+{
+	struct admin_reply reply;
+	int fd = connect_admin(vm);
+
+	CHECK_EQ(send(fd, request, sizeof(*request), 0), sizeof(*request));
+	for (int i = 0; i < REPLY_CYCLES / SERVICE_CYCLES; i++) {
+		virtual_master_run(vm, SERVICE_CYCLES);
+		if (recv(fd, &reply, sizeof(reply), MSG_DONTWAIT) == (ssize_t)sizeof(reply)) {
+			close(fd);
+			return reply;
+		}
+	}
+	test_fail(__FILE__, __LINE__, "no reply to verb %u", request->verb);
+}

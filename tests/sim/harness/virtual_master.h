@@ -1,0 +1,80 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The daemon's session on a virtual bench: one thread, virtual time, the cycle held to its
+ * real-time rules (rt_guard.h). Every sample that comes out of the ring is counted and hashed, so
+ * that two runs can be compared to the last byte.
+ */
+#ifndef TESTS_SIM_HARNESS_VIRTUAL_MASTER_H
+#define TESTS_SIM_HARNESS_VIRTUAL_MASTER_H
+
+#include <stdint.h>
+
+#include "admin/protocol.h"
+#include "base/ring.h"
+#include "base/sample.h"
+#include "config/config.h"
+#include "daemon/session.h"
+#include "sim/harness/virtual_bench.h"
+
+/* What the samples said. All counts are of samples taken from the ring. */
+struct virtual_result {
+	uint64_t samples;
+	uint64_t gaps;            /* a cycle number that is not one more */
+	uint64_t op;              /* samples in OP; of those: */
+	uint64_t bad;             /* with any slave's bit */
+	uint64_t bad_unexplained; /* bad, and neither lost, late, skipped nor WKC low */
+	uint64_t lost;
+	uint64_t late;
+	uint64_t doubled;
+	uint64_t skipped;
+	uint64_t wkc_low;
+	uint64_t unlocked;    /* in OP and not locked */
+	int64_t phase_max_ns; /* largest |phase error| in OP */
+	uint64_t hash;        /* FNV-1a over every byte of every sample */
+	uint64_t first_cycle;
+	uint64_t last_cycle;
+};
+
+struct virtual_master {
+	struct virtual_bench *bench;
+	char dir[64];
+	struct config cfg;
+	struct session *session;
+	struct cycle *cycle; /* NULL: does not run */
+	struct ring_reader *samples;
+	struct virtual_result result;
+	struct failure failure;                        /* of the newest call that failed */
+	int64_t op_ns;                                 /* virtual time that bring-up took */
+	void (*each_cycle)(struct virtual_master *vm); /* a checker, after every cycle; NULL: none
+							*/
+	_Alignas(8) uint8_t newest[sizeof(struct sample_header) + LIMIT_IMAGE_BYTES];
+};
+
+/**
+ * A master with @settings ("cycle.period=2ms", ..., NULL at the end; NULL: none) over the defaults.
+ * Ends the test if it cannot be made.
+ */
+void virtual_master_init(struct virtual_master *vm, struct virtual_bench *bench,
+			 const char *const *settings);
+/** Gone without a word on the wire, as by SIGKILL. */
+void virtual_master_kill(struct virtual_master *vm);
+
+/** session_bring_up(); 0 or -errno with vm->failure. */
+int virtual_master_bring_up(struct virtual_master *vm);
+/** @cycles cycles with the service loop between them. An enum session_news or -errno. */
+int virtual_master_run(struct virtual_master *vm, uint64_t cycles);
+/** Outputs safe, INIT; 0 or -errno with vm->failure. The samples up to there are in the result. */
+int virtual_master_stop(struct virtual_master *vm);
+
+/** Forget the samples counted so far. */
+void virtual_master_forget(struct virtual_master *vm);
+
+/** The newest sample's header; the value of the channel named @name in it. */
+const struct sample_header *virtual_master_sample(const struct virtual_master *vm);
+uint64_t virtual_master_value(const struct virtual_master *vm, const char *name);
+
+/** A request through the admin socket, cycles going on until the reply is there. */
+struct admin_reply virtual_master_ask(struct virtual_master *vm,
+				      const struct admin_request *request);
+
+#endif

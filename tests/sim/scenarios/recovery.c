@@ -1,0 +1,143 @@
+/* SPDX-License-Identifier: MIT */
+/* Cables and power: what falls comes back, and samples say what they are worth in between. */
+#include "harness/test.h"
+#include "sim/harness/virtual_master.h"
+
+static struct virtual_bench b;
+static struct virtual_master vm;
+
+static void open_all(const char *const *settings)
+{
+	virtual_bench_init(&b, &(struct virtual_spec){ .ppm = { 30, -40 }, .seed = 31 });
+	virtual_master_init(&vm, &b, settings);
+	if (virtual_master_bring_up(&vm) < 0) {
+		test_fail(__FILE__, __LINE__, "%s", vm.failure.text);
+	}
+	virtual_master_run(&vm, 100);
+	virtual_master_forget(&vm);
+}
+
+static void close_all(void)
+{
+	virtual_master_kill(&vm);
+	virtual_bench_done(&b);
+}
+
+static uint32_t state(void)
+{
+	return atomic_load(&session_page(vm.session)->bus_state);
+}
+
+/* Until the bus is in OP, in steps of 10 ms; how many ms that took. */
+static uint64_t wait_for_op(uint64_t limit_ms)
+{
+	uint64_t ms = 0;
+
+	while (state() != BUS_OP) {
+		if (ms >= limit_ms) {
+			char text[256];
+			const struct status_page *page = session_page(vm.session);
+
+			status_text_get(&page->text_sequence, page->message, sizeof(page->message),
+					text);
+			test_fail(__FILE__, __LINE__, "not in OP after %llu ms: %s",
+				  (unsigned long long)ms, text);
+		}
+		CHECK_EQ(virtual_master_run(&vm, 10), SESSION_GOES_ON);
+		ms += 10;
+	}
+	return ms;
+}
+
+static void check_all_good_again(void)
+{
+	virtual_master_run(&vm, 100);
+	virtual_master_forget(&vm);
+	CHECK_EQ(virtual_master_run(&vm, 1000), SESSION_GOES_ON);
+	CHECK_EQ(vm.result.op, vm.result.samples);
+	CHECK_EQ(vm.result.bad, 0);
+	CHECK_EQ(vm.result.gaps, 0);
+}
+
+static void check_falls_and_returns(const char *breaks, const char *mends, uint64_t limit_ms)
+{
+	uint64_t ms;
+
+	open_all(NULL);
+	virtual_bench_fault(&b, breaks);
+	virtual_master_run(&vm, 500);
+	CHECK_EQ(state(), BUS_RECOVERING);
+	CHECK_EQ(vm.result.gaps, 0);
+	CHECK_EQ(vm.result.bad_unexplained, 0);
+	virtual_bench_fault(&b, mends);
+	ms = wait_for_op(limit_ms);
+	printf("%s, %s: OP again after %llu ms\n", breaks, mends, (unsigned long long)ms);
+	check_all_good_again();
+	close_all();
+}
+
+TEST(sim_recovery, a_cable_pulled_between_slaves_and_put_back)
+{
+	check_falls_and_returns("at=10ms cut slave=1", "at=0s heal slave=1", 2000);
+}
+
+TEST(sim_recovery, a_cable_pulled_at_the_master_and_put_back)
+{
+	check_falls_and_returns("at=10ms cut slave=0", "at=0s heal slave=0", 3000);
+}
+
+TEST(sim_recovery, a_slave_without_power_and_with_power_again)
+{
+	check_falls_and_returns("at=10ms power-off slave=1", "at=0s power-on slave=1", 3000);
+}
+
+TEST(sim_recovery, a_slave_that_reports_an_error_is_led_back)
+{
+	open_all(NULL);
+	virtual_bench_fault(&b, "at=10ms al-error slave=1 code=0x001a");
+	virtual_master_run(&vm, 200);
+	wait_for_op(2000);
+	check_all_good_again();
+	close_all();
+}
+
+TEST(sim_recovery, a_master_held_up_past_the_watchdog_brings_the_slaves_back)
+{
+	open_all(NULL);
+	in_process_stall(b.host, 300 * NS_PER_MS);
+	virtual_master_run(&vm, 300);
+	wait_for_op(2000);
+	CHECK_EQ(vm.result.bad_unexplained, 0);
+	check_all_good_again();
+	close_all();
+}
+
+TEST(sim_recovery, the_whole_segment_without_power_is_started_anew)
+{
+	int r = SESSION_GOES_ON;
+
+	open_all(NULL);
+	virtual_bench_fault(&b, "at=10ms power-off slave=0");
+	for (int i = 0; i < 1000 && r == SESSION_GOES_ON; i++) {
+		r = virtual_master_run(&vm, 10);
+	}
+	CHECK_EQ(r, SESSION_LOST);
+	session_drop(vm.session);
+	segment_power_on(b.segment, 0, virtual_bench_now_ns(&b));
+	if (virtual_master_bring_up(&vm) < 0) {
+		test_fail(__FILE__, __LINE__, "%s", vm.failure.text);
+	}
+	check_all_good_again();
+	close_all();
+}
+
+TEST(sim_recovery, port_errors_are_shown_at_their_slave)
+{
+	open_all(NULL);
+	virtual_bench_fault(&b, "at=10ms port-error slave=1 port=0");
+	virtual_master_run(&vm, 1000);
+	CHECK(atomic_load(&session_page(vm.session)->slave[1].rx_errors[0]) > 0);
+	CHECK_EQ(atomic_load(&session_page(vm.session)->slave[0].rx_errors[0]), 0);
+	CHECK_EQ(state(), BUS_OP);
+	close_all();
+}
