@@ -60,8 +60,8 @@ static enum piccolo_al_code check_process_data(struct piccolo *p)
 }
 
 /*
- * The SYNC unit must be set up before SAFEOP: running under the master's hand in periodic mode, given
- * to us (0x0980 bit 0) in one-shot mode. The first edge may still lie in the future.
+ * The SYNC unit must be set up before SAFEOP: running under the master's hand in periodic mode,
+ * given to us (0x0980 bit 0) in one-shot mode. The first edge may still lie in the future.
  */
 static enum piccolo_al_code check_sync(struct piccolo *p)
 {
@@ -212,7 +212,8 @@ static void finish_op(struct piccolo *p)
 		return;
 	}
 	if (p->hal.time_us(p->hal.ctx) - p->al.op_since_us >= PICCOLO_OP_TIMEOUT_US) {
-		piccolo_al_fail(p, PICCOLO_SAFEOP, has_sync ? AL_SM_WATCHDOG : AL_SYNC_NOT_RECEIVED);
+		piccolo_al_fail(p, PICCOLO_SAFEOP,
+				has_sync ? AL_SM_WATCHDOG : AL_SYNC_NOT_RECEIVED);
 	}
 }
 

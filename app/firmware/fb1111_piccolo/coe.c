@@ -47,7 +47,8 @@ static uint16_t put_abort(octet_t *answer, const octet_t *request, uint32_t code
 }
 
 /* Up to 4 octets go in the header (expedited), more behind it (normal). */
-static uint16_t put_upload(octet_t *answer, const octet_t *request, const octet_t *data, uint16_t len)
+static uint16_t put_upload(octet_t *answer, const octet_t *request, const octet_t *data,
+			   uint16_t len)
 {
 	int is_short = len >= 1 && len <= 4;
 	octet_t *to = answer + (is_short ? SDO_DATA : SDO_NORMAL_DATA);

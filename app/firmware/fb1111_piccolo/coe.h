@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The SDO server (ETG.1000.6 part 5.6.2): expedited and normal upload and download. Every object fits
- * one mailbox, so segments are refused, as is complete access; there is no SDO information service.
+ * The SDO server (ETG.1000.6 part 5.6.2): expedited and normal upload and download. Every object
+ * fits one mailbox, so segments are refused, as is complete access; there is no SDO information
+ * service.
  */
 #ifndef FB1111_PICCOLO_COE_H
 #define FB1111_PICCOLO_COE_H

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The one description of the slave. The firmware checks the master's settings against it and answers
- * CoE from it; host/sii.c makes the EEPROM image and host/esi.c the ESI file from it.
+ * The one description of the slave. The firmware checks the master's settings against it and
+ * answers CoE from it; host/sii.c makes the EEPROM image and host/esi.c the ESI file from it.
  */
 #ifndef FB1111_PICCOLO_DESCRIPTION_H
 #define FB1111_PICCOLO_DESCRIPTION_H
@@ -69,9 +69,9 @@ struct piccolo_pdo {
 struct piccolo_sm {
 	uint16_t start;
 	uint16_t length;
-	octet_t control; /* 0x0804 + 8n */
-	octet_t type;    /* ETG.2010 and 0x1C00: 1 mailbox out, 2 in, 3 outputs, 4 inputs */
-	const char *name;/* as ESI names it */
+	octet_t control;  /* 0x0804 + 8n */
+	octet_t type;     /* ETG.2010 and 0x1C00: 1 mailbox out, 2 in, 3 outputs, 4 inputs */
+	const char *name; /* as ESI names it */
 };
 
 struct piccolo_fmmu {
@@ -88,7 +88,7 @@ struct piccolo_dc_mode {
 
 struct piccolo_description {
 	const char *vendor_name;
-	const char *order;   /* ESI type, SII order string */
+	const char *order; /* ESI type, SII order string */
 	const char *name;
 	const char *group;
 	const char *group_name;

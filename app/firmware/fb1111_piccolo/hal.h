@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * What the firmware needs of the board, and nothing else. On the F28069 these are SPI-A in mode 3
- * (CPOL = 1, CPHA = 1) at 10 Mbit/s, GPIO for chip select, EEPROM_LOADED and LED, the ADC with XINT2
- * (wired to the ET1100's SYNC0) as start-of-conversion trigger, CPU timer 0, and the global interrupt
- * mask. In the simulator they are sim/devices/fb1111_piccolo.c.
+ * (CPOL = 1, CPHA = 1) at 10 Mbit/s, GPIO for chip select, EEPROM_LOADED and LED, the ADC with
+ * XINT2 (wired to the ET1100's SYNC0) as start-of-conversion trigger, CPU timer 0, and the global
+ * interrupt mask. In the simulator they are sim/devices/fb1111_piccolo.c.
  */
 #ifndef FB1111_PICCOLO_HAL_H
 #define FB1111_PICCOLO_HAL_H

@@ -32,8 +32,8 @@ void piccolo_mailbox_reset(struct piccolo *p)
 	m->rx_counter = m->tx_counter = 0;
 	m->is_repeat = m->is_repeat_wanted = 0;
 	m->is_blocked = 0;
-	m->activate_seen = piccolo_esc_read8(p, sm_register(PICCOLO_SM_MAILBOX_IN,
-							    SM_OFFSET_ACTIVATE));
+	m->activate_seen =
+		piccolo_esc_read8(p, sm_register(PICCOLO_SM_MAILBOX_IN, SM_OFFSET_ACTIVATE));
 }
 
 void piccolo_mailbox_sm1_activated(struct piccolo *p, octet_t activate)
@@ -119,9 +119,9 @@ static void read_request(struct piccolo *p)
 			 m->rx + m->rx_pos, len);
 	m->rx_pos = (uint16_t)(m->rx_pos + len);
 	if (m->rx_pos == len) { /* the first chunk has the header */
-		m->rx_len = least((uint16_t)(MAILBOX_HEADER + least(octets_get16(m->rx),
-								    MAILBOX_DATA_MAX)),
-				  PICCOLO_MAILBOX_OCTETS);
+		m->rx_len = least(
+			(uint16_t)(MAILBOX_HEADER + least(octets_get16(m->rx), MAILBOX_DATA_MAX)),
+			PICCOLO_MAILBOX_OCTETS);
 		m->rx_len = m->rx_len < m->rx_pos ? m->rx_pos : m->rx_len;
 	}
 	if (m->rx_pos == PICCOLO_MAILBOX_OCTETS) {
@@ -133,8 +133,8 @@ static void read_request(struct piccolo *p)
 
 static void release_request(struct piccolo *p)
 {
-	(void)piccolo_esc_read8(p, (uint16_t)(sm_start(PICCOLO_SM_MAILBOX_OUT) +
-					      PICCOLO_MAILBOX_OCTETS - 1));
+	(void)piccolo_esc_read8(
+		p, (uint16_t)(sm_start(PICCOLO_SM_MAILBOX_OUT) + PICCOLO_MAILBOX_OCTETS - 1));
 	take_request(p);
 }
 
@@ -142,8 +142,7 @@ static void release_request(struct piccolo *p)
 
 static octet_t is_sm1_full(struct piccolo *p)
 {
-	octet_t status =
-		piccolo_esc_read8(p, sm_register(PICCOLO_SM_MAILBOX_IN, SM_OFFSET_STATUS));
+	octet_t status = piccolo_esc_read8(p, sm_register(PICCOLO_SM_MAILBOX_IN, SM_OFFSET_STATUS));
 
 	return OCTET((status & SM_STATUS_MAILBOX_FULL) != 0);
 }
@@ -160,8 +159,8 @@ static void finish_repeat(struct piccolo *p)
 	}
 	m->is_repeat_wanted = 0;
 	acknowledge[0] = OCTET(m->activate_seen & SM_ACTIVATE_REPEAT);
-	piccolo_esc_write(p, sm_register(PICCOLO_SM_MAILBOX_IN, SM_OFFSET_PDI_CONTROL),
-			  acknowledge, 1);
+	piccolo_esc_write(p, sm_register(PICCOLO_SM_MAILBOX_IN, SM_OFFSET_PDI_CONTROL), acknowledge,
+			  1);
 }
 
 /* Returns nonzero if there is something to do at once. A full SM1 is looked at again later. */

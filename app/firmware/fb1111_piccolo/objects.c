@@ -42,20 +42,27 @@ const struct piccolo_object piccolo_objects[] = {
 	{ 0x1c13, 0, PICCOLO_USINT, ACCESS_RW_PREOP, VALUE_TX_ASSIGNED, 0, "TxPDO assign" },
 	{ 0x1c13, 1, PICCOLO_UINT, ACCESS_RW_PREOP, VALUE_TX_PDO, 0, "TxPDO 1" },
 
-	{ 0x1c32, 0x00, PICCOLO_USINT, ACCESS_RO, VALUE_FIXED, ENTRIES_SYNC, "Output sync parameters" },
+	{ 0x1c32, 0x00, PICCOLO_USINT, ACCESS_RO, VALUE_FIXED, ENTRIES_SYNC,
+	  "Output sync parameters" },
 	{ 0x1c32, 0x01, PICCOLO_UINT, ACCESS_RW_PREOP, VALUE_SYNC_TYPE, 0, "Sync type" },
 	{ 0x1c32, 0x02, PICCOLO_UDINT, ACCESS_RO, VALUE_CYCLE, 0, "Cycle time" },
-	{ 0x1c32, 0x04, PICCOLO_UINT, ACCESS_RO, VALUE_FIXED, SYNC_TYPES_DC_SYNC0, "Sync types supported" },
-	{ 0x1c32, 0x05, PICCOLO_UDINT, ACCESS_RO, VALUE_FIXED, PICCOLO_MIN_CYCLE_NS, "Minimum cycle time" },
+	{ 0x1c32, 0x04, PICCOLO_UINT, ACCESS_RO, VALUE_FIXED, SYNC_TYPES_DC_SYNC0,
+	  "Sync types supported" },
+	{ 0x1c32, 0x05, PICCOLO_UDINT, ACCESS_RO, VALUE_FIXED, PICCOLO_MIN_CYCLE_NS,
+	  "Minimum cycle time" },
 	{ 0x1c32, 0x0c, PICCOLO_UINT, ACCESS_RO, VALUE_OVERRUNS, 0, "Cycle time too small" },
 	{ 0x1c32, 0x20, PICCOLO_BOOL, ACCESS_RO, VALUE_FIXED, 0, "Sync error" },
 
-	{ 0x1c33, 0x00, PICCOLO_USINT, ACCESS_RO, VALUE_FIXED, ENTRIES_SYNC, "Input sync parameters" },
+	{ 0x1c33, 0x00, PICCOLO_USINT, ACCESS_RO, VALUE_FIXED, ENTRIES_SYNC,
+	  "Input sync parameters" },
 	{ 0x1c33, 0x01, PICCOLO_UINT, ACCESS_RW_PREOP, VALUE_SYNC_TYPE, 0, "Sync type" },
 	{ 0x1c33, 0x02, PICCOLO_UDINT, ACCESS_RO, VALUE_CYCLE, 0, "Cycle time" },
-	{ 0x1c33, 0x04, PICCOLO_UINT, ACCESS_RO, VALUE_FIXED, SYNC_TYPES_DC_SYNC0, "Sync types supported" },
-	{ 0x1c33, 0x05, PICCOLO_UDINT, ACCESS_RO, VALUE_FIXED, PICCOLO_MIN_CYCLE_NS, "Minimum cycle time" },
-	{ 0x1c33, 0x06, PICCOLO_UDINT, ACCESS_RO, VALUE_FIXED, PICCOLO_COPY_NS, "Calc and copy time" },
+	{ 0x1c33, 0x04, PICCOLO_UINT, ACCESS_RO, VALUE_FIXED, SYNC_TYPES_DC_SYNC0,
+	  "Sync types supported" },
+	{ 0x1c33, 0x05, PICCOLO_UDINT, ACCESS_RO, VALUE_FIXED, PICCOLO_MIN_CYCLE_NS,
+	  "Minimum cycle time" },
+	{ 0x1c33, 0x06, PICCOLO_UDINT, ACCESS_RO, VALUE_FIXED, PICCOLO_COPY_NS,
+	  "Calc and copy time" },
 	{ 0x1c33, 0x0c, PICCOLO_UINT, ACCESS_RO, VALUE_OVERRUNS, 0, "Cycle time too small" },
 	{ 0x1c33, 0x20, PICCOLO_BOOL, ACCESS_RO, VALUE_FIXED, 0, "Sync error" },
 
@@ -134,8 +141,8 @@ static const char *text_of(enum piccolo_value value)
 	if (value == VALUE_NAME) {
 		return piccolo_description.name;
 	}
-	return value == VALUE_HARDWARE ? piccolo_description.hardware_version :
-					 piccolo_description.software_version;
+	return value == VALUE_HARDWARE ? piccolo_description.hardware_version
+				       : piccolo_description.software_version;
 }
 
 /* Inputs belong to the ISR; they are copied with interrupts off. */

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The object dictionary: one table, from which the SDO server answers and the ESI file is written. */
+/* The object dictionary: one table, from which the SDO server answers and the ESI file is written.
+ */
 #ifndef FB1111_PICCOLO_OBJECTS_H
 #define FB1111_PICCOLO_OBJECTS_H
 
@@ -31,7 +32,7 @@ enum piccolo_value {
 	VALUE_SOFTWARE,
 	VALUE_RX_ENTRY, /* number: entry of the RxPDO */
 	VALUE_TX_ENTRY,
-	VALUE_SM_TYPE,  /* number: SyncManager */
+	VALUE_SM_TYPE, /* number: SyncManager */
 	VALUE_RX_ASSIGNED,
 	VALUE_TX_ASSIGNED,
 	VALUE_RX_PDO,

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Firmware of the FB1111-0141 + TMS320F28069 "Piccolo" slave. The board calls piccolo_step() for ever
- * and piccolo_sync0_isr() on every SYNC0 edge; all state is in struct piccolo, all hardware behind the
- * HAL. C99, no allocation, no library beyond <stdint.h> and <string.h>.
+ * Firmware of the FB1111-0141 + TMS320F28069 "Piccolo" slave. The board calls piccolo_step() for
+ * ever and piccolo_sync0_isr() on every SYNC0 edge; all state is in struct piccolo, all hardware
+ * behind the HAL. C99, no allocation, no library beyond <stdint.h> and <string.h>.
  *
  * Who writes what: the ISR writes inputs, sync0.last_*, sync0.edges and sync0.armed; everybody else
  * touches those with interrupts off. All other fields belong to the main loop.
@@ -47,7 +47,7 @@ enum piccolo_status_bit {
 };
 
 enum piccolo_timing {
-	PICCOLO_EVENT_POLL_US = 1200,    /* AL events are never older than this */
+	PICCOLO_EVENT_POLL_US = 1200, /* AL events are never older than this */
 	PICCOLO_AL_POLL_US = 50000,
 	PICCOLO_REFRESH_DEFAULT_MS = 10,
 	PICCOLO_REFRESH_MAX_MS = 1000,
@@ -87,8 +87,8 @@ struct piccolo_al {
 	enum piccolo_state state;
 	octet_t has_error;
 	uint16_t code;
-	uint16_t control;        /* last AL control that was handled */
-	octet_t is_op_pending;   /* waiting in SAFEOP for outputs and SYNC0 */
+	uint16_t control;      /* last AL control that was handled */
+	octet_t is_op_pending; /* waiting in SAFEOP for outputs and SYNC0 */
 	uint32_t op_since_us;
 	uint32_t polled_us;
 };
@@ -106,30 +106,30 @@ struct piccolo_mailbox {
 	octet_t rx[PICCOLO_MAILBOX_OCTETS];
 	octet_t tx[PICCOLO_MAILBOX_OCTETS];
 	uint16_t rx_len, rx_pos;
-	uint16_t tx_len, tx_pos;   /* tx_len 0: no answer to repeat */
-	octet_t rx_counter;        /* of the last request executed; 0: none */
+	uint16_t tx_len, tx_pos; /* tx_len 0: no answer to repeat */
+	octet_t rx_counter;      /* of the last request executed; 0: none */
 	octet_t tx_counter;
-	octet_t is_repeat;         /* the answer in tx has been sent before */
-	octet_t is_repeat_wanted;  /* SM1 repeat request has toggled */
-	octet_t activate_seen;     /* SM1 activate octet last seen */
-	octet_t is_blocked;        /* SM1 was full at blocked_us */
+	octet_t is_repeat;        /* the answer in tx has been sent before */
+	octet_t is_repeat_wanted; /* SM1 repeat request has toggled */
+	octet_t activate_seen;    /* SM1 activate octet last seen */
+	octet_t is_blocked;       /* SM1 was full at blocked_us */
 	uint32_t blocked_us;
 };
 
 struct piccolo {
 	struct piccolo_hal hal;
-	int is_started;            /* EEPROM_LOADED seen and the ET1100 answers */
+	int is_started; /* EEPROM_LOADED seen and the ET1100 answers */
 
-	uint16_t al_event;         /* 0x0220 as the last SPI access returned it */
-	uint32_t accessed_us;      /* when that was */
+	uint16_t al_event;    /* 0x0220 as the last SPI access returned it */
+	uint32_t accessed_us; /* when that was */
 	uint32_t refreshed_us;
 
-	enum piccolo_mode mode;    /* 0x8000:01 */
-	uint16_t refresh_ms;       /* 0x8000:02 */
-	octet_t rx_assigned;       /* 0x1C12:00 */
-	octet_t tx_assigned;       /* 0x1C13:00 */
-	octet_t is_watchdog_used;  /* SM2 triggers the watchdog */
-	octet_t has_outputs;       /* outputs have come since SAFEOP */
+	enum piccolo_mode mode;   /* 0x8000:01 */
+	uint16_t refresh_ms;      /* 0x8000:02 */
+	octet_t rx_assigned;      /* 0x1C12:00 */
+	octet_t tx_assigned;      /* 0x1C13:00 */
+	octet_t is_watchdog_used; /* SM2 triggers the watchdog */
+	octet_t has_outputs;      /* outputs have come since SAFEOP */
 
 	struct piccolo_al al;
 	struct piccolo_inputs inputs;

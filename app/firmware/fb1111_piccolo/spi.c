@@ -2,8 +2,8 @@
 #include "spi.h"
 
 enum spi_command {
-	SPI_NOP = 0,              /* two address octets, no data */
-	SPI_READ_WAIT_STATE = 3,  /* one 0xff between address and data */
+	SPI_NOP = 0,             /* two address octets, no data */
+	SPI_READ_WAIT_STATE = 3, /* one 0xff between address and data */
 	SPI_WRITE = 4,
 	SPI_ADDRESS_EXTENSION = 6 /* a third address octet follows */
 };
@@ -22,9 +22,11 @@ static void begin(struct piccolo *p, uint16_t address, enum spi_command command)
 
 	p->hal.spi_select(p->hal.ctx);
 	event = transfer(p, (unsigned)address >> 5);
-	event |= (unsigned)transfer(p, ((unsigned)address & 0x1fu) << 3 |
-					(unsigned)(command == SPI_NOP ? SPI_NOP : SPI_ADDRESS_EXTENSION))
-		 << 8;
+	event |=
+		(unsigned)transfer(
+			p, ((unsigned)address & 0x1fu) << 3 |
+				   (unsigned)(command == SPI_NOP ? SPI_NOP : SPI_ADDRESS_EXTENSION))
+		<< 8;
 	if (command != SPI_NOP) {
 		(void)transfer(p, ((unsigned)address >> 13) << 5 | (unsigned)command << 2);
 	}

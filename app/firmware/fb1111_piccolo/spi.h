@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Access to the ET1100's address space over SPI. ESC access is one chip-select cycle: three address
- * octets, on a read one wait-state octet, then the data (ET1100 data sheet, section III, SPI slave).
+ * octets, on a read one wait-state octet, then the data (ET1100 data sheet, section III, SPI
+ * slave).
  */
 #ifndef FB1111_PICCOLO_SPI_H
 #define FB1111_PICCOLO_SPI_H

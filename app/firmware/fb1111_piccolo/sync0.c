@@ -60,8 +60,8 @@ void piccolo_sync0_disarm(struct piccolo *p)
 }
 
 /*
- * Cycle time 0 makes the SYNC unit fire once. Activation comes last, so that the unit never compares
- * with half a start time.
+ * Cycle time 0 makes the SYNC unit fire once. Activation comes last, so that the unit never
+ * compares with half a start time.
  */
 static void arm(struct piccolo *p, uint64_t at_ns)
 {

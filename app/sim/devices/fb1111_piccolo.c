@@ -18,9 +18,9 @@ struct board {
 	uint8_t sii[PICCOLO_EEPROM_OCTETS];
 	struct piccolo firmware;
 	struct pdi_spi spi;
-	int64_t busy_until_ns;    /* the CPU is at its SPI octets, or hangs */
-	int64_t step_ns;          /* next pass of the main loop */
-	int64_t edge_ns;          /* last SYNC0 */
+	int64_t busy_until_ns; /* the CPU is at its SPI octets, or hangs */
+	int64_t step_ns;       /* next pass of the main loop */
+	int64_t edge_ns;       /* last SYNC0 */
 	int64_t copy_ns;
 	uint16_t adc;
 	uint8_t is_adc_on;
@@ -103,8 +103,8 @@ static uint32_t hal_time_us(void *ctx)
 }
 
 /*
- * Within one pass of the main loop no edge can come, since time on the segment stands still; an edge while the
- * CPU is busy is served at busy_until_ns. So the mask itself has nothing to do.
+ * Within one pass of the main loop no edge can come, since time on the segment stands still; an
+ * edge while the CPU is busy is served at busy_until_ns. So the mask itself has nothing to do.
  */
 static void hal_interrupts(void *ctx)
 {
@@ -173,7 +173,8 @@ static void run_step(struct board *b, int64_t t_ns)
 static int64_t next_wake_ns(const struct sim_device *dev)
 {
 	const struct board *b = (const struct board *)dev;
-	int64_t cpu_ns = b->is_edge_pending ? b->busy_until_ns : later(b->step_ns, b->busy_until_ns);
+	int64_t cpu_ns =
+		b->is_edge_pending ? b->busy_until_ns : later(b->step_ns, b->busy_until_ns);
 
 	return earlier(cpu_ns, pdi_spi_due_ns(&b->spi));
 }

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The FB1111-Piccolo board: firmware/fb1111_piccolo as it is, on a HAL made of the modelled SPI pins, an ADC
- * that SYNC0 starts, an LED and the segment's time. The CPU's program takes no time, its SPI octets do.
+ * The FB1111-Piccolo board: firmware/fb1111_piccolo as it is, on a HAL made of the modelled SPI
+ * pins, an ADC that SYNC0 starts, an LED and the segment's time. The CPU's program takes no time,
+ * its SPI octets do.
  */
 #ifndef SIM_DEVICES_FB1111_PICCOLO_H
 #define SIM_DEVICES_FB1111_PICCOLO_H
@@ -18,8 +19,9 @@ enum {
 };
 
 /**
- * Fill a spec for one board, behind slave @position - 1 of a line: 1 m of cable, about 1 us a slave there and back.
- * The segment takes the board over; its EEPROM image lives as long as it does. 0 or -ENOMEM.
+ * Fill a spec for one board, behind slave @position - 1 of a line: 1 m of cable, about 1 us a slave
+ * there and back. The segment takes the board over; its EEPROM image lives as long as it does. 0 or
+ * -ENOMEM.
  */
 int fb1111_piccolo_slave(int position, struct segment_slave_spec *ret_spec);
 
@@ -29,7 +31,8 @@ int fb1111_piccolo_led(const struct sim_device *dev);
 /** How long after its SYNC0 edge the last sample was in SM3; 0: none yet. */
 int64_t fb1111_piccolo_copy_ns(const struct sim_device *dev);
 
-/** Fault: the CPU hangs with interrupts off from @t_ns for @span_ns; edges in that time are overruns. */
+/** Fault: the CPU hangs with interrupts off from @t_ns for @span_ns; edges in that time are
+ * overruns. */
 void fb1111_piccolo_stall(struct sim_device *dev, int64_t t_ns, int64_t span_ns);
 
 #endif

@@ -173,8 +173,7 @@ static uint8_t take_data(struct pdi_spi *spi, uint8_t out)
 
 static int is_header(const struct pdi_spi *spi)
 {
-	return spi->pos < ADDRESS_OCTETS ||
-	       (spi->pos == ADDRESS_OCTETS && spi->data_pos == 0);
+	return spi->pos < ADDRESS_OCTETS || (spi->pos == ADDRESS_OCTETS && spi->data_pos == 0);
 }
 
 uint8_t pdi_spi_transfer(struct pdi_spi *spi, uint8_t out)
@@ -196,7 +195,8 @@ uint8_t pdi_spi_transfer(struct pdi_spi *spi, uint8_t out)
 	return in;
 }
 
-/* A read that is not terminated has already fetched the next octet, with all that reading it does. */
+/* A read that is not terminated has already fetched the next octet, with all that reading it does.
+ */
 static void end_read(struct pdi_spi *spi)
 {
 	if (spi->pos > spi->data_pos && !spi->is_terminated) {

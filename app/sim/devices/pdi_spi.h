@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The ET1100's SPI slave pins (data sheet, section III): chip select and one octet at a time, each taking
- * PDI_SPI_OCTET of time. The CPU's clock is kept here: it runs ahead of the segment while a burst of octets is
- * exchanged in one call. A read looks at the ESC when its octet is clocked. A write is posted, and reaches the
- * ESC when the segment has come to the end of its last octet, so that a frame in between sees the old data.
+ * The ET1100's SPI slave pins (data sheet, section III): chip select and one octet at a time, each
+ * taking PDI_SPI_OCTET of time. The CPU's clock is kept here: it runs ahead of the segment while a
+ * burst of octets is exchanged in one call. A read looks at the ESC when its octet is clocked. A
+ * write is posted, and reaches the ESC when the segment has come to the end of its last octet, so
+ * that a frame in between sees the old data.
  *
  * One CPU and one ESC to an instance, no locks.
  */
@@ -29,27 +30,27 @@ struct pdi_spi_write {
 
 struct pdi_spi {
 	struct esc *esc;
-	int64_t now_ns;       /* the CPU's time, */
-	uint32_t tenths;      /* and tenths of a ns */
+	int64_t now_ns;  /* the CPU's time, */
+	uint32_t tenths; /* and tenths of a ns */
 
 	/* the access that is going on */
 	uint8_t header[3];
 	uint8_t al_event[3];
 	uint8_t is_selected;
 	uint8_t command;
-	uint8_t is_terminated;/* the master's 0xff has come */
-	uint8_t is_broken;    /* it was no access that the data sheet knows */
+	uint8_t is_terminated; /* the master's 0xff has come */
+	uint8_t is_broken;     /* it was no access that the data sheet knows */
 	uint16_t address;
-	unsigned pos;         /* octets since select */
-	unsigned data_pos;    /* position of the first data octet */
-	uint8_t latched[8];   /* a DC time, taken with its first octet */
+	unsigned pos;       /* octets since select */
+	unsigned data_pos;  /* position of the first data octet */
+	uint8_t latched[8]; /* a DC time, taken with its first octet */
 	uint8_t latched_len;
 	struct pdi_spi_write write;
 
 	/* posted, oldest first */
 	struct pdi_spi_write posted[PDI_SPI_POSTED];
 	unsigned posted_first, posted_count;
-	uint64_t octets;      /* since power-on */
+	uint64_t octets; /* since power-on */
 };
 
 /** Power-on at @t_ns. */

@@ -1,13 +1,16 @@
 /* SPDX-License-Identifier: MIT */
 /* The AL state machine: every way between the states, and why a way is refused. */
+#include "wire/al.h"
 #include "base/bytes.h"
 #include "board.h"
 #include "harness/test.h"
-#include "wire/al.h"
 #include "wire/esc_reg.h"
 
-enum { ERROR_INIT = AL_INIT | AL_ERROR, ERROR_PREOP = AL_PREOP | AL_ERROR,
-       ERROR_SAFEOP = AL_SAFEOP | AL_ERROR };
+enum {
+	ERROR_INIT = AL_INIT | AL_ERROR,
+	ERROR_PREOP = AL_PREOP | AL_ERROR,
+	ERROR_SAFEOP = AL_SAFEOP | AL_ERROR
+};
 
 static void expect(struct board *b, uint16_t control, uint16_t status, uint16_t code)
 {

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A board for the firmware to run on: a fake HAL whose SPI ends in a small ET1100, octet by octet. It
- * counts every breach of the SPI rules, so that a test can say there was none. The master's side is
- * the board_master_ calls.
+ * A board for the firmware to run on: a fake HAL whose SPI ends in a small ET1100, octet by octet.
+ * It counts every breach of the SPI rules, so that a test can say there was none. The master's side
+ * is the board_master_ calls.
  */
 #ifndef TESTS_UNIT_FIRMWARE_BOARD_H
 #define TESTS_UNIT_FIRMWARE_BOARD_H

@@ -5,6 +5,7 @@
 Usage: description.py PROGRAM. Both readers are written from ETG.2010 and ETG.2000 and share nothing
 with the C code that wrote the files.
 """
+
 import struct
 import subprocess
 import sys
@@ -84,8 +85,12 @@ def read_sii(image: bytes) -> dict:
         "type": text[general[2]],
         "name": text[general[3]],
         "physics": "".join({1: "Y", 3: "K"}[n] for n in (general[16] & 15, general[16] >> 4) if n),
-        "coe": {"SdoInfo": general[5] >> 1 & 1, "PdoAssign": general[5] >> 2 & 1,
-                "PdoConfig": general[5] >> 3 & 1, "CompleteAccess": general[5] >> 5 & 1},
+        "coe": {
+            "SdoInfo": general[5] >> 1 & 1,
+            "PdoAssign": general[5] >> 2 & 1,
+            "PdoConfig": general[5] >> 3 & 1,
+            "CompleteAccess": general[5] >> 5 & 1,
+        },
         "has_coe": bool(protocols & 4) and bool(general[5] & 1),
         "mailbox": mailbox,
         "fmmu": [FMMUS[b] for b in cat[40] if b not in (0, 0xFF)],
@@ -102,34 +107,63 @@ def esi_pdo(element: ET.Element) -> dict:
     assert element.get("Fixed") == "1" and element.get("Mandatory") == "1"
     entries = []
     for e in element.findall("Entry"):
-        entries.append((number(e.findtext("Index")), number(e.findtext("SubIndex", "0")),
-                        int(e.findtext("BitLen")), e.findtext("Name", ""), e.findtext("DataType")))
-    return {"index": number(element.findtext("Index")), "sm": int(element.get("Sm")),
-            "name": element.findtext("Name"), "entries": entries}
+        entries.append(
+            (
+                number(e.findtext("Index")),
+                number(e.findtext("SubIndex", "0")),
+                int(e.findtext("BitLen")),
+                e.findtext("Name", ""),
+                e.findtext("DataType"),
+            )
+        )
+    return {
+        "index": number(element.findtext("Index")),
+        "sm": int(element.get("Sm")),
+        "name": element.findtext("Name"),
+        "entries": entries,
+    }
 
 
 def read_esi(path: Path) -> dict:
     root = ET.parse(path).getroot()
     (device,) = root.findall("Descriptions/Devices/Device")
     kind = device.find("Type")
-    sms = [(s.text, number(s.get("StartAddress")), int(s.get("DefaultSize")),
-            number(s.get("ControlByte")), int(s.get("Enable"))) for s in device.findall("Sm")]
+    sms = [
+        (
+            s.text,
+            number(s.get("StartAddress")),
+            int(s.get("DefaultSize")),
+            number(s.get("ControlByte")),
+            int(s.get("Enable")),
+        )
+        for s in device.findall("Sm")
+    ]
     by_name = {s[0]: s for s in sms}
     coe = device.find("Mailbox/CoE")
     modes = []
     for mode in device.findall("Dc/OpMode"):
         cycle = mode.find("CycleTimeSync0")
-        modes.append((mode.findtext("Name"), mode.findtext("Desc"),
-                      number(mode.findtext("AssignActivate")),
-                      0 if cycle is None else int(cycle.get("Factor"))))
+        modes.append(
+            (
+                mode.findtext("Name"),
+                mode.findtext("Desc"),
+                number(mode.findtext("AssignActivate")),
+                0 if cycle is None else int(cycle.get("Factor")),
+            )
+        )
     return {
-        "identity": (number(root.findtext("Vendor/Id")), number(kind.get("ProductCode")),
-                     number(kind.get("RevisionNo"))),
+        "identity": (
+            number(root.findtext("Vendor/Id")),
+            number(kind.get("ProductCode")),
+            number(kind.get("RevisionNo")),
+        ),
         "group": device.findtext("GroupType"),
         "type": kind.text,
         "name": device.findtext("Name"),
         "physics": device.get("Physics"),
-        "coe": {k: int(coe.get(k)) for k in ("SdoInfo", "PdoAssign", "PdoConfig", "CompleteAccess")},
+        "coe": {
+            k: int(coe.get(k)) for k in ("SdoInfo", "PdoAssign", "PdoConfig", "CompleteAccess")
+        },
         "has_coe": coe is not None,
         "mailbox": by_name["MBoxOut"][1:3] + by_name["MBoxIn"][1:3],
         "fmmu": [f.text for f in device.findall("Fmmu")],
@@ -146,16 +180,25 @@ def check_facts(device: dict) -> None:
     """What is known of the board and of its process data, not taken from the program."""
     assert device["identity"] == (0x00000002, 0x04570862, 0x0258008D)
     assert [s[1:4] for s in device["sm"]] == [
-        (0x1000, 128, 0x26), (0x1080, 128, 0x22), (0x1100, 9, 0x64), (0x1180, 13, 0x20)]
+        (0x1000, 128, 0x26),
+        (0x1080, 128, 0x22),
+        (0x1100, 9, 0x64),
+        (0x1180, 13, 0x20),
+    ]
     assert device["bytes"] == 2048
     assert device["config"][:3] == bytes.fromhex("050e03")
     assert struct.unpack_from("<H", device["config"], 4)[0] * 10 == 50000  # ns
     assert [(e[0], e[1], e[2], e[3], e[4]) for e in device["tx"]["entries"]] == [
-        (0x6000, 1, 16, "adc", "UINT"), (0x6000, 2, 16, "counter", "UINT"),
-        (0x6000, 3, 64, "sample_time", "ULINT"), (0x6000, 4, 8, "status", "USINT")]
+        (0x6000, 1, 16, "adc", "UINT"),
+        (0x6000, 2, 16, "counter", "UINT"),
+        (0x6000, 3, 64, "sample_time", "ULINT"),
+        (0x6000, 4, 8, "status", "USINT"),
+    ]
     assert [(e[0], e[1], e[2], e[3], e[4]) for e in device["rx"]["entries"]] == [
-        (0x7000, 1, 1, "led", "BOOL"), (0, 0, 7, "", None),
-        (0x7000, 2, 64, "oneshot_time", "ULINT")]
+        (0x7000, 1, 1, "led", "BOOL"),
+        (0, 0, 7, "", None),
+        (0x7000, 2, 64, "oneshot_time", "ULINT"),
+    ]
     assert sum(e[2] for e in device["tx"]["entries"]) == 8 * 13
     assert sum(e[2] for e in device["rx"]["entries"]) == 8 * 9
 
@@ -174,7 +217,9 @@ def check_dictionary(path: Path) -> None:
         assert [i.findtext("Name") for i in items] == [d.findtext("Name") for d in defaults], where
         end = 0
         for item in items:
-            assert item.findtext("BitSize") == types[item.findtext("Type")].findtext("BitSize"), where
+            assert item.findtext("BitSize") == types[item.findtext("Type")].findtext("BitSize"), (
+                where
+            )
             assert int(item.findtext("BitOffs")) >= end, where
             end = int(item.findtext("BitOffs")) + int(item.findtext("BitSize"))
         assert not items or end == int(kind.findtext("BitSize")), where
@@ -187,14 +232,21 @@ def main() -> int:
         subprocess.run([program, "--sii", sii, "--esi", esi], check=True)
         from_sii, from_esi = read_sii(sii.read_bytes()), read_esi(esi)
         for key in from_sii:
-            assert from_sii[key] == from_esi[key], f"{key}: SII {from_sii[key]}, ESI {from_esi[key]}"
+            assert from_sii[key] == from_esi[key], (
+                f"{key}: SII {from_sii[key]}, ESI {from_esi[key]}"
+            )
         assert from_sii.keys() == from_esi.keys()
         check_facts(from_sii)
         check_dictionary(esi)
         stdout = subprocess.run([program, "--sii", "-"], check=True, capture_output=True).stdout
         assert stdout == sii.read_bytes()
-    for arguments, code in ([[], 2], [["--sii"], 2], [["--what", "x"], 2],
-                            [["--sii", "/nonexistent/x"], 1], [["--esi", "/dev/full"], 1]):
+    for arguments, code in (
+        [[], 2],
+        [["--sii"], 2],
+        [["--what", "x"], 2],
+        [["--sii", "/nonexistent/x"], 1],
+        [["--esi", "/dev/full"], 1],
+    ):
         run = subprocess.run([program, *arguments], capture_output=True, text=True)
         assert run.returncode == code, (arguments, run)
         assert run.stderr.count("\n") == 1 and not run.stdout, (arguments, run)

@@ -14,8 +14,10 @@ static void usage(FILE *out)
 {
 	fprintf(out,
 		"usage: %s [--sii FILE] [--esi FILE]\n"
-		"Write the EEPROM image (--sii) and the ESI file (--esi) of the FB1111-Piccolo slave.\n"
-		"FILE \"-\" is standard output. Exit codes: 0 done, 1 a file cannot be written, 2 usage.\n",
+		"Write the EEPROM image (--sii) and the ESI file (--esi) of the FB1111-Piccolo "
+		"slave.\n"
+		"FILE \"-\" is standard output. Exit codes: 0 done, 1 a file cannot be written, 2 "
+		"usage.\n",
 		program);
 }
 
@@ -63,8 +65,8 @@ int main(int argc, char **argv)
 		} else if (strcmp(argv[i], "--esi") == 0 && i + 1 < argc) {
 			esi = argv[++i];
 		} else {
-			fprintf(stderr, "%s: %s: unknown, or without its file; see --help\n", program,
-				argv[i]);
+			fprintf(stderr, "%s: %s: unknown, or without its file; see --help\n",
+				program, argv[i]);
 			return 2;
 		}
 	}

@@ -69,14 +69,16 @@ static void put_entry(FILE *out, const struct piccolo_entry *e)
 	fprintf(out, "            <BitLen>%u</BitLen>\n", (unsigned)e->bits);
 	if (e->name != NULL) {
 		element(out, "            ", "Name", e->name);
-		element(out, "            ", "DataType", fb1111_piccolo_esi_type((unsigned)e->type));
+		element(out, "            ", "DataType",
+			fb1111_piccolo_esi_type((unsigned)e->type));
 	}
 	fputs("          </Entry>\n", out);
 }
 
 static void put_pdo(FILE *out, const char *kind, const struct piccolo_pdo *pdo)
 {
-	fprintf(out, "        <%s Fixed=\"1\" Mandatory=\"1\" Sm=\"%u\">\n", kind, (unsigned)pdo->sm);
+	fprintf(out, "        <%s Fixed=\"1\" Mandatory=\"1\" Sm=\"%u\">\n", kind,
+		(unsigned)pdo->sm);
 	fprintf(out, "          <Index>#x%04X</Index>\n", (unsigned)pdo->index);
 	element(out, "          ", "Name", pdo->name);
 	for (unsigned i = 0; i < pdo->entry_count; i++) {
@@ -96,7 +98,8 @@ static void put_process_data(FILE *out)
 		const struct piccolo_sm *sm = &d->sm[i];
 
 		fprintf(out,
-			"        <Sm DefaultSize=\"%u\" StartAddress=\"#x%04X\" ControlByte=\"#x%02X\" "
+			"        <Sm DefaultSize=\"%u\" StartAddress=\"#x%04X\" "
+			"ControlByte=\"#x%02X\" "
 			"Enable=\"1\">%s</Sm>\n",
 			(unsigned)sm->length, (unsigned)sm->start, (unsigned)sm->control, sm->name);
 	}
@@ -142,7 +145,8 @@ static void put_device(FILE *out)
 	const struct piccolo_description *d = &piccolo_description;
 
 	fputs("      <Device Physics=\"YY\">\n", out);
-	fprintf(out, "        <Type ProductCode=\"#x%08" PRIX32 "\" RevisionNo=\"#x%08" PRIX32 "\">",
+	fprintf(out,
+		"        <Type ProductCode=\"#x%08" PRIX32 "\" RevisionNo=\"#x%08" PRIX32 "\">",
 		PICCOLO_PRODUCT_CODE, PICCOLO_REVISION);
 	fb1111_piccolo_esi_text(out, d->order);
 	fputs("</Type>\n        <Name LcId=\"1033\">", out);
@@ -154,7 +158,8 @@ static void put_device(FILE *out)
 	fputs("        </Profile>\n", out);
 	put_process_data(out);
 	fputs("        <Mailbox DataLinkLayer=\"1\">\n"
-	      "          <CoE SdoInfo=\"0\" PdoAssign=\"0\" PdoConfig=\"0\" CompleteAccess=\"0\"/>\n"
+	      "          <CoE SdoInfo=\"0\" PdoAssign=\"0\" PdoConfig=\"0\" "
+	      "CompleteAccess=\"0\"/>\n"
 	      "        </Mailbox>\n",
 	      out);
 	put_dc(out);

@@ -5,7 +5,8 @@
 #include "../objects.h"
 #include "esi.h"
 
-/* Objects are read from a firmware that was just powered on, so defaults are what it really answers. */
+/* Objects are read from a firmware that was just powered on, so defaults are what it really
+ * answers. */
 static void no_interrupts(void *ctx)
 {
 	(void)ctx;
@@ -108,7 +109,8 @@ static void put_types(FILE *out)
 	for (i = 0; i < sizeof(simple) / sizeof(simple[0]); i++) {
 		unsigned bits = simple[i] == PICCOLO_BOOL ? 1 : 8u * piccolo_type_octets(simple[i]);
 
-		fprintf(out, "              <DataType><Name>%s</Name><BitSize>%u</BitSize></DataType>\n",
+		fprintf(out,
+			"              <DataType><Name>%s</Name><BitSize>%u</BitSize></DataType>\n",
 			fb1111_piccolo_esi_type((unsigned)simple[i]), bits);
 	}
 	for (i = 0; i < piccolo_object_count; i++) {
@@ -140,8 +142,9 @@ static void put_default(FILE *out, const struct piccolo_object *object)
 
 static void put_object(FILE *out, const struct piccolo_object *first, unsigned count)
 {
-	fprintf(out, "              <Object>\n                <Index>#x%04X</Index>\n"
-		     "                <Name>",
+	fprintf(out,
+		"              <Object>\n                <Index>#x%04X</Index>\n"
+		"                <Name>",
 		(unsigned)first->index);
 	fb1111_piccolo_esi_text(out, first->name);
 	fputs("</Name>\n                <Type>", out);

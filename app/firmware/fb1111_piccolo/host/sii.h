@@ -7,8 +7,8 @@
 #include <stdint.h>
 
 /**
- * Write the image to @buf; returns its size (PICCOLO_EEPROM_OCTETS), or 0 with @buf untouched if @cap
- * is too small. Context: any.
+ * Write the image to @buf; returns its size (PICCOLO_EEPROM_OCTETS), or 0 with @buf untouched if
+ * @cap is too small. Context: any.
  */
 size_t fb1111_piccolo_sii(uint8_t *buf, size_t cap);
 

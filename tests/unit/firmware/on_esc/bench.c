@@ -77,7 +77,8 @@ static unsigned datagram(struct bench *b, enum ecat_cmd cmd, unsigned slave, uin
 	return get_le16(body + len);
 }
 
-unsigned bench_write(struct bench *b, unsigned slave, uint16_t address, const void *data, size_t len)
+unsigned bench_write(struct bench *b, unsigned slave, uint16_t address, const void *data,
+		     size_t len)
 {
 	uint8_t copy[256];
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A line of FB1111-Piccolo boards on the real ESC model, and a small master that talks to them in single datagrams.
- * Nothing here knows the firmware: it is reached through the wire.
+ * A line of FB1111-Piccolo boards on the real ESC model, and a small master that talks to them in
+ * single datagrams. Nothing here knows the firmware: it is reached through the wire.
  */
 #ifndef TESTS_UNIT_FIRMWARE_ON_ESC_BENCH_H
 #define TESTS_UNIT_FIRMWARE_ON_ESC_BENCH_H
@@ -38,7 +38,8 @@ void bench_run(struct bench *b, int64_t span_ns);
 void bench_run_to(struct bench *b, int64_t t_ns);
 
 /** One datagram to slave @slave; returns the working counter. */
-unsigned bench_write(struct bench *b, unsigned slave, uint16_t address, const void *data, size_t len);
+unsigned bench_write(struct bench *b, unsigned slave, uint16_t address, const void *data,
+		     size_t len);
 unsigned bench_read(struct bench *b, unsigned slave, uint16_t address, void *data, size_t len);
 void bench_put(struct bench *b, unsigned slave, uint16_t address, uint64_t value, size_t len);
 uint64_t bench_get(struct bench *b, unsigned slave, uint16_t address, size_t len);

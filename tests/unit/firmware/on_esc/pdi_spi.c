@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The modelled SPI pins, driven by hand: what the ET1100's data sheet lets a master do and what not. */
+/* The modelled SPI pins, driven by hand: what the ET1100's data sheet lets a master do and what
+ * not. */
 #include "sim/devices/pdi_spi.h"
 
 #include "base/bytes.h"
@@ -177,8 +178,8 @@ TEST(pdi_spi, breaches_of_the_protocol_are_counted_and_change_nothing)
 
 TEST(pdi_spi, a_dc_time_is_read_as_one_moment)
 {
-	static const uint8_t out[12] = { 0x0910 >> 5, 0x10 << 3 | 6, 3 << 2, 0xff, 0, 0, 0, 0, 0, 0, 0,
-					 0xff };
+	static const uint8_t out[12] = { 0x0910 >> 5, 0x10 << 3 | 6, 3 << 2, 0xff, 0, 0, 0, 0, 0, 0,
+					 0,           0xff };
 	static struct pins p;
 	uint8_t in[12];
 	uint64_t time;
