@@ -96,6 +96,8 @@ void esc_sync_edge(struct esc *esc)
 		esc->reg[ESC_REG_DC_ACTIVATION_STATUS] = 0;
 		s->next_true_ns = INT64_MAX;
 	} else {
+		/* Bit 0: the first pulse is pending (ET1100 data sheet, 0x0984). */
+		esc->reg[ESC_REG_DC_ACTIVATION_STATUS] = 0;
 		s->next_local_ns += get_le32(esc->reg + ESC_REG_DC_SYNC0_CYCLE);
 		if (esc->features.dc == ESC_DC_32) {
 			s->next_local_ns &= UINT32_MAX;
