@@ -17,7 +17,15 @@
 const uint16 priMAC[3] = { 0x1010, 0x1010, 0x1010 };
 const uint16 secMAC[3] = { 0x1010, 0x1010, 0x1014 };
 
-enum { FIRST_DATAGRAM = ECAT_ETHERNET_BYTES + ECAT_FRAME_HEADER_BYTES, LENGTH_MASK = 0x07ff };
+enum {
+	FIRST_DATAGRAM = ECAT_ETHERNET_BYTES + ECAT_FRAME_HEADER_BYTES,
+	LENGTH_MASK = 0x07ff,
+	TRIES = 3,
+	MAILBOX_US = 50000,
+};
+
+/* A late answer to one try is not taken for the next, so that later tries wait longer. */
+static const int try_us[TRIES] = { EC_TIMEOUTRET, 5 * EC_TIMEOUTRET, 25 * EC_TIMEOUTRET };
 
 static void write_ethernet_header(uint8_t *frame)
 {
@@ -128,25 +136,17 @@ int ecx_waitinframe(ecx_portt *port, uint8 idx, int timeout)
 
 int ecx_srconfirm(ecx_portt *port, uint8 idx, int timeout)
 {
-	int64_t left_us = timeout > EC_TIMEOUTRET ? timeout : EC_TIMEOUTRET;
-	int wkc;
+	int64_t whole_us = timeout > MAILBOX_US ? timeout : MAILBOX_US;
+	int wkc = EC_NOFRAME;
 
 	if (!may_be_repeated(port->txbuf[idx])) {
-		return transact(port, idx, left_us * NS_PER_US);
+		return transact(port, idx, whole_us * NS_PER_US);
 	}
-	if (left_us < EC_TIMEOUTRET3) {
-		left_us = EC_TIMEOUTRET3;
+	for (int i = 0; i < TRIES && wkc < 0; i++) {
+		port->retries += i > 0;
+		wkc = transact(port, idx, (int64_t)try_us[i] * NS_PER_US);
 	}
-	for (;;) {
-		int64_t try_us = left_us < EC_TIMEOUTRET ? left_us : EC_TIMEOUTRET;
-
-		wkc = transact(port, idx, try_us * NS_PER_US);
-		left_us -= try_us;
-		if (wkc >= 0 || left_us <= 0) {
-			return wkc;
-		}
-		port->retries++;
-	}
+	return wkc;
 }
 
 uint16 oshw_htons(uint16 host)

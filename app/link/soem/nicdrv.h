@@ -45,8 +45,9 @@ int ecx_outframe_red(ecx_portt *port, uint8 idx);
 /** Send once and wait @timeout us: WKC of the last datagram, or EC_NOFRAME. */
 int ecx_waitinframe(ecx_portt *port, uint8 idx, int timeout);
 /**
- * Send and wait. A frame that may be repeated without harm is sent again after EC_TIMEOUTRET us, until
- * @timeout; a mailbox write is sent exactly once and waited for with the whole @timeout.
+ * Send and wait. A frame that may be repeated without harm is sent up to three times, waited for 2, 10
+ * and 50 ms, whatever @timeout says; a mailbox write is sent exactly once and waited for with the whole
+ * @timeout, 50 ms at least.
  */
 int ecx_srconfirm(ecx_portt *port, uint8 idx, int timeout);
 

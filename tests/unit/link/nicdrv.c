@@ -73,7 +73,7 @@ TEST(nicdrv, silence_ends_after_three_tries)
 	CHECK_EQ(ecx_FPRD(&nic->port, 0x1001, ESC_REG_AL_STATUS, 2, &value, EC_TIMEOUTRET3), EC_NOFRAME);
 	CHECK_EQ(nic->wire.sent, 3);
 	CHECK_EQ(value, 77);
-	CHECK_EQ(nic->wire.now_ns, 6000000);
+	CHECK_EQ(nic->wire.now_ns, 62000000);
 	nic_destroy(nic);
 }
 
@@ -82,7 +82,7 @@ TEST(nicdrv, mailbox_write_whose_answer_is_late_is_sent_exactly_once)
 	struct nic *nic = nic_create();
 	uint8 mailbox[16] = { 1 };
 
-	nic->wire.travel_ns = 5000000;
+	nic->wire.travel_ns = 45000000;
 	CHECK_EQ(ecx_FPWR(&nic->port, 0x1001, 0x1000, sizeof(mailbox), mailbox, EC_TIMEOUTRET3), 1);
 	CHECK_EQ(nic->wire.sent, 1);
 	nic->wire.drop = 1;

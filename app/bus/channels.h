@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: MIT */
+/* From the mapped entries of one slave to channels of the process image. Pure. */
+#ifndef BUS_CHANNELS_H
+#define BUS_CHANNELS_H
+
+#include <stddef.h>
+
+#include "base/sample.h"
+#include "bus/pdo.h"
+#include "bus/plan.h"
+
+enum { CHANNELS_SM = 8 };
+
+/* Where the bits of each SyncManager of the slave begin in the process image. */
+struct channels_place {
+	uint32_t bit_offset[CHANNELS_SM];
+};
+
+/**
+ * Append the channels of @slave to @channel (which holds *count of @capacity); sets its counter_channel and bits. 0
+ * or -E2BIG (*count untouched).
+ */
+int channels_add(struct slave_info *slave, const struct pdo_entry *entry, size_t entry_count,
+		 const struct channels_place *place, struct channel *channel, size_t *count,
+		 size_t capacity);
+
+#endif

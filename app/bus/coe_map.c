@@ -1,0 +1,176 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The mapping as the slave's object dictionary has it: SyncManager types (0x1C00), assigned PDOs (0x1C1n), their
+ * entries. An object that is not there means no mapping by CoE; a transfer that fails is an error, never an
+ * empty mapping.
+ */
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "bus/internal.h"
+
+enum {
+	OBJECT_SM_TYPE = 0x1c00,
+	OBJECT_SM_ASSIGN = 0x1c10,
+	SM_OUTPUTS = 3,
+	SM_INPUTS = 4,
+	SM_FIRST = 2,
+	SM_COUNT_DEFAULT = 4,
+};
+
+struct coe_walk {
+	struct bus *bus;
+	size_t pos;
+	struct pdo_entry *entry;
+	size_t capacity;
+	size_t count;
+};
+
+/* 1 and the value; 0 when the slave aborts (no such object); -errno with a line. */
+static int read_value(struct coe_walk *w, uint16_t index, uint8_t subindex, uint64_t *ret_value)
+{
+	uint32_t abort;
+	int r = bus_sdo_value(w->bus, w->pos, index, subindex, ret_value, &abort);
+
+	if (r == -EREMOTEIO) {
+		return 0;
+	}
+	if (r < 0) {
+		return bus_fail_slave(w->bus, w->pos, -EIO, "SDO 0x%04x:%02x of its mapping: %s", index,
+				      subindex,
+				      r == -ETIMEDOUT ? "no answer from its mailbox" : strerror(-r));
+	}
+	return 1;
+}
+
+static int add_entry(struct coe_walk *w, const struct pdo_entry *common, uint64_t word)
+{
+	struct pdo_entry *e = &w->entry[w->count];
+
+	if (w->count >= w->capacity) {
+		return bus_fail_slave(w->bus, w->pos, -E2BIG, "more mapped entries than PDO_LIMIT (%d)",
+				      PDO_LIMIT);
+	}
+	*e = *common;
+	e->index = (uint16_t)(word >> 16);
+	e->subindex = (uint8_t)(word >> 8);
+	e->bit_len = (uint8_t)word;
+	w->count++;
+	return 1;
+}
+
+static int walk_pdo(struct coe_walk *w, const struct pdo_entry *common)
+{
+	uint64_t count;
+	int r = read_value(w, common->pdo, 0, &count);
+
+	for (uint64_t i = 1; r > 0 && i <= (count & 0xff); i++) {
+		uint64_t word;
+
+		r = read_value(w, common->pdo, (uint8_t)i, &word);
+		if (r > 0) {
+			r = add_entry(w, common, word);
+		}
+	}
+	if (r == 0) {
+		return bus_fail_slave(w->bus, w->pos, -EPROTO,
+				      "PDO 0x%04x is assigned to SM%u, but its mapping cannot be read",
+				      common->pdo, common->sm);
+	}
+	return r;
+}
+
+static int walk_sm(struct coe_walk *w, uint8_t sm, uint8_t type)
+{
+	uint16_t assign = (uint16_t)(OBJECT_SM_ASSIGN + sm);
+	uint64_t count;
+	int r = read_value(w, assign, 0, &count);
+
+	if (r <= 0) {
+		return r;
+	}
+	for (uint64_t i = 1; i <= (count & 0xff); i++) {
+		struct pdo_entry common = { .sm = sm, .is_output = type == SM_OUTPUTS };
+		uint64_t pdo;
+
+		r = read_value(w, assign, (uint8_t)i, &pdo);
+		if (r == 0) {
+			return bus_fail_slave(w->bus, w->pos, -EPROTO, "0x%04x:%02x cannot be read",
+					      assign, (unsigned)i);
+		}
+		if (r < 0) {
+			return r;
+		}
+		common.pdo = (uint16_t)pdo;
+		if (common.pdo != 0) {
+			r = walk_pdo(w, &common);
+		}
+		if (r < 0) {
+			return r;
+		}
+	}
+	return 0;
+}
+
+int bus_coe_entries(struct bus *bus, size_t pos, struct pdo_entry *ret, size_t capacity)
+{
+	struct coe_walk w = { .bus = bus, .pos = pos, .entry = ret, .capacity = capacity };
+	uint64_t sm_count = SM_COUNT_DEFAULT;
+	int has_types = read_value(&w, OBJECT_SM_TYPE, 0, &sm_count);
+
+	if (has_types < 0) {
+		return has_types;
+	}
+	if (sm_count > EC_MAXSM) {
+		sm_count = EC_MAXSM;
+	}
+	for (uint8_t sm = SM_FIRST; sm < sm_count; sm++) {
+		uint64_t type = sm == SM_FIRST ? SM_OUTPUTS : sm == SM_FIRST + 1 ? SM_INPUTS : 0;
+		int r = 0;
+
+		if (has_types > 0) {
+			r = read_value(&w, OBJECT_SM_TYPE, (uint8_t)(sm + 1), &type);
+		}
+		if (r >= 0 && (type == SM_OUTPUTS || type == SM_INPUTS)) {
+			r = walk_sm(&w, sm, (uint8_t)type);
+		}
+		if (r < 0) {
+			return r;
+		}
+	}
+	return (int)w.count;
+}
+
+void bus_coe_names(struct bus *bus, size_t pos, struct pdo_entry *entry, size_t count)
+{
+	ec_ODlistt *list = &bus->od_list;
+	ec_OElistt *entries = &bus->od_entries;
+	ec_errort note;
+
+	if ((bus->soem_slave[soem_index(pos)].CoEdetails & ECT_COEDET_SDOINFO) == 0) {
+		return;
+	}
+	for (size_t i = 0; i < count; i++) {
+		struct pdo_entry *e = &entry[i];
+
+		if (e->index == 0 || (e->name[0] != '\0' && e->data_type != 0)) {
+			continue;
+		}
+		list->Slave = soem_index(pos);
+		list->Index[0] = e->index;
+		entries->DataType[e->subindex] = 0;
+		entries->Name[e->subindex][0] = '\0';
+		if (ecx_readOEsingle(&bus->context, 0, e->subindex, list, entries) <= 0) {
+			continue;
+		}
+		if (e->data_type == 0) {
+			e->data_type = entries->DataType[e->subindex];
+		}
+		if (e->name[0] == '\0') {
+			snprintf(e->name, sizeof(e->name), "%s", entries->Name[e->subindex]);
+		}
+	}
+	while (ecx_poperror(&bus->context, &note)) {
+	}
+}

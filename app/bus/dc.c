@@ -1,0 +1,399 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * Distributed clocks, in place of SOEM's: stop, filters, latch, delays, offsets, drift burst, check. Every register
+ * access is checked; 0x0934 goes before 0x0930, which is written again after the offsets, so that the loops
+ * start from nothing.
+ */
+#include <errno.h>
+#include <inttypes.h>
+#include <string.h>
+
+#include "base/bytes.h"
+#include "bus/internal.h"
+#include "bus/registers.h"
+
+enum {
+	TIME_FILTER = 0x00,    /* 0x0934: none, as the good masters have it */
+	SPEED_FILTER = 0x0c,   /* 0x0935: the ET1100's own default */
+	SPEED_COUNTER_START = 0x1000,
+	BURST_PER_FRAME = 12,
+	DIFF_MAGNITUDE = 0x7fffffff,
+	SETTLE_BURST = 1200,   /* FRMWs between two looks at 0x092C */
+};
+
+static int is_follower(const struct bus *bus, size_t pos)
+{
+	return bus->slave[pos].clock.kind == CLOCK_SYSTEM_TIME && (int)pos != bus->reference;
+}
+
+/* --- clear, latch, read --- */
+
+/* WKC 0 is news only where a slave has a system time: the broadcasts reach whoever has the register. */
+static int clear_clocks(struct bus *bus)
+{
+	static const uint8_t zero[8];
+	const uint8_t filters[2] = { TIME_FILTER, SPEED_FILTER };
+	uint8_t start[2];
+	int r;
+
+	put_le16(start, SPEED_COUNTER_START);
+	r = register_broadcast(bus, ESC_REG_DC_ACTIVATION, zero, 1);
+	if (r >= 0) {
+		r = register_broadcast(bus, ESC_REG_DC_SYSTEM_TIME_OFFSET, zero, 8);
+	}
+	if (r >= 0) {
+		r = register_broadcast(bus, ESC_REG_DC_SYSTEM_TIME_DELAY, zero, 4);
+	}
+	if (r >= 0) {
+		r = register_broadcast(bus, ESC_REG_DC_TIME_FILTER, filters, sizeof(filters));
+	}
+	if (r >= 0) {
+		r = register_broadcast(bus, ESC_REG_DC_SPEED_COUNTER_START, start, sizeof(start));
+	}
+	return r < 0 ? bus_fail(bus, -EIO, "no frame comes back while the clocks are cleared") : 0;
+}
+
+/* Time of the DC epoch at this moment. A board without a clock of its own starts at 2000 (T39). */
+static int64_t wanted_time(const struct bus *bus)
+{
+	const struct platform *platform = line_platform(bus->line);
+	int64_t since_2000_ns = platform->tai_ns(platform->ctx) - DC_EPOCH_UNIX_S * NS_PER_S;
+
+	return since_2000_ns > 0 ? since_2000_ns : bus_now(bus).ns;
+}
+
+static int latch(struct bus *bus, int64_t *ret_latched_ns)
+{
+	static const uint8_t any[4];
+
+	/* Before the frame, so that the way out counts and the way back does not. */
+	*ret_latched_ns = wanted_time(bus);
+	if (register_broadcast(bus, ESC_REG_DC_RECEIVE_TIME_PORT, any, sizeof(any)) <= 0) {
+		return bus_fail(bus, -EIO, "no slave latches receive times (0x0900)");
+	}
+	return 0;
+}
+
+static int read_latched(struct bus *bus, size_t pos, uint64_t *ret_local_ns)
+{
+	struct bus_slave *sl = &bus->slave[pos];
+	uint8_t times[4 * DC_PORTS];
+	uint8_t local[8] = { 0 };
+
+	*ret_local_ns = 0;
+	if (sl->clock.kind == CLOCK_NONE) {
+		return 0;
+	}
+	if (register_read(bus, pos, ESC_REG_DC_RECEIVE_TIME_PORT, times, sizeof(times)) < 0) {
+		return bus_fail_slave(bus, pos, -EIO, "its receive times (0x0900) cannot be read");
+	}
+	for (unsigned i = 0; i < DC_PORTS; i++) {
+		sl->clock.time_ns[i] = get_le32(times + 4 * i);
+	}
+	if (sl->clock.kind != CLOCK_SYSTEM_TIME) {
+		return 0;
+	}
+	if (register_read(bus, pos, ESC_REG_DC_RECEIVE_TIME_PU, local, sl->is_clock_64bit ? 8 : 4) < 0) {
+		return bus_fail_slave(bus, pos, -EIO, "its receive time (0x0918) cannot be read");
+	}
+	*ret_local_ns = get_le64(local);
+	return 0;
+}
+
+/* --- offsets --- */
+
+static int write_clock(struct bus *bus, size_t pos, int64_t offset_ns)
+{
+	struct bus_slave *sl = &bus->slave[pos];
+	uint8_t offset[8];
+	uint8_t delay[4];
+	uint8_t start[2];
+	const uint8_t filters[2] = { TIME_FILTER, SPEED_FILTER };
+	int r;
+
+	put_le64(offset, (uint64_t)offset_ns);
+	put_le32(delay, (int)pos == bus->reference ? 0 : (uint32_t)sl->clock.delay_ns);
+	put_le16(start, SPEED_COUNTER_START);
+	r = register_write(bus, pos, ESC_REG_DC_SYSTEM_TIME_OFFSET, offset, sl->is_clock_64bit ? 8 : 4);
+	if (r >= 0) {
+		r = register_write(bus, pos, ESC_REG_DC_SYSTEM_TIME_DELAY, delay, sizeof(delay));
+	}
+	if (r >= 0) {
+		r = register_write(bus, pos, ESC_REG_DC_TIME_FILTER, filters, sizeof(filters));
+	}
+	if (r >= 0) {
+		r = register_write(bus, pos, ESC_REG_DC_SPEED_COUNTER_START, start, sizeof(start));
+	}
+	if (r >= 0) {
+		sl->clock_offset_ns = offset_ns;
+	}
+	return r;
+}
+
+static int solve(struct bus *bus)
+{
+	struct dc_node node[LIMIT_SLAVES];
+
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		node[i] = bus->slave[i].clock;
+	}
+	bus->reference = dc_topology_solve(node, bus->slave_count);
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		bus->slave[i].clock = node[i];
+		bus->slave[i].info.dc_delay_ns = (int32_t)node[i].delay_ns;
+		bus->slave[i].info.is_dc_reference = (int)i == bus->reference;
+	}
+	if (bus->reference == -EPROTO) {
+		bus->reference = -1;
+		return bus_fail(bus, -EPROTO,
+				"the open ports of the slaves (0x0110) make no tree: a cable in a wrong "
+				"port, or a slave that came or went during the scan");
+	}
+	return 0;
+}
+
+static int set_clocks(struct bus *bus)
+{
+	uint64_t local_ns[LIMIT_SLAVES];
+	int64_t latched_ns;
+	int r = latch(bus, &latched_ns);
+
+	for (size_t i = 0; i < bus->slave_count && r >= 0; i++) {
+		r = read_latched(bus, i, &local_ns[i]);
+	}
+	if (r >= 0) {
+		r = solve(bus);
+	}
+	for (size_t i = 0; i < bus->slave_count && r >= 0; i++) {
+		const struct bus_slave *sl = &bus->slave[i];
+
+		if (sl->clock.kind != CLOCK_SYSTEM_TIME) {
+			continue;
+		}
+		r = write_clock(bus, i, latched_ns + sl->clock.delay_ns - (int64_t)local_ns[i]);
+		if (r < 0) {
+			return bus_fail_slave(bus, i, -EIO, "its clock does not take offset and delay");
+		}
+	}
+	return r;
+}
+
+/* --- static drift --- */
+
+static int burst(struct bus *bus, uint32_t count)
+{
+	uint16_t reference = bus->slave[bus->reference].info.station_addr;
+	uint8_t time[8];
+
+	while (count > 0) {
+		struct access access[BURST_PER_FRAME];
+		uint32_t n = count < BURST_PER_FRAME ? count : BURST_PER_FRAME;
+
+		memset(time, 0, sizeof(time));
+		for (uint32_t i = 0; i < n; i++) {
+			access[i] = (struct access){ .cmd = ECAT_CMD_FRMW,
+						     .adp = reference,
+						     .reg = ESC_REG_DC_SYSTEM_TIME,
+						     .len = sizeof(time),
+						     .data = NULL };
+		}
+		if (registers_run(bus, access, n) < 0) {
+			return bus_fail(bus, -EIO, "no frame comes back during drift compensation");
+		}
+		if (access[0].wkc == 0) {
+			return bus_fail_slave(bus, (size_t)bus->reference, -EIO,
+					      "the reference clock does not answer any more");
+		}
+		count -= n;
+	}
+	return 0;
+}
+
+int64_t bus_clock_diff(struct bus *bus, size_t pos)
+{
+	uint8_t raw[4];
+	int r = register_read(bus, pos, ESC_REG_DC_SYSTEM_TIME_DIFF, raw, sizeof(raw));
+
+	return r < 0 ? r : (int64_t)(get_le32(raw) & DIFF_MAGNITUDE);
+}
+
+/* The slave that is furthest off, -1 when all are inside the limit. */
+static int find_straggler(struct bus *bus, int64_t *ret_diff_ns)
+{
+	int straggler = -1;
+
+	*ret_diff_ns = bus->cfg->dc_diff_limit_ns;
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		int64_t diff_ns = is_follower(bus, i) ? bus_clock_diff(bus, i) : 0;
+
+		if (diff_ns < 0) {
+			*ret_diff_ns = diff_ns;
+			return (int)i;
+		}
+		if (diff_ns > *ret_diff_ns) {
+			*ret_diff_ns = diff_ns;
+			straggler = (int)i;
+		}
+	}
+	return straggler;
+}
+
+static int settle(struct bus *bus)
+{
+	mono_t give_up = mono_add(bus_now(bus), (span_t){ bus->cfg->dc_lock_timeout_ns });
+	uint32_t count = bus->cfg->dc_burst_frames;
+
+	for (;;) {
+		int64_t diff_ns = 0;
+		int straggler;
+		int r = burst(bus, count);
+
+		if (r < 0) {
+			return r;
+		}
+		straggler = find_straggler(bus, &diff_ns);
+		if (straggler < 0) {
+			return 0;
+		}
+		if (diff_ns < 0) {
+			return bus_fail_slave(bus, (size_t)straggler, -EIO,
+					      "its system time difference (0x092C) cannot be read");
+		}
+		if (bus_now(bus).ns >= give_up.ns) {
+			return bus_fail_slave(bus, (size_t)straggler, -ETIME,
+					      "its clock is still %" PRId64 " ns off the reference "
+					      "(limit %" PRId64 " ns, dc.diff_limit)",
+					      diff_ns, bus->cfg->dc_diff_limit_ns);
+		}
+		count = SETTLE_BURST;
+	}
+}
+
+/* --- public --- */
+
+static int has_clocks(const struct bus *bus)
+{
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		if (bus->slave[i].clock.kind == CLOCK_SYSTEM_TIME) {
+			return 1;
+		}
+	}
+	return 0;
+}
+
+int bus_dc_setup(struct bus *bus, char *error)
+{
+	int r;
+
+	bus->error = error;
+	bus->reference = -1;
+	bus->plan.dc_reference = 0;
+	if (!bus->cfg->dc_enable || !has_clocks(bus)) {
+		return 0;
+	}
+	r = clear_clocks(bus);
+	if (r >= 0) {
+		r = set_clocks(bus);
+	}
+	if (r < 0) {
+		return r;
+	}
+	if (!bus->slave[bus->reference].is_clock_64bit) {
+		return bus_fail_slave(bus, (size_t)bus->reference, -ENOTSUP,
+				      "the first clock on the bus has 32 bits only and cannot be the reference");
+	}
+	r = settle(bus);
+	if (r < 0) {
+		return r;
+	}
+	bus->plan.dc_reference = bus->slave[bus->reference].info.station_addr;
+	bus_publish_slaves(bus);
+	return bus_reference_time(bus, &bus->reference_ns) < 0 ?
+		       bus_fail_slave(bus, (size_t)bus->reference, -EIO,
+				      "the reference clock does not answer") :
+		       0;
+}
+
+int bus_reference_time(struct bus *bus, int64_t *ret_ns)
+{
+	uint8_t time[8];
+	mono_t at = bus_now(bus);
+	int r = register_read(bus, (size_t)bus->reference, ESC_REG_DC_SYSTEM_TIME, time, sizeof(time));
+
+	if (r < 0) {
+		return r;
+	}
+	/* While riding, the frame left up to a cycle later; good enough to keep an outage of the reference. */
+	bus->reference_at = at;
+	bus->reference_ns = (int64_t)get_le64(time);
+	*ret_ns = bus->reference_ns;
+	return 0;
+}
+
+/* A living clock other than @pos to set it by: the reference, else any. -1: none. */
+static int find_guide(const struct bus *bus, size_t pos)
+{
+	if (bus->reference >= 0 && (size_t)bus->reference != pos && !bus->slave[bus->reference].is_lost) {
+		return bus->reference;
+	}
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		const struct bus_slave *sl = &bus->slave[i];
+
+		if (i != pos && sl->clock.kind == CLOCK_SYSTEM_TIME && sl->is_clock_64bit &&
+		    !sl->is_lost && sl->step == RECOVERY_NONE) {
+			return (int)i;
+		}
+	}
+	return -1;
+}
+
+/* One frame reads both clocks; the second is passed later by the difference of the delays. */
+static int read_pair(struct bus *bus, size_t guide, size_t pos, int64_t *ret_guide_ns, int64_t *ret_ns)
+{
+	uint8_t time[2][8] = { { 0 } };
+	struct access access[2];
+
+	for (int i = 0; i < 2; i++) {
+		const struct bus_slave *sl = &bus->slave[i == 0 ? guide : pos];
+
+		access[i] = (struct access){ .cmd = ECAT_CMD_FPRD,
+					     .adp = sl->info.station_addr,
+					     .reg = ESC_REG_DC_SYSTEM_TIME,
+					     .len = sl->is_clock_64bit ? 8 : 4,
+					     .data = time[i] };
+	}
+	if (registers_run(bus, access, 2) < 0 || access[0].wkc == 0 || access[1].wkc == 0) {
+		return -EIO;
+	}
+	*ret_guide_ns = (int64_t)get_le64(time[0]) - bus->slave[guide].clock.delay_ns;
+	*ret_ns = (int64_t)get_le64(time[1]);
+	return 0;
+}
+
+int bus_clock_restore(struct bus *bus, size_t pos)
+{
+	struct bus_slave *sl = &bus->slave[pos];
+	static const uint8_t zero[8];
+	int guide = find_guide(bus, pos);
+	int64_t guide_ns;
+	int64_t local_ns;
+	int r;
+
+	if (sl->clock.kind != CLOCK_SYSTEM_TIME || bus->plan.dc_reference == 0) {
+		return 0;
+	}
+	r = register_write(bus, pos, ESC_REG_DC_SYSTEM_TIME_OFFSET, zero, sl->is_clock_64bit ? 8 : 4);
+	if (r < 0) {
+		return r;
+	}
+	if (guide >= 0) {
+		r = read_pair(bus, (size_t)guide, pos, &guide_ns, &local_ns);
+	} else {
+		uint8_t time[8] = { 0 };
+
+		guide_ns = bus->reference_ns + mono_sub(bus_now(bus), bus->reference_at).ns;
+		r = register_read(bus, pos, ESC_REG_DC_SYSTEM_TIME, time, sl->is_clock_64bit ? 8 : 4);
+		local_ns = (int64_t)get_le64(time);
+	}
+	return r < 0 ? r : write_clock(bus, pos, guide_ns + sl->clock.delay_ns - local_ns);
+}

@@ -1,0 +1,203 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * What the files of bus/ share: the bus, its slaves, and the way to say what went wrong. Positions are
+ * 0-based everywhere but in SOEM's calls, which take soem_index(pos). Context: service thread.
+ */
+#ifndef BUS_INTERNAL_H
+#define BUS_INTERNAL_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "oshw.h"
+
+#include "ethercatcoe.h"
+#include "ethercatconfig.h"
+#include "ethercatmain.h"
+
+#include "bus/bus.h"
+#include "bus/dc_topology.h"
+#include "bus/pdo.h"
+#include "wire/sii.h"
+
+enum {
+	PICCOLO_VENDOR = 0x00000002,
+	PICCOLO_PRODUCT = 0x04570862,
+	PICCOLO_OBJECT_ADC = 0x6000,
+	PICCOLO_SUBINDEX_ADC = 1,
+	PICCOLO_SUBINDEX_COUNTER = 2,
+	PICCOLO_OBJECT_MODE = 0x8000,
+	PICCOLO_SUBINDEX_MODE = 1,
+	SII_IMAGE_BYTES = 4096,
+};
+
+/* Way of a slave back to the bus (bus/recover.c); one step a call. */
+enum recovery_step {
+	RECOVERY_NONE,
+	RECOVERY_BACK,      /* answers again: see what it has become */
+	RECOVERY_FIND,      /* not answering: look whether its place is taken again */
+	RECOVERY_IDENTIFY,  /* something answers there: is it the same slave? */
+	RECOVERY_INIT,
+	RECOVERY_PREOP,
+	RECOVERY_SETUP,     /* start-up SDOs, SM, FMMU, watchdog */
+	RECOVERY_CLOCK,     /* offset, delay, filters */
+	RECOVERY_SETTLE,    /* wait for 0x092C */
+	RECOVERY_SYNC0,
+	RECOVERY_SAFEOP,
+	RECOVERY_OP,
+};
+
+struct bus_slave {
+	struct slave_info info;
+	struct dc_node clock;       /* ports, receive times, parent, delay */
+	uint16_t esc_features;
+	uint8_t is_clock_64bit;
+	uint16_t assign_activate;   /* low byte 0x0980, high byte 0x0981; 0: no SYNC0 */
+	int64_t sync0_shift_ns;
+	int64_t clock_offset_ns;    /* 0x0920 as last written */
+	size_t pdo_first;           /* its entries in bus->pdo */
+	size_t pdo_count;
+	enum config_mode mode;
+	uint8_t *sii;               /* in bus->sii; shared by slaves of one type and revision */
+	size_t sii_len;
+	/* bus/watch.c */
+	uint16_t al_status;         /* as last seen */
+	unsigned misses;            /* looks in a row without an answer */
+	int is_lost;
+	int was_reset;              /* came back without its station address */
+	enum recovery_step step;
+	mono_t step_deadline;
+	mono_t retry_at;
+};
+
+struct bus {
+	const struct config *cfg;
+	struct line *line;
+	char *error;                /* of the public call that runs */
+	uint8_t sequence;           /* index byte of our own frames */
+	struct bus_slave slave[LIMIT_SLAVES];
+	size_t slave_count;
+	struct slave_info info[LIMIT_SLAVES]; /* what bus_slaves() shows */
+	uint8_t sii[LIMIT_SLAVES][SII_IMAGE_BYTES];
+	struct pdo_entry pdo[PDO_LIMIT];
+	size_t pdo_count;
+	struct channel channel[LIMIT_CHANNELS];
+	size_t channel_count;
+	struct exchange_plan plan;
+	int reference;              /* position of the reference clock; -1: none */
+	int64_t reference_ns;       /* its time as last read, and when */
+	mono_t reference_at;
+	int64_t sync0_start_ns;     /* common grid; 0: SYNC0 was not started */
+	enum al_state target;       /* newest state asked for */
+	size_t next_recovery;       /* whose turn it is first */
+	/* SOEM */
+	ecx_contextt context;
+	ecx_portt port;
+	ec_slavet soem_slave[LIMIT_SLAVES + 1];
+	int soem_slave_count;
+	ec_groupt group[EC_MAXGROUP];
+	uint8_t sii_cache[EC_MAXEEPBUF + 8]; /* SOEM stores the last 8 bytes past the end */
+	uint32_t sii_map[EC_MAXEEPBITMAP + 1];
+	ec_eringt errors;
+	ec_idxstackT index_stack;
+	boolean has_error;
+	int64_t dc_time;
+	ec_SMcommtypet sm_comm_type;
+	ec_PDOassignt pdo_assign;
+	ec_PDOdesct pdo_description;
+	ec_eepromSMt sii_sm;
+	ec_eepromFMMUt sii_fmmu;
+	struct sii parsed;          /* the SII looked at last */
+	ec_ODlistt od_list;
+	ec_OElistt od_entries;
+};
+
+static inline uint16_t soem_index(size_t pos)
+{
+	return (uint16_t)(pos + 1);
+}
+
+static inline int is_piccolo(const struct slave_info *info)
+{
+	return info->vendor == PICCOLO_VENDOR && info->product == PICCOLO_PRODUCT;
+}
+
+mono_t bus_now(const struct bus *bus);
+
+/** Write one line to the caller's error buffer. Returns @code. */
+int bus_fail(struct bus *bus, int code, const char *format, ...) __attribute__((format(printf, 3, 4)));
+/** "slave 1 (piccolo1): " and the line. Returns @code. */
+int bus_fail_slave(struct bus *bus, size_t pos, int code, const char *format, ...)
+	__attribute__((format(printf, 4, 5)));
+
+/* --- sii_read.c --- */
+
+/** Read the SII of a slave to its sii, sii_len: the categories that matter, the rest zero. 0 or -EIO. */
+int bus_sii_load(struct bus *bus, size_t pos);
+/** Its mapped entries, outputs first; how many, or -errno with a line. */
+int bus_sii_entries(struct bus *bus, size_t pos, struct pdo_entry *ret, size_t capacity);
+
+/* --- scan.c --- */
+
+/** What bus_slaves() shows becomes what is known now. */
+void bus_publish_slaves(struct bus *bus);
+
+/* --- coe_map.c --- */
+
+/** Read SM types, PDO assignment and mapping by CoE. Entries found, 0 if there are no such objects, -errno with a line. */
+int bus_coe_entries(struct bus *bus, size_t pos, struct pdo_entry *ret, size_t capacity);
+/** Give entries without name or type what the object dictionary says (SDO information). */
+void bus_coe_names(struct bus *bus, size_t pos, struct pdo_entry *entry, size_t count);
+
+/* --- mailbox.c --- */
+
+int bus_has_coe(const struct bus *bus, size_t pos);
+/** A little-endian value of 1 to 8 bytes; @ret_abort as bus_sdo_read(). */
+int bus_sdo_value(struct bus *bus, size_t pos, uint16_t index, uint8_t subindex, uint64_t *ret_value,
+		  uint32_t *ret_abort);
+/** Mode and configured start-up SDOs of one slave, in PRE-OP. */
+int bus_startup_sdos(struct bus *bus, size_t pos);
+const char *bus_abort_text(uint32_t abort);
+
+/* --- map_sm.c --- */
+
+/** Tell SOEM the SyncManagers and bits of a slave's entries; *total_bytes counts the image. 0 or -errno with a line. */
+int bus_map_sm(struct bus *bus, size_t pos, uint32_t *total_bytes);
+
+/* --- map.c --- */
+
+/** SM, FMMU and watchdog of one slave, again, as bus_map() left them. */
+int bus_restore_mapping(struct bus *bus, size_t pos);
+
+/* --- dc.c --- */
+
+/** Time of the reference clock now, by FPRD. */
+int bus_reference_time(struct bus *bus, int64_t *ret_ns);
+/** Offset, delay and filters of a slave that lost them, from the clocks that run. */
+int bus_clock_restore(struct bus *bus, size_t pos);
+/** |0x092C| of one slave; -errno. */
+int64_t bus_clock_diff(struct bus *bus, size_t pos);
+
+/* --- sync0.c --- */
+
+/** 1 if the slave takes part in the common SYNC0, and it was started. */
+int bus_sync0_is_wanted(const struct bus *bus, size_t pos);
+/** Program and start SYNC0 of one slave. 0 or -errno, without a line. */
+int bus_sync0_program(struct bus *bus, size_t pos, int64_t start_ns);
+/** SYNC unit of a slave that lost it: into the grid of the others, or back to its own controller. */
+int bus_sync0_restore(struct bus *bus, size_t pos);
+/** 1 if SYNC0 of the slave fires on the grid; 0 if not; -errno. */
+int bus_sync0_is_running(struct bus *bus, size_t pos);
+void bus_sync0_stop(struct bus *bus);
+
+/* --- recover.c --- */
+
+struct bus_emit {
+	void (*call)(void *ctx, const struct event *ev);
+	void *ctx;
+};
+/** One step towards OP for a slave that is not there. */
+void bus_recover(struct bus *bus, size_t pos, const struct bus_emit *emit);
+void bus_emit_event(struct bus *bus, const struct bus_emit *emit, struct event ev);
+
+#endif

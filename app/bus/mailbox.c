@@ -1,0 +1,184 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * SDO transfers on SOEM's mailbox. A mailbox write is sent once only (link/nicdrv.c), so a lost one is mended
+ * here: the whole transfer is tried again with a new counter, after the mailbox has been emptied (T42).
+ */
+#include <errno.h>
+#include <inttypes.h>
+#include <string.h>
+
+#include "base/bytes.h"
+#include "bus/internal.h"
+
+#include "ethercatprint.h"
+
+enum { TRIES = 3, FAST_US = 100000, SOEM_TOO_SMALL = 3 };
+
+int bus_has_coe(const struct bus *bus, size_t pos)
+{
+	const ec_slavet *soem = &bus->soem_slave[soem_index(pos)];
+
+	return soem->mbx_l > 0 && (soem->mbx_proto & ECT_MBXPROT_COE) != 0;
+}
+
+const char *bus_abort_text(uint32_t abort)
+{
+	return ec_sdoerror2string(abort);
+}
+
+/* What SOEM noted about the transfer that failed: -EREMOTEIO abort, -EMSGSIZE, -ETIMEDOUT nothing. */
+static int take_errors(struct bus *bus, uint16_t index, uint32_t *ret_abort)
+{
+	int result = -ETIMEDOUT;
+	ec_errort note;
+
+	while (ecx_poperror(&bus->context, &note)) {
+		if (note.Etype == EC_ERR_TYPE_SDO_ERROR && note.Index == index) {
+			*ret_abort = (uint32_t)note.AbortCode;
+			result = -EREMOTEIO;
+		} else if (note.Etype == EC_ERR_TYPE_PACKET_ERROR && note.Index == index &&
+			   note.ErrorCode == SOEM_TOO_SMALL) {
+			result = -EMSGSIZE;
+		}
+	}
+	return result;
+}
+
+static int check_request(const struct bus *bus, size_t pos)
+{
+	if (pos >= bus->slave_count) {
+		return -ENODEV;
+	}
+	if (!bus_has_coe(bus, pos)) {
+		return -ENOTSUP;
+	}
+	return bus->slave[pos].is_lost ? -EIO : 0;
+}
+
+/* While the bus mends itself, a dead mailbox must not hold up the rest. */
+static int patience_us(const struct bus *bus, size_t pos)
+{
+	return bus->slave[pos].step != RECOVERY_NONE ? FAST_US : EC_TIMEOUTRXM;
+}
+
+int bus_sdo_read(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t subindex,
+		 uint8_t *ret_data, size_t *len, uint32_t *ret_abort)
+{
+	int r = check_request(bus, slave_pos);
+	uint32_t abort = 0;
+
+	*ret_abort = 0;
+	if (r < 0) {
+		return r;
+	}
+	r = -ETIMEDOUT;
+	take_errors(bus, index, &abort);
+	for (int i = 0; i < TRIES && r == -ETIMEDOUT; i++) {
+		int size = (int)*len;
+
+		if (ecx_SDOread(&bus->context, soem_index(slave_pos), index, subindex, FALSE, &size,
+				ret_data, patience_us(bus, slave_pos)) > 0) {
+			*len = (size_t)size;
+			return 0;
+		}
+		r = take_errors(bus, index, ret_abort);
+	}
+	return r;
+}
+
+int bus_sdo_write(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t subindex,
+		  const uint8_t *data, size_t len, uint32_t *ret_abort)
+{
+	int r = check_request(bus, slave_pos);
+	uint32_t abort = 0;
+
+	*ret_abort = 0;
+	if (r < 0) {
+		return r;
+	}
+	r = -ETIMEDOUT;
+	take_errors(bus, index, &abort);
+	for (int i = 0; i < TRIES && r == -ETIMEDOUT; i++) {
+		if (ecx_SDOwrite(&bus->context, soem_index(slave_pos), index, subindex, FALSE, (int)len,
+				 data, patience_us(bus, slave_pos)) > 0) {
+			return 0;
+		}
+		r = take_errors(bus, index, ret_abort);
+	}
+	return r;
+}
+
+int bus_sdo_value(struct bus *bus, size_t pos, uint16_t index, uint8_t subindex, uint64_t *ret_value,
+		  uint32_t *ret_abort)
+{
+	uint8_t data[8] = { 0 };
+	size_t len = sizeof(data);
+	int r = bus_sdo_read(bus, (uint16_t)pos, index, subindex, data, &len, ret_abort);
+
+	if (r < 0) {
+		return r;
+	}
+	for (size_t i = len; i < sizeof(data); i++) {
+		data[i] = 0;
+	}
+	*ret_value = get_le64(data);
+	return 0;
+}
+
+static int write_startup(struct bus *bus, size_t pos, const struct config_sdo *sdo)
+{
+	uint8_t data[8];
+	uint32_t abort;
+	int r;
+
+	put_le64(data, sdo->value);
+	r = bus_sdo_write(bus, (uint16_t)pos, sdo->index, sdo->subindex, data, sdo->bytes, &abort);
+	if (r == -EREMOTEIO) {
+		return bus_fail_slave(bus, pos, -EPROTO,
+				      "start-up SDO 0x%04x:%02x = 0x%" PRIx64 " (%s:%d) is refused: abort "
+				      "0x%08x, %s",
+				      sdo->index, sdo->subindex, sdo->value, bus->cfg->path, sdo->line,
+				      abort, bus_abort_text(abort));
+	}
+	if (r < 0) {
+		return bus_fail_slave(bus, pos, r, "start-up SDO 0x%04x:%02x (%s:%d): %s", sdo->index,
+				      sdo->subindex, bus->cfg->path, sdo->line,
+				      r == -ENOTSUP ? "the slave has no CoE mailbox" : strerror(-r));
+	}
+	return 0;
+}
+
+static int write_mode(struct bus *bus, size_t pos)
+{
+	const struct bus_slave *sl = &bus->slave[pos];
+	struct config_sdo sdo = {
+		.index = PICCOLO_OBJECT_MODE,
+		.subindex = PICCOLO_SUBINDEX_MODE,
+		.bytes = 1,
+		.value = sl->mode == CONFIG_MODE_ONESHOT ? 1 : 0,
+		.line = pos < bus->cfg->slave_count ? bus->cfg->slave[pos].line : 0,
+	};
+
+	if (sl->mode == CONFIG_MODE_UNSET) {
+		return 0;
+	}
+	if (!is_piccolo(&sl->info)) {
+		return bus_fail_slave(bus, pos, -ENOTSUP,
+				      "mode is an option of the FB1111-Piccolo; this is vendor 0x%08x "
+				      "product 0x%08x",
+				      sl->info.vendor, sl->info.product);
+	}
+	return write_startup(bus, pos, &sdo);
+}
+
+int bus_startup_sdos(struct bus *bus, size_t pos)
+{
+	int r = write_mode(bus, pos);
+
+	for (size_t i = 0; i < bus->cfg->sdo_count && r >= 0; i++) {
+		if (bus->cfg->sdo[i].slave_pos == pos) {
+			r = write_startup(bus, pos, &bus->cfg->sdo[i]);
+		}
+	}
+	return r;
+}

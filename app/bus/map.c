@@ -1,0 +1,282 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * Process data: what each slave maps (CoE, else SII), where SOEM puts it in the image, which channels, datagrams and
+ * working counters follow from that. SOEM programs SyncManagers and FMMUs; the mapping is read here, so that a
+ * lost mailbox answer is an error and not an empty mapping (T42).
+ */
+#include <errno.h>
+#include <inttypes.h>
+#include <string.h>
+
+#include "base/bytes.h"
+#include "bus/channels.h"
+#include "bus/internal.h"
+#include "bus/plan.h"
+#include "bus/registers.h"
+
+enum {
+	SM_TYPE_OUTPUTS = 3,
+	SM_TYPE_INPUTS = 4,
+	FMMU_INPUTS = 1,
+	FMMU_OUTPUTS = 2,
+	WATCHDOG_DIVIDER = 0x09c2,  /* (2498 + 2) * 40 ns = 100 us */
+	WATCHDOG_UNIT_NS = 100000,
+};
+
+static uint32_t bytes_of(uint32_t bits)
+{
+	return (bits + 7) / 8;
+}
+
+/* --- what the slave maps --- */
+
+/* CoE tells index and length; the SII often knows the name and type. */
+static void borrow_names(struct pdo_entry *entry, size_t count, const struct pdo_entry *sii,
+			 size_t sii_count)
+{
+	for (size_t i = 0; i < count; i++) {
+		for (size_t k = 0; k < sii_count && entry[i].index != 0; k++) {
+			if (sii[k].index == entry[i].index && sii[k].subindex == entry[i].subindex) {
+				memcpy(entry[i].name, sii[k].name, sizeof(entry[i].name));
+				memcpy(entry[i].pdo_name, sii[k].pdo_name, sizeof(entry[i].pdo_name));
+				entry[i].data_type = sii[k].data_type;
+				break;
+			}
+		}
+	}
+}
+
+static int read_entries(struct bus *bus, size_t pos)
+{
+	struct bus_slave *sl = &bus->slave[pos];
+	struct pdo_entry *entry = &bus->pdo[bus->pdo_count];
+	size_t capacity = PDO_LIMIT - bus->pdo_count;
+	int coe = 0;
+	int sii;
+
+	if (bus_has_coe(bus, pos)) {
+		coe = bus_coe_entries(bus, pos, entry, capacity);
+		if (coe < 0) {
+			return coe;
+		}
+	}
+	sii = bus_sii_entries(bus, pos, entry + coe, capacity - (size_t)coe);
+	if (coe == 0 && sii < 0) {
+		return sii;
+	}
+	if (coe > 0) {
+		borrow_names(entry, (size_t)coe, entry + coe, sii > 0 ? (size_t)sii : 0);
+		bus_coe_names(bus, pos, entry, (size_t)coe);
+	}
+	sl->pdo_first = bus->pdo_count;
+	sl->pdo_count = (size_t)(coe > 0 ? coe : sii);
+	bus->pdo_count += sl->pdo_count;
+	return 0;
+}
+
+/* --- the image --- */
+
+static uint32_t fmmu_bytes(const ec_slavet *soem, unsigned type)
+{
+	uint32_t sum = 0;
+
+	for (unsigned i = 0; i < EC_MAXFMMU; i++) {
+		if (soem->FMMU[i].FMMUactive && soem->FMMU[i].FMMUtype == type) {
+			sum += etohs(soem->FMMU[i].LogLength);
+		}
+	}
+	return sum;
+}
+
+static int check_mapped(struct bus *bus, size_t pos)
+{
+	const ec_slavet *soem = &bus->soem_slave[soem_index(pos)];
+	uint32_t out = fmmu_bytes(soem, FMMU_OUTPUTS);
+	uint32_t in = fmmu_bytes(soem, FMMU_INPUTS);
+
+	if ((soem->Obits > 0 && (out == 0 || out < soem->Obytes)) ||
+	    (soem->Ibits > 0 && (in == 0 || in < soem->Ibytes))) {
+		return bus_fail_slave(bus, pos, -EPROTO,
+				      "%u bits of outputs and %u bits of inputs do not fit into its FMMUs",
+				      soem->Obits, soem->Ibits);
+	}
+	return 0;
+}
+
+/* Where the slave's SMs of one direction begin, and the areas they take. */
+static void place_direction(const struct bus *bus, size_t pos, const uint8_t *image, int is_output,
+			    struct channels_place *place, struct plan_area *area, size_t *area_count)
+{
+	const ec_slavet *soem = &bus->soem_slave[soem_index(pos)];
+	const uint8_t *base = is_output ? soem->outputs : soem->inputs;
+	uint32_t start_bit = is_output ? soem->Ostartbit : soem->Istartbit;
+	uint32_t bits = is_output ? soem->Obits : soem->Ibits;
+	uint32_t at;
+
+	if (bits == 0) {
+		return;
+	}
+	at = (uint32_t)(base - image);
+	for (unsigned n = 0; n < EC_MAXSM; n++) {
+		uint32_t bytes = etohs(soem->SM[n].SMlength);
+
+		if (soem->SMtype[n] != (is_output ? SM_TYPE_OUTPUTS : SM_TYPE_INPUTS)) {
+			continue;
+		}
+		place->bit_offset[n] = at * 8 + start_bit;
+		area[(*area_count)++] = (struct plan_area){
+			.start = at,
+			.end = bits < 8 ? at + bytes_of(start_bit + bits) : at + bytes,
+			.slave_pos = (uint16_t)pos,
+			.sm = (uint8_t)n,
+			.is_output = (uint8_t)is_output,
+		};
+		at += bytes;
+	}
+}
+
+static int build_channels(struct bus *bus, const uint8_t *image, struct plan_area *area,
+			  size_t *area_count)
+{
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		struct bus_slave *sl = &bus->slave[i];
+		struct channels_place place = { 0 };
+		int r = check_mapped(bus, i);
+
+		if (r < 0) {
+			return r;
+		}
+		place_direction(bus, i, image, 1, &place, area, area_count);
+		place_direction(bus, i, image, 0, &place, area, area_count);
+		r = channels_add(&sl->info, &bus->pdo[sl->pdo_first], sl->pdo_count, &place,
+				 bus->channel, &bus->channel_count, LIMIT_CHANNELS);
+		if (r < 0) {
+			return bus_fail_slave(bus, i, r, "more channels than LIMIT_CHANNELS (%d) with it",
+					      LIMIT_CHANNELS);
+		}
+	}
+	return 0;
+}
+
+static int build_plan(struct bus *bus, const struct plan_area *area, size_t area_count)
+{
+	int blocked = -1;
+
+	bus->plan = (struct exchange_plan){
+		.image_bytes = bus->group[0].Obytes + bus->group[0].Ibytes,
+		.output_bytes = bus->group[0].Obytes,
+		.logical_start = bus->group[0].logstartaddr,
+		.slave_count = (uint16_t)bus->slave_count,
+		.monitor = (int)bus->cfg->bus_monitor,
+		/* room for FRMW is left in any case; bus_dc_setup() says whose time it is */
+		.dc_reference = UINT16_MAX,
+	};
+	if (plan_chunks(&bus->plan, area, area_count, &blocked) < 0) {
+		if (blocked < 0) {
+			return bus_fail(bus, -E2BIG,
+					"%u bytes of process data need more than LIMIT_FRAMES (%d) frames",
+					bus->plan.image_bytes, LIMIT_FRAMES);
+		}
+		return bus_fail_slave(bus, area[blocked].slave_pos, -E2BIG,
+				      "SM%u has %u bytes: more than one frame holds, and it must not be split",
+				      area[blocked].sm, area[blocked].end - area[blocked].start);
+	}
+	bus->plan.dc_reference = 0;
+	return 0;
+}
+
+/* --- watchdog --- */
+
+/* A slave without the register keeps what it has; one that takes another value than asked is an error (T08). */
+static int set_watchdog(struct bus *bus, size_t pos)
+{
+	int64_t time = (bus->cfg->bus_watchdog_ns + WATCHDOG_UNIT_NS - 1) / WATCHDOG_UNIT_NS;
+	uint8_t wanted[2][2];
+	const uint16_t reg[2] = { ESC_REG_WATCHDOG_DIVIDER, ESC_REG_WATCHDOG_TIME_PD };
+
+	if (bus->cfg->bus_watchdog_ns == 0 || bus->slave[pos].info.output_bits == 0) {
+		return 0;
+	}
+	put_le16(wanted[0], WATCHDOG_DIVIDER);
+	put_le16(wanted[1], (uint16_t)(time > UINT16_MAX ? UINT16_MAX : time));
+	for (int i = 0; i < 2; i++) {
+		uint8_t got[2] = { 0 };
+
+		register_write(bus, pos, reg[i], wanted[i], sizeof(wanted[i]));
+		if (register_read(bus, pos, reg[i], got, sizeof(got)) == 0 &&
+		    memcmp(got, wanted[i], sizeof(got)) != 0) {
+			return bus_fail_slave(bus, pos, -EPROTO,
+					      "watchdog register 0x%04x reads 0x%04x after 0x%04x was written",
+					      reg[i], get_le16(got), get_le16(wanted[i]));
+		}
+	}
+	return 0;
+}
+
+/* --- public --- */
+
+int bus_restore_mapping(struct bus *bus, size_t pos)
+{
+	const ec_slavet *soem = &bus->soem_slave[soem_index(pos)];
+	int r = 0;
+
+	for (unsigned n = 0; n < EC_MAXSM && r >= 0; n++) {
+		if (soem->SM[n].StartAddr != 0) {
+			r = register_write(bus, pos, (uint16_t)(ESC_REG_SM + n * ESC_SM_BYTES),
+					   &soem->SM[n], ESC_SM_BYTES);
+		}
+	}
+	for (unsigned i = 0; i < EC_MAXFMMU && r >= 0; i++) {
+		if (soem->FMMU[i].FMMUactive) {
+			r = register_write(bus, pos, (uint16_t)(ESC_REG_FMMU + i * ESC_FMMU_BYTES),
+					   &soem->FMMU[i], ESC_FMMU_BYTES);
+		}
+	}
+	return r < 0 ? r : set_watchdog(bus, pos);
+}
+
+static int read_all(struct bus *bus)
+{
+	uint32_t total_bytes = 0;
+
+	bus->pdo_count = 0;
+	bus->channel_count = 0;
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		int r = bus_startup_sdos(bus, i);
+
+		if (r >= 0) {
+			r = read_entries(bus, i);
+		}
+		if (r >= 0) {
+			r = bus_map_sm(bus, i, &total_bytes);
+		}
+		if (r < 0) {
+			return r;
+		}
+	}
+	return 0;
+}
+
+int bus_map(struct bus *bus, char *error)
+{
+	static const uint8_t image[LIMIT_IMAGE_BYTES]; /* SOEM only computes places in it */
+	struct plan_area area[PLAN_AREAS];
+	size_t area_count = 0;
+	int r;
+
+	bus->error = error;
+	r = read_all(bus);
+	if (r < 0) {
+		return r;
+	}
+	ecx_config_map_group(&bus->context, (void *)(uintptr_t)image, 0);
+	r = build_channels(bus, image, area, &area_count);
+	if (r >= 0) {
+		r = build_plan(bus, area, area_count);
+	}
+	for (size_t i = 0; i < bus->slave_count && r >= 0; i++) {
+		r = set_watchdog(bus, i);
+	}
+	bus_publish_slaves(bus);
+	return r;
+}

@@ -1,0 +1,262 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * Finds the slaves. SOEM does the work; around it: stop what an earlier master left running (T09), notice
+ * blank and unreadable EEPROMs before anything is built on them (T31), bring all to PRE-OP, name them.
+ */
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "base/bytes.h"
+#include "bus/compare.h"
+#include "bus/internal.h"
+#include "bus/names.h"
+#include "bus/registers.h"
+
+enum {
+	FEATURE_DC = 1 << 2,
+	FEATURE_DC_64BIT = 1 << 3,
+	EEPROM_CHECKSUM_ERROR = 1 << 11,
+	EEPROM_NOT_LOADED = 1 << 12,
+	EEPROM_NO_ANSWER = 1 << 13,
+	ASSIGN_DC = 0x0300,
+	ASSIGN_ONE_SHOT = 0x0001, /* 0x0980 bit 0: the SYNC unit is the slave's own */
+};
+
+/* SYNC pulses of a master that was killed; a slave whose SYNC unit its PDI owns is freed in free_sync(). */
+static void silence(struct bus *bus)
+{
+	uint8_t off = 0;
+
+	register_broadcast(bus, ESC_REG_DC_ACTIVATION, &off, sizeof(off));
+}
+
+/* 0x0980 is written where it is set, and nowhere else: some drives mind (T12). */
+static void free_sync(struct bus *bus, size_t pos)
+{
+	uint8_t unit[2];
+	const uint8_t off[2] = { 0, 0 };
+
+	if (register_read(bus, pos, ESC_REG_DC_CYCLIC_CONTROL, unit, sizeof(unit)) < 0) {
+		return;
+	}
+	if (unit[0] != 0) {
+		register_write(bus, pos, ESC_REG_DC_CYCLIC_CONTROL, off, 1);
+	}
+	if (unit[0] != 0 || unit[1] != 0) {
+		register_write(bus, pos, ESC_REG_DC_ACTIVATION, off, 1);
+	}
+}
+
+static int find_slaves(struct bus *bus)
+{
+	mono_t give_up = mono_add(bus_now(bus), (span_t){ bus->cfg->bus_scan_timeout_ns });
+	const struct transport *tp = line_transport(bus->line);
+	int found;
+
+	for (;;) {
+		silence(bus);
+		found = ecx_config_init(&bus->context, FALSE);
+		if (found > 0 || found == EC_SLAVECOUNTEXCEEDED || bus_now(bus).ns >= give_up.ns) {
+			break;
+		}
+		line_sleep(bus->line, (span_t){ 100 * NS_PER_MS });
+	}
+	if (found == EC_SLAVECOUNTEXCEEDED) {
+		return bus_fail(bus, -E2BIG, "more slaves on the bus than LIMIT_SLAVES (%d)",
+				LIMIT_SLAVES);
+	}
+	if (found <= 0) {
+		return bus_fail(bus, -ENODEV, "no slave answers on %s: %s",
+				bus->cfg->interface[0] != '\0' ? bus->cfg->interface : "the line",
+				tp->is_up != NULL && tp->is_up(tp->ctx) == 0 ?
+					"the link is down (cable, power of the first slave)" :
+					"the link is up; is this the EtherCAT port, is the IN side "
+					"connected?");
+	}
+	bus->slave_count = (size_t)found;
+	return 0;
+}
+
+static int check_eeprom(struct bus *bus, size_t pos)
+{
+	const struct slave_info *info = &bus->slave[pos].info;
+	uint8_t status[2] = { 0 };
+
+	register_read(bus, pos, ESC_REG_EEPROM_CONTROL, status, sizeof(status));
+	if ((get_le16(status) & EEPROM_NO_ANSWER) != 0) {
+		return bus_fail_slave(bus, pos, -EPROTO, "its EEPROM does not answer (0x0502 is 0x%04x)",
+				      get_le16(status));
+	}
+	if (info->vendor == 0 || info->vendor == UINT32_MAX) {
+		return bus_fail_slave(bus, pos, -EPROTO,
+				      "its EEPROM is blank or unreadable (vendor 0x%08x, 0x0502 is 0x%04x): "
+				      "write its SII first",
+				      info->vendor, get_le16(status));
+	}
+	if ((get_le16(status) & (EEPROM_CHECKSUM_ERROR | EEPROM_NOT_LOADED)) != 0) {
+		return bus_fail_slave(bus, pos, -EPROTO,
+				      "its EEPROM is damaged: checksum of words 0 to 7 (0x0502 is 0x%04x)",
+				      get_le16(status));
+	}
+	return 0;
+}
+
+static void name_device(struct bus *bus, size_t pos)
+{
+	struct bus_slave *sl = &bus->slave[pos];
+
+	sii_string(sl->sii, sl->sii_len, bus->parsed.device_name, sl->info.device);
+	if (sl->info.device[0] == '\0') {
+		sii_string(sl->sii, sl->sii_len, bus->parsed.order_name, sl->info.device);
+	}
+}
+
+/* Configured; else what the slave is: by its kind, by its SII; else SYNC0 for whoever has a clock. */
+static uint16_t choose_assign_activate(const struct bus *bus, size_t pos)
+{
+	const struct config_slave *want = pos < bus->cfg->slave_count ? &bus->cfg->slave[pos] : NULL;
+	const struct bus_slave *sl = &bus->slave[pos];
+
+	if (want != NULL && want->assign_activate != 0) {
+		return (uint16_t)want->assign_activate;
+	}
+	if (is_piccolo(&sl->info)) {
+		return sl->mode == CONFIG_MODE_ONESHOT ? ASSIGN_ONE_SHOT : ASSIGN_DC;
+	}
+	if (bus->parsed.has_dc) {
+		return bus->parsed.dc_assign_activate;
+	}
+	return ASSIGN_DC;
+}
+
+static void take_over(struct bus *bus, size_t pos)
+{
+	const ec_slavet *soem = &bus->soem_slave[soem_index(pos)];
+	struct bus_slave *sl = &bus->slave[pos];
+
+	memset(sl, 0, sizeof(*sl));
+	sl->info.slave_pos = (uint16_t)pos;
+	sl->info.station_addr = soem->configadr;
+	sl->info.alias = soem->aliasadr;
+	sl->info.vendor = soem->eep_man;
+	sl->info.product = soem->eep_id;
+	sl->info.revision = soem->eep_rev;
+	sl->info.serial = soem->eep_sn;
+	sl->info.counter_channel = -1;
+	sl->clock.ports = soem->activeports;
+}
+
+static void take_clock(struct bus *bus, size_t pos)
+{
+	struct bus_slave *sl = &bus->slave[pos];
+	uint8_t features[2] = { 0 };
+	uint8_t times[16];
+	uint8_t system_time[8];
+
+	register_read(bus, pos, ESC_REG_FEATURES, features, sizeof(features));
+	sl->esc_features = get_le16(features);
+	sl->is_clock_64bit = (sl->esc_features & FEATURE_DC_64BIT) != 0;
+	/* The feature bit alone does not tell who has a system time: ask for it. */
+	if ((sl->esc_features & FEATURE_DC) == 0 ||
+	    register_read(bus, pos, ESC_REG_DC_RECEIVE_TIME_PORT, times, sizeof(times)) < 0) {
+		sl->clock.kind = CLOCK_NONE;
+	} else if (register_read(bus, pos, ESC_REG_DC_SYSTEM_TIME, system_time,
+				 sizeof(system_time)) < 0) {
+		sl->clock.kind = CLOCK_RECEIVE_TIMES;
+	} else {
+		sl->clock.kind = CLOCK_SYSTEM_TIME;
+	}
+	sl->info.has_dc = sl->clock.kind == CLOCK_SYSTEM_TIME;
+}
+
+/* What the configuration says of the slave at its position. */
+static void take_settings(struct bus *bus, size_t pos)
+{
+	struct bus_slave *sl = &bus->slave[pos];
+	const struct config_slave *want;
+
+	if (pos >= bus->cfg->slave_count) {
+		return;
+	}
+	want = &bus->cfg->slave[pos];
+	sl->mode = want->mode;
+	sl->sync0_shift_ns = want->sync0_shift_ns;
+	snprintf(sl->info.name, sizeof(sl->info.name), "%s", want->name);
+}
+
+static int describe(struct bus *bus, size_t pos)
+{
+	struct bus_slave *sl = &bus->slave[pos];
+	char why[128];
+	int r;
+
+	take_settings(bus, pos);
+	r = bus_sii_load(bus, pos);
+	if (r < 0) {
+		return bus_fail_slave(bus, pos, r, "its EEPROM cannot be read");
+	}
+	/* Damage is told where it matters: when the mapping is read. */
+	sii_parse(sl->sii, sl->sii_len, &bus->parsed, why, sizeof(why));
+	name_device(bus, pos);
+	sl->assign_activate = choose_assign_activate(bus, pos);
+	if (sl->info.name[0] == '\0') {
+		name_slave(sl->info.device, is_piccolo(&sl->info), pos, sl->info.name,
+			   sizeof(sl->info.name));
+	}
+	return 0;
+}
+
+static int check_names(struct bus *bus)
+{
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		for (size_t k = 0; k < i; k++) {
+			if (strcmp(bus->slave[i].info.name, bus->slave[k].info.name) == 0) {
+				return bus_fail_slave(bus, i, -EEXIST, "slave %zu has the same name", k);
+			}
+		}
+	}
+	return 0;
+}
+
+void bus_publish_slaves(struct bus *bus)
+{
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		bus->info[i] = bus->slave[i].info;
+	}
+}
+
+int bus_scan(struct bus *bus, char *error)
+{
+	int r;
+
+	bus->error = error;
+	r = find_slaves(bus);
+	if (r < 0) {
+		return r;
+	}
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		take_over(bus, i);
+	}
+	for (size_t i = 0; i < bus->slave_count && r >= 0; i++) {
+		free_sync(bus, i);
+		take_clock(bus, i);
+		r = check_eeprom(bus, i);
+		if (r >= 0) {
+			r = describe(bus, i);
+		}
+	}
+	if (r >= 0) {
+		r = check_names(bus);
+	}
+	bus_publish_slaves(bus);
+	if (r < 0) {
+		return r;
+	}
+	return bus_request_state(bus, AL_PREOP, (span_t){ bus->cfg->bus_scan_timeout_ns }, error);
+}
+
+int bus_compare(const struct bus *bus, char *error)
+{
+	return compare_slaves(bus->cfg, bus->info, bus->slave_count, error, BUS_ERROR_BYTES);
+}

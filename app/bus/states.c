@@ -1,0 +1,218 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * AL states: ask all slaves, wait while the cycle goes on, and say who refused and why. States are never
+ * compared by what a broadcast ORs together.
+ */
+#include <errno.h>
+
+#include "base/bytes.h"
+#include "bus/internal.h"
+#include "bus/registers.h"
+
+enum { AL_BYTES = 6, POLL_MS = 2, ACKNOWLEDGE_NS = 500000000 };
+
+struct al_reading {
+	uint8_t bytes[AL_BYTES]; /* 0x0130 to 0x0135: status, reserved, code */
+	uint16_t wkc;
+};
+
+static uint16_t status_of(const struct al_reading *al)
+{
+	return get_le16(al->bytes);
+}
+
+static uint16_t code_of(const struct al_reading *al)
+{
+	return get_le16(al->bytes + 4);
+}
+
+/*
+ * AL control is a mailbox, too: a slave that has not looked at the last request yet does not take another
+ * (WKC 0). Write to those that have not taken @state; @taken says who has.
+ */
+static int write_control(struct bus *bus, enum al_state state, uint8_t *taken)
+{
+	struct access access[LIMIT_SLAVES];
+	size_t pos[LIMIT_SLAVES];
+	size_t count = 0;
+	uint8_t word[2];
+	int r;
+
+	put_le16(word, (uint16_t)state);
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		if (taken[i]) {
+			continue;
+		}
+		pos[count] = i;
+		access[count++] = (struct access){ .cmd = ECAT_CMD_FPWR,
+						   .adp = bus->slave[i].info.station_addr,
+						   .reg = ESC_REG_AL_CONTROL,
+						   .len = sizeof(word),
+						   .data = word };
+	}
+	r = registers_run(bus, access, count);
+	for (size_t i = 0; i < count && r >= 0; i++) {
+		taken[pos[i]] = access[i].wkc > 0;
+	}
+	return r;
+}
+
+static int read_states(struct bus *bus, struct al_reading *al)
+{
+	struct access access[LIMIT_SLAVES];
+	int r;
+
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		access[i] = (struct access){ .cmd = ECAT_CMD_FPRD,
+					     .adp = bus->slave[i].info.station_addr,
+					     .reg = ESC_REG_AL_STATUS,
+					     .len = AL_BYTES,
+					     .data = al[i].bytes };
+	}
+	r = registers_run(bus, access, bus->slave_count);
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		al[i].wkc = r < 0 ? 0 : access[i].wkc;
+		if (al[i].wkc > 0) {
+			bus->slave[i].al_status = status_of(&al[i]);
+		}
+	}
+	return r;
+}
+
+static int is_in(const struct al_reading *al, enum al_state state)
+{
+	return al->wkc > 0 && (status_of(al) & (AL_STATE_MASK | AL_ERROR)) == (uint16_t)state;
+}
+
+static int has_error(const struct al_reading *al)
+{
+	return al->wkc > 0 && (status_of(al) & AL_ERROR) != 0;
+}
+
+/* The first slave that refuses, else the first that is not there yet. -1: all are in @state. */
+static int find_culprit(const struct bus *bus, const struct al_reading *al, enum al_state state)
+{
+	int behind = -1;
+
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		if (has_error(&al[i])) {
+			return (int)i;
+		}
+		if (behind < 0 && !is_in(&al[i], state)) {
+			behind = (int)i;
+		}
+	}
+	return behind;
+}
+
+static int say_why(struct bus *bus, size_t pos, const struct al_reading *al, enum al_state state)
+{
+	const char *wanted = al_state_to_str((uint16_t)state);
+
+	if (al->wkc == 0) {
+		return bus_fail_slave(bus, pos, -EIO, "does not answer on the way to %s", wanted);
+	}
+	if (has_error(al)) {
+		return bus_fail_slave(bus, pos, -ETIME, "refuses %s and is in %s: AL status code 0x%04x, %s",
+				      wanted, al_state_to_str(status_of(al)), code_of(al),
+				      al_status_code_to_str(code_of(al)));
+	}
+	return bus_fail_slave(bus, pos, -ETIME, "did not reach %s in time and is in %s", wanted,
+			      al_state_to_str(status_of(al)));
+}
+
+static void poll_pause(struct bus *bus)
+{
+	line_sleep(bus->line, (span_t){ POLL_MS * NS_PER_MS });
+}
+
+/* An error of the past must not be taken for a refusal: acknowledge it, in the state it left. */
+static int acknowledge_errors(struct bus *bus, mono_t give_up)
+{
+	struct al_reading al[LIMIT_SLAVES];
+
+	for (;;) {
+		unsigned errors = 0;
+		int r = read_states(bus, al);
+
+		for (size_t i = 0; i < bus->slave_count && r >= 0; i++) {
+			uint8_t word[2];
+
+			if (has_error(&al[i])) {
+				errors++;
+				put_le16(word, (status_of(&al[i]) & AL_STATE_MASK) | AL_ERROR);
+				register_write(bus, i, ESC_REG_AL_CONTROL, word, sizeof(word));
+			}
+		}
+		if (errors == 0 || bus_now(bus).ns >= give_up.ns) {
+			return r;
+		}
+		poll_pause(bus);
+	}
+}
+
+static int wait_for(struct bus *bus, enum al_state state, mono_t give_up)
+{
+	struct al_reading al[LIMIT_SLAVES];
+	uint8_t taken[LIMIT_SLAVES] = { 0 };
+
+	for (;;) {
+		int r = write_control(bus, state, taken);
+		int culprit = -1;
+
+		if (r >= 0) {
+			r = read_states(bus, al);
+		}
+		if (r >= 0) {
+			culprit = find_culprit(bus, al, state);
+			if (culprit < 0) {
+				return 0;
+			}
+			if (has_error(&al[culprit]) && taken[culprit]) {
+				return say_why(bus, (size_t)culprit, &al[culprit], state);
+			}
+		}
+		if (bus_now(bus).ns >= give_up.ns) {
+			return r < 0 ? bus_fail(bus, -EIO, "no frame comes back on the way to %s",
+						al_state_to_str((uint16_t)state)) :
+				       say_why(bus, (size_t)culprit, &al[culprit], state);
+		}
+		poll_pause(bus);
+	}
+}
+
+int bus_request_state(struct bus *bus, enum al_state state, span_t timeout, char *error)
+{
+	mono_t give_up = mono_add(bus_now(bus), timeout);
+
+	bus->error = error;
+	bus->target = state;
+	acknowledge_errors(bus, mono_add(bus_now(bus), (span_t){ ACKNOWLEDGE_NS }));
+	return wait_for(bus, state, give_up);
+}
+
+/* A step down that goes on over errors: the first one is kept. */
+static int step_down(struct bus *bus, enum al_state state, int before, char *error)
+{
+	char later[BUS_ERROR_BYTES];
+	int r = bus_request_state(bus, state, (span_t){ NS_PER_S }, before < 0 ? later : error);
+
+	return before < 0 ? before : r;
+}
+
+int bus_stop(struct bus *bus, char *error)
+{
+	int r = 0;
+
+	if (bus->slave_count == 0) {
+		return 0;
+	}
+	if (bus->target == AL_OP) {
+		r = step_down(bus, AL_SAFEOP, r, error);
+	}
+	if (bus->target == AL_SAFEOP) {
+		r = step_down(bus, AL_PREOP, r, error);
+	}
+	bus_sync0_stop(bus);
+	return step_down(bus, AL_INIT, r, error);
+}

@@ -1,0 +1,196 @@
+/* SPDX-License-Identifier: MIT */
+/* A look at every slave, a few times a second: states, error counters, clock difference. Who needs it is led back. */
+#include <string.h>
+
+#include "base/bytes.h"
+#include "bus/internal.h"
+#include "bus/registers.h"
+
+enum {
+	MISSES_LOST = 2,
+	RECOVERIES_PER_CALL = 8,
+	DIFF_MAGNITUDE = 0x7fffffff,
+	LOOKS = 4, /* registers read of one slave */
+};
+
+struct look {
+	uint8_t al[6];
+	uint8_t rx_errors[2 * ESC_PORTS];
+	uint8_t lost_links[ESC_PORTS];
+	uint8_t diff[4];
+	uint16_t wkc[LOOKS];
+};
+
+enum { LOOK_AL, LOOK_RX_ERRORS, LOOK_LOST_LINKS, LOOK_DIFF };
+
+static int look_at_all(struct bus *bus, struct look *look)
+{
+	struct access access[LIMIT_SLAVES * LOOKS];
+	size_t n = 0;
+	int r;
+
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		const struct {
+			uint16_t reg;
+			uint16_t len;
+			void *data;
+		} part[LOOKS] = {
+			[LOOK_AL] = { ESC_REG_AL_STATUS, sizeof(look->al), look[i].al },
+			[LOOK_RX_ERRORS] = { ESC_REG_RX_ERROR_COUNTER, sizeof(look->rx_errors),
+					     look[i].rx_errors },
+			[LOOK_LOST_LINKS] = { ESC_REG_LOST_LINK_COUNTER, sizeof(look->lost_links),
+					      look[i].lost_links },
+			[LOOK_DIFF] = { ESC_REG_DC_SYSTEM_TIME_DIFF, sizeof(look->diff), look[i].diff },
+		};
+
+		for (int k = 0; k < LOOKS; k++) {
+			access[n++] = (struct access){ .cmd = ECAT_CMD_FPRD,
+						       .adp = bus->slave[i].info.station_addr,
+						       .reg = part[k].reg,
+						       .len = part[k].len,
+						       .data = part[k].data };
+		}
+	}
+	r = registers_run(bus, access, n);
+	for (size_t i = 0; i < n; i++) {
+		look[i / LOOKS].wkc[i % LOOKS] = r < 0 ? 0 : access[i].wkc;
+	}
+	return r;
+}
+
+void bus_emit_event(struct bus *bus, const struct bus_emit *emit, struct event ev)
+{
+	const struct platform *platform = line_platform(bus->line);
+
+	if (emit->call == NULL) {
+		return;
+	}
+	ev.mono_ns = platform->now(platform->ctx).ns;
+	ev.tai_ns = platform->tai_ns(platform->ctx);
+	emit->call(emit->ctx, &ev);
+}
+
+static void note_state(struct bus *bus, size_t pos, const struct look *look, const struct bus_emit *emit)
+{
+	struct bus_slave *sl = &bus->slave[pos];
+	uint16_t status = get_le16(look->al);
+
+	if (status != sl->al_status) {
+		bus_emit_event(bus, emit,
+			       (struct event){ .id = EVENT_SLAVE_STATE,
+					       .slave_pos = (uint16_t)pos,
+					       .arg = { sl->al_status, status },
+					       .value = get_le16(look->al + 4) });
+	}
+	sl->al_status = status;
+}
+
+static void note_presence(struct bus *bus, size_t pos, int is_here, const struct bus_emit *emit)
+{
+	struct bus_slave *sl = &bus->slave[pos];
+
+	if (is_here) {
+		sl->misses = 0;
+		if (sl->is_lost) {
+			sl->is_lost = 0;
+			sl->step = RECOVERY_BACK;
+			bus_emit_event(bus, emit,
+				       (struct event){ .id = EVENT_SLAVE_BACK,
+						       .slave_pos = (uint16_t)pos });
+		}
+		return;
+	}
+	sl->misses++;
+	if (!sl->is_lost && sl->misses >= MISSES_LOST) {
+		sl->is_lost = 1;
+		sl->step = RECOVERY_FIND;
+		bus_emit_event(bus, emit,
+			       (struct event){ .id = EVENT_SLAVE_LOST, .slave_pos = (uint16_t)pos });
+	}
+}
+
+static void show(const struct bus_slave *sl, const struct look *look, struct slave_status *page)
+{
+	atomic_store_explicit(&page->is_lost, (uint32_t)sl->is_lost, memory_order_relaxed);
+	if (look->wkc[LOOK_AL] > 0) {
+		atomic_store_explicit(&page->al_state, get_le16(look->al) & (AL_STATE_MASK | AL_ERROR),
+				      memory_order_relaxed);
+		atomic_store_explicit(&page->al_status_code, get_le16(look->al + 4), memory_order_relaxed);
+	} else if (sl->is_lost) {
+		atomic_store_explicit(&page->al_state, AL_NONE, memory_order_relaxed);
+	}
+	for (unsigned i = 0; i < ESC_PORTS; i++) {
+		if (look->wkc[LOOK_RX_ERRORS] > 0) {
+			atomic_store_explicit(&page->rx_errors[i],
+					      (uint32_t)look->rx_errors[2 * i] + look->rx_errors[2 * i + 1],
+					      memory_order_relaxed);
+		}
+		if (look->wkc[LOOK_LOST_LINKS] > 0) {
+			atomic_store_explicit(&page->lost_links[i], look->lost_links[i],
+					      memory_order_relaxed);
+		}
+	}
+	atomic_store_explicit(&page->dc_diff_ns,
+			      look->wkc[LOOK_DIFF] > 0 ? (int32_t)(get_le32(look->diff) & DIFF_MAGNITUDE) : -1,
+			      memory_order_relaxed);
+}
+
+static int is_in_op(const struct bus_slave *sl)
+{
+	return !sl->is_lost && (sl->al_status & (AL_STATE_MASK | AL_ERROR)) == AL_OP;
+}
+
+static void recover_some(struct bus *bus, const struct bus_emit *emit)
+{
+	unsigned steps = 0;
+
+	if (bus->target != AL_OP) {
+		return;
+	}
+	for (size_t n = 0; n < bus->slave_count && steps < RECOVERIES_PER_CALL; n++) {
+		size_t pos = (bus->next_recovery + n) % bus->slave_count;
+		struct bus_slave *sl = &bus->slave[pos];
+
+		if ((!is_in_op(sl) && sl->misses == 0) || sl->step != RECOVERY_NONE) {
+			bus_recover(bus, pos, emit);
+			steps++;
+		}
+	}
+	bus->next_recovery += steps > 0 ? steps : 1;
+}
+
+int bus_watch(struct bus *bus, struct status_page *page,
+	      void (*emit)(void *ctx, const struct event *ev), void *emit_ctx,
+	      struct bus_watch_report *ret_report)
+{
+	const struct bus_emit out = { .call = emit, .ctx = emit_ctx };
+	struct look look[LIMIT_SLAVES] = { 0 };
+	int64_t time_ns;
+	int r;
+
+	bus->error = NULL;
+	r = look_at_all(bus, look);
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		int is_here = look[i].wkc[LOOK_AL] > 0;
+
+		note_presence(bus, i, is_here, &out);
+		if (is_here) {
+			note_state(bus, i, &look[i], &out);
+		}
+		if (page != NULL) {
+			show(&bus->slave[i], &look[i], &page->slave[i]);
+		}
+	}
+	if (bus->plan.dc_reference != 0 && !bus->slave[bus->reference].is_lost &&
+	    bus->slave[bus->reference].step == RECOVERY_NONE) {
+		bus_reference_time(bus, &time_ns);
+	}
+	recover_some(bus, &out);
+	*ret_report = (struct bus_watch_report){ 0 };
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		ret_report->slaves_op += is_in_op(&bus->slave[i]) ? 1 : 0;
+		ret_report->slaves_lost += bus->slave[i].is_lost ? 1 : 0;
+	}
+	ret_report->is_all_op = ret_report->slaves_op == bus->slave_count;
+	return r < 0 ? r : 0;
+}
