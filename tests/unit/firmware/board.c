@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 #include "board.h"
 
+#include <string.h>
+
 #include "base/bytes.h"
-#include "harness/test.h"
 #include "wire/esc_reg.h"
 
 enum {
