@@ -2,12 +2,15 @@
 /* The last part of bring-up, while the cycle runs: lock, SYNC0, SAFE-OP, OP. */
 #include <errno.h>
 #include <inttypes.h>
+#include <string.h>
 
 #include "daemon/session.h"
 #include "daemon/session_inside.h"
 
 /* In a row with a frame, before OP is asked for (T07). */
 enum { FLOWING_CYCLES = 10 };
+/* So many looks in a row at clocks that agree, before SYNC0 is started (T23). */
+enum { AGREEING_LOOKS = 20 };
 #define LOOK_SPAN ((span_t){ 5 * NS_PER_MS })
 
 static int look_again(struct session *s, mono_t give_up, struct failure *failure)
@@ -60,6 +63,71 @@ static int wait_for_lock(struct session *s, struct failure *failure)
 	return 0;
 }
 
+/* The newest |0x092C| of all slaves as the cycle reads it, an upper estimate; -1: not known. */
+static int64_t newest_diff_ns(struct ring_reader *reader, uint8_t *slot)
+{
+	struct sample_header header;
+
+	if (ring_peek_newest(reader, slot) != RING_OK) {
+		return -1;
+	}
+	memcpy(&header, slot, sizeof(header));
+	return header.dc_diff_ns;
+}
+
+static int wait_for_agreement(struct session *s, struct ring_reader *reader,
+			      struct failure *failure)
+{
+	static uint8_t slot[sizeof(struct sample_header) + LIMIT_IMAGE_BYTES];
+	int64_t limit_ns = s->spec.cfg->dc_diff_limit_ns;
+	mono_t give_up = mono_add(session_now(s), (span_t){ s->spec.cfg->dc_lock_timeout_ns });
+
+	for (int looks = 0; looks < AGREEING_LOOKS;) {
+		int64_t diff_ns = newest_diff_ns(reader, slot);
+		int r;
+
+		looks = diff_ns >= 0 && diff_ns <= limit_ns ? looks + 1 : 0;
+		r = look_again(s, give_up, failure);
+		if (r == -ETIME) {
+			return failure_set(
+				failure, EXIT_CODE_CLOCKS, r,
+				"dc: the slaves' clocks are up to %" PRId64
+				" ns off the reference (0x092C; dc.diff_limit is %" PRId64 " ns)",
+				diff_ns, limit_ns);
+		}
+		if (r < 0) {
+			return r;
+		}
+	}
+	return 0;
+}
+
+/*
+ * From the burst of static drift compensation to one frame a cycle, the slaves' loops have to
+ * settle once more. Only the cycle's own monitor sees that; without it the check before the burst's
+ * end stands.
+ */
+static int wait_for_clocks(struct session *s, struct failure *failure)
+{
+	struct ring_reader *reader = NULL;
+	char path[CONFIG_PATH_BYTES + 16];
+	int r;
+
+	if (!bus_plan(s->bus)->monitor) {
+		return 0;
+	}
+	r = home_path(&s->home, CONFIG_RUN_SAMPLES, path, sizeof(path));
+	if (r == 0) {
+		r = ring_reader_open(path, &reader);
+	}
+	if (r < 0) {
+		return failure_set(failure, EXIT_CODE_RESOURCES, r, "%s: %s", path, strerror(-r));
+	}
+	r = wait_for_agreement(s, reader, failure);
+	ring_reader_destroy(reader);
+	return r;
+}
+
 /* A slave that is asked for OP while frames are missing trips over its watchdog (T07). */
 static int wait_for_flow(struct session *s, struct failure *failure)
 {
@@ -98,6 +166,10 @@ static int start_clocks(struct session *s, struct failure *failure)
 		return 0;
 	}
 	r = wait_for_lock(s, failure);
+	if (r < 0) {
+		return r;
+	}
+	r = wait_for_clocks(s, failure);
 	if (r < 0) {
 		return r;
 	}
