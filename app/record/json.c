@@ -57,10 +57,15 @@ void json_string(FILE *out, const char *text)
 
 int real_format(double value, char *buf, size_t buf_len)
 {
-	int n = snprintf(buf, buf_len, "%.15g", value);
+	int n = 0;
 
-	return strtod(buf, NULL) == value || isnan(value) ? n :
-							    snprintf(buf, buf_len, "%.17g", value);
+	for (int digits = 15; digits <= 17; digits++) {
+		n = snprintf(buf, buf_len, "%.*g", digits, value);
+		if (isnan(value) || strtod(buf, NULL) == value) {
+			break;
+		}
+	}
+	return n;
 }
 
 void json_real(FILE *out, double value)

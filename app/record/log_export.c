@@ -17,6 +17,7 @@ struct export {
 	FILE *out;
 	FILE *err;
 	uint64_t rows;
+	int is_hopeless;       /* the table cannot be made: no more files */
 };
 
 static int is_asked_for(const struct export *ex, uint64_t cycle)
@@ -39,6 +40,7 @@ static int freeze(struct export *ex, struct columns *c, const char *path)
 	char why[320];
 	int r = columns_freeze(c, missing, sizeof(missing));
 
+	ex->is_hopeless = r < 0;
 	if (r == -ENOENT) {
 		snprintf(why, sizeof(why), "has no channel %s", missing);
 		return log_fail(ex->err, path, why);
@@ -52,6 +54,7 @@ static int freeze(struct export *ex, struct columns *c, const char *path)
 			columns_put_header(c, ex->out);
 		}
 	} else if (!columns_are_equal(ex->first, c)) {
+		ex->is_hopeless = 1;
 		return log_fail(ex->err, path,
 				"has other channels than the files before: export it by itself");
 	}
@@ -145,7 +148,7 @@ static int export_directory(struct export *ex, const char *dir)
 	if (r < 0) {
 		return log_fail_errno(ex->err, dir, r);
 	}
-	for (size_t i = 0; i < count; i++) {
+	for (size_t i = 0; i < count && !ex->is_hopeless; i++) {
 		char path[PATH_MAX];
 		int one = store_path(dir, entries[i].name, path, sizeof(path)) < 0 ?
 				  LOG_FAILED :
@@ -162,7 +165,7 @@ int log_export(const struct log_export_options *options, FILE *out, FILE *err)
 	struct export ex = { .options = options, .out = out, .err = err };
 	int result = LOG_OK;
 
-	for (size_t i = 0; i < options->path_count; i++) {
+	for (size_t i = 0; i < options->path_count && !ex.is_hopeless; i++) {
 		const char *path = options->paths[i];
 		struct stat st;
 		int one = stat(path, &st) < 0 ? log_fail_errno(err, path, -errno) :

@@ -257,6 +257,7 @@ int log_info(const char *path, enum log_format format, FILE *out, FILE *err)
 {
 	struct info in = { .format = format, .out = out, .comma = "" };
 	const struct mcap_visitor visitor = { .item = visit, .ctx = &in };
+	struct mcap_reader *reader;
 	struct mcap_scan *scan;
 	struct log_file file;
 	int r = log_file_open(path, &file);
@@ -264,6 +265,12 @@ int log_info(const char *path, enum log_format format, FILE *out, FILE *err)
 	if (r < 0) {
 		return log_fail_errno(err, path, r);
 	}
+	r = mcap_reader_create(&file.source, &reader);
+	if (r < 0) { /* nothing is printed of what is no recording */
+		log_file_close(&file);
+		return log_fail_errno(err, path, r);
+	}
+	mcap_reader_destroy(reader);
 	track_init(&in.track);
 	if (format == LOG_JSON) {
 		fprintf(out, "{\"file\":");

@@ -41,7 +41,7 @@ static void put_result(FILE *out, const char *path, const struct recover_outcome
 	}
 	fprintf(out, "%s: %s: %" PRIu64 " chunks, %" PRIu64 " messages, %" PRIu64 " cycles", path,
 		result_to_str(o->result), o->found.chunks, o->found.messages, o->track.cycles);
-	if (o->track.cycles > 0) {
+	if (o->track.cycles > 0 && o->result != RECOVER_WAS_WHOLE) {
 		fprintf(out, ", lost after cycle %" PRIu64, o->track.last_cycle);
 	}
 	fprintf(out, ", %" PRIu64 " bytes given up\n", o->found.lost_bytes);
