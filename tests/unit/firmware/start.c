@@ -8,6 +8,7 @@
 #include "harness/test.h"
 #include "wire/al.h"
 #include "wire/esc_reg.h"
+#include "wire/sii.h"
 
 TEST(firmware, nothing_touches_the_bus_before_eeprom_loaded)
 {
@@ -163,4 +164,47 @@ TEST(firmware, sii_checksum_is_that_of_real_terminals)
 
 	CHECK_EQ(fb1111_piccolo_sii_checksum(el4002, sizeof(el4002)), 0xa4);
 	CHECK_EQ(fb1111_piccolo_sii_checksum(evb9252, sizeof(evb9252)), 0xc6);
+}
+
+static void check_entries(const struct sii *sii, const struct sii_pdo *got,
+			  const struct piccolo_pdo *wanted)
+{
+	CHECK_EQ(got->index, wanted->index);
+	CHECK_EQ(got->sm, wanted->sm);
+	CHECK_EQ(got->entry_count, wanted->entry_count);
+	for (unsigned i = 0; i < got->entry_count; i++) {
+		const struct sii_entry *e = &sii->entry[got->first_entry + i];
+
+		CHECK_EQ(e->index, wanted->entries[i].index);
+		CHECK_EQ(e->subindex, wanted->entries[i].subindex);
+		CHECK_EQ(e->bit_len, wanted->entries[i].bits);
+	}
+}
+
+TEST(firmware, sii_is_what_the_master_reads_out_of_it)
+{
+	const struct piccolo_description *d = &piccolo_description;
+	static struct sii sii;
+	uint8_t image[PICCOLO_EEPROM_OCTETS];
+	char error[128];
+	char text[SII_NAME_BYTES];
+
+	CHECK_EQ(fb1111_piccolo_sii(image, sizeof(image)), sizeof(image));
+	CHECK_EQ(sii_parse(image, sizeof(image), &sii, error, sizeof(error)), 0);
+	CHECK_EQ(sii_checksum(image), image[14]);
+	CHECK_EQ(sii.vendor, PICCOLO_VENDOR_ID);
+	CHECK_EQ(sii.product, PICCOLO_PRODUCT_CODE);
+	CHECK_EQ(sii.revision, PICCOLO_REVISION);
+	CHECK_EQ(sii.size_bytes, sizeof(image));
+	CHECK_EQ(sii.mailbox_out_start, d->sm[PICCOLO_SM_MAILBOX_OUT].start);
+	CHECK_EQ(sii.mailbox_in_len, d->sm[PICCOLO_SM_MAILBOX_IN].length);
+	CHECK_EQ(sii.mailbox_protocols, SII_MAILBOX_COE);
+	CHECK_EQ(sii.sm_count, PICCOLO_SM_COUNT);
+	CHECK_EQ(sii.sm[PICCOLO_SM_OUTPUTS].control, 0x64);
+	CHECK_EQ(sii.dc_assign_activate, 0x0300);
+	CHECK_EQ(sii.pdo_count, 2);
+	check_entries(&sii, &sii.pdo[sii.pdo[0].is_tx ? 0 : 1], &d->tx);
+	check_entries(&sii, &sii.pdo[sii.pdo[0].is_tx ? 1 : 0], &d->rx);
+	sii_string(image, sizeof(image), sii.device_name, text);
+	CHECK_STR(text, d->name);
 }
