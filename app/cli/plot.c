@@ -152,7 +152,8 @@ static struct span span_of(const struct plot *plot, unsigned panel)
 /* Dot row of @value, 0 on top. */
 static int row_of(double value, const struct span *axis, int height)
 {
-	double share = (axis->max - value) / (axis->max - axis->min);
+	/* Halves: the span of the largest numbers is more than a double holds. */
+	double share = (axis->max / 2 - value / 2) / (axis->max / 2 - axis->min / 2);
 	int row = (int)lround(share * (height - 1));
 
 	return row < 0 ? 0 : row >= height ? height - 1 : row;

@@ -5,8 +5,14 @@
 # The include paths of the headers are those of the source tree: "base/ring.h", "image/image.h".
 add_library(ecdaq_client STATIC $<TARGET_OBJECTS:ecdaq_base> $<TARGET_OBJECTS:ecdaq_image>)
 set_target_properties(ecdaq_client PROPERTIES OUTPUT_NAME ecdaq LINKER_LANGUAGE C)
-install(TARGETS ecdaq_client ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
-install(FILES base/event.h base/ring.h base/sample.h base/timemap.h
+add_library(ecdaq_client_shared SHARED $<TARGET_OBJECTS:ecdaq_base> $<TARGET_OBJECTS:ecdaq_image>)
+set_target_properties(ecdaq_client_shared PROPERTIES OUTPUT_NAME ecdaq LINKER_LANGUAGE C
+	VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR})
+target_link_libraries(ecdaq_client_shared PRIVATE m)
+install(TARGETS ecdaq_client ecdaq_client_shared
+	ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(FILES base/board.h base/clock.h base/event.h base/histogram.h base/limits.h base/ring.h
+	base/sample.h base/status.h base/timemap.h
 	DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq/base)
 install(FILES image/image.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq/image)
 

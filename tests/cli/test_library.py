@@ -66,7 +66,9 @@ def compile_against_library(source: Path, program: Path, *flags: str) -> None:
         ["pkg-config", "--cflags", "--libs", str(pc)], check=True, capture_output=True, text=True
     ).stdout.split()
     cc = ["gcc", "-std=c11", "-Wall", "-Wextra", "-Werror", *SANITIZE, *flags]
-    subprocess.run([*cc, str(source), "-o", str(program), *found], check=True)
+    # Where it stands, the library is on no search path; installed to /usr it is.
+    rpath = f"-Wl,-rpath,{pc.parents[1]}"
+    subprocess.run([*cc, str(source), "-o", str(program), *found, rpath], check=True)
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: MIT
+from __future__ import annotations
+
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from ecdaq import Fake
+
+
+@pytest.fixture
+def run_dir() -> Iterator[Path]:
+    """A run directory that others may enter, on a tmpfs, with a short path (it holds a socket)."""
+    path = Path(tempfile.mkdtemp(prefix="ecdaq-cli-", dir="/dev/shm"))
+    path.chmod(0o755)
+    yield path
+    shutil.rmtree(path)
+
+
+@pytest.fixture
+def fake(run_dir: Path) -> Iterator[Callable[..., Fake]]:
+    """Starts a fake ecdaqd with the settings given."""
+    started: list[Fake] = []
+
+    def start(*settings: str) -> Fake:
+        started.append(Fake(run_dir, *settings))
+        return started[-1]
+
+    yield start
+    for one in started:
+        one.close()
+
+
+@pytest.fixture
+def daemon(fake: Callable[..., Fake]) -> Fake:
+    """A fake ecdaqd, ten times as fast as a real one."""
+    return fake("SPEED=10")

@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: MIT
+"""What ecdaq asks of ecdaqd by the admin socket."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from ecdaq import FAILED, NO_DAEMON, OK, REFUSED, USAGE, Fake, fails, json_of, works
+
+
+def value_of(daemon: Fake, channel: str) -> int | float:
+    sample = json_of(daemon("watch", channel, "--count", "1", "--json", "--raw"))
+    return sample["values"][channel]
+
+
+def test_set_says_in_which_cycle_it_took_effect(daemon: Fake) -> None:
+    before = json_of(daemon("status", "--json"))["cycle_number"]
+    answer = json_of(daemon("set", "piccolo0.led=on", "--json"))
+    assert answer["cycle"] > before
+    assert answer["raw"] == {"piccolo0.led": 1}
+    assert value_of(daemon, "piccolo0.led") == 1
+    text = works(daemon("set", "piccolo0.led=off"))
+    assert text.startswith("piccolo0.led = 0 from cycle ")
+    assert value_of(daemon, "piccolo0.led") == 0
+
+
+def test_set_takes_several_outputs_at_once_and_64_bits_exactly(daemon: Fake) -> None:
+    big = 2**63 + 1
+    answer = json_of(daemon("set", "piccolo0.led=1", f"piccolo1.oneshot_time={big}", "--json"))
+    assert answer["raw"] == {"piccolo0.led": 1, "piccolo1.oneshot_time": big}
+    assert value_of(daemon, "piccolo1.oneshot_time") == big
+
+
+@pytest.mark.parametrize(
+    ("word", "code", "said"),
+    [
+        ("piccolo0.led", USAGE, "piccolo0.led: wants OUTPUT=VALUE"),
+        ("=1", USAGE, "=1: wants OUTPUT=VALUE"),
+        ("piccolo0.led=", USAGE, "wants OUTPUT=VALUE"),
+        ("piccolo0.lde=1", FAILED, "piccolo0.lde: no such channel; did you mean piccolo0.led?"),
+        ("piccolo0.adc=1", FAILED, "piccolo0.adc: is an input"),
+        ("piccolo0.led=2", FAILED, "piccolo0.led: 2 is no value of type BOOL"),
+        ("piccolo0.led=maybe", FAILED, "maybe is no value of type BOOL"),
+        ("piccolo0.oneshot_time=-1", FAILED, "-1 does not fit into UINT64"),
+        ("piccolo0.oneshot_time=1.5", FAILED, "1.5 is no value of type UINT64"),
+        ("piccolo1.led=1", REFUSED, "refused: piccolo1.led: owned by program"),
+    ],
+)
+def test_set_refuses_with_a_reason(daemon: Fake, word: str, code: int, said: str) -> None:
+    fails(daemon("set", word), code, said)
+
+
+def test_a_wrong_word_keeps_all_others_from_being_set(daemon: Fake) -> None:
+    fails(daemon("set", "piccolo0.led=1", "piccolo0.lde=1"), FAILED)
+    assert value_of(daemon, "piccolo0.led") == 0
+
+
+def test_oneshot_arms_all_slaves_for_the_same_instant(daemon: Fake) -> None:
+    answer = json_of(daemon("oneshot", "all", "--in", "500ms", "--wait", "--json"))
+    assert [s["name"] for s in answer["slave"]] == ["piccolo0", "piccolo1"]
+    for slave in answer["slave"]:
+        assert slave["converted"] is True
+        assert slave["sample_time"] == answer["dc_time_ns"]
+    assert answer["slave"][1]["adc"] == 2001
+
+
+def test_oneshot_waits_for_the_value(daemon: Fake) -> None:
+    text = works(daemon("oneshot", "piccolo1", "--in", "300ms", "--wait"))
+    assert text.startswith("piccolo1: adc 2001, sampled at DC ") and "(+0 ns)" in text
+
+
+def test_oneshot_takes_an_absolute_time(daemon: Fake) -> None:
+    now = json_of(daemon("status", "--json"))["dc_time_ns"]
+    at = now + 60 * 10**9
+    text = works(daemon("oneshot", "0", "--at", str(at)))
+    assert text.startswith(f"piccolo0: armed for DC {at} from cycle ")
+
+
+def test_oneshot_in_the_past_is_refused(daemon: Fake) -> None:
+    fails(daemon("oneshot", "0", "--at", "5"), REFUSED, "refused: the time is in the past")
+
+
+def test_oneshot_needs_a_slave_that_is_there(daemon: Fake) -> None:
+    fails(daemon("oneshot", "piccolo7", "--in", "1s"), FAILED, "piccolo7: no slave of this name")
+    fails(daemon("oneshot", "2", "--in", "1s"), FAILED, "2: no slave at this position")
+
+
+def test_oneshot_does_not_wait_for_a_bus_that_was_stopped(daemon: Fake) -> None:
+    process = daemon.start("oneshot", "all", "--in", "1000s", "--wait", stdout=-1, stderr=-1)
+    events = works(daemon("events", "--count", "1"))
+    assert events
+    daemon.end()
+    _, said = process.communicate(timeout=60)
+    assert process.returncode in (FAILED, NO_DAEMON)
+    assert said.startswith("ecdaq: oneshot: ") and said.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "wanted"),
+    [
+        (["0", "0x1018:1"], "0x00000002 2\n"),
+        (["piccolo1", "0x1018:01", "--type", "UDINT"], "2\n"),
+        (["piccolo1", "4120:1", "--type", "dint"], "2\n"),
+        (["0", "0x1008", "--type", "STRING"], "FB1111-Piccolo\n"),
+        (["0", "0x1008"], "46 42 31 31 31 31 2d 50 69 63 63 6f 6c 6f\n"),
+    ],
+)
+def test_sdo_read_shows_an_object(daemon: Fake, words: list[str], wanted: str) -> None:
+    assert works(daemon("sdo", "read", *words)) == wanted
+
+
+def test_sdo_read_as_json(daemon: Fake) -> None:
+    answer = json_of(daemon("sdo", "read", "1", "0x1018:1", "--json"))
+    assert answer == {
+        "slave": 1,
+        "index": 0x1018,
+        "subindex": 1,
+        "bytes": "02 00 00 00",
+        "value": 2,
+    }
+    text = json_of(daemon("sdo", "read", "1", "0x1008", "--type", "STRING", "--json"))
+    assert text["value"] == "FB1111-Piccolo"
+
+
+def test_sdo_write_is_read_back(daemon: Fake) -> None:
+    assert works(daemon("sdo", "write", "0", "0x8000:2", "250", "--type", "UINT")) == ""
+    assert works(daemon("sdo", "read", "0", "0x8000:2", "--type", "UINT")) == "250\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (["read", "0", "0x1234"], REFUSED, "0x1234:00: SDO abort 0x06020000: object"),
+        (["write", "0", "0x8000:1", "1", "-t", "USINT"], REFUSED, "0x08000022: data cannot be"),
+        (["write", "0", "0x8000:2", "1"], USAGE, "--type: writing wants one of BOOL|SINT"),
+        (["write", "0", "0x8000:2", "65536", "-t", "UINT"], USAGE, "65536: does not fit into UINT"),
+        (["write", "0", "0x8000:2", "x", "-t", "UINT"], USAGE, "x: is no UINT"),
+        (["write", "0", "0x8000:2", "-1", "-t", "UINT"], USAGE, "-1: does not fit into UINT"),
+        (["read", "0", "0x1018:1", "-t", "UINT"], FAILED, "the object has 4 bytes, UINT has 2"),
+        (["read", "9", "0x1018:1"], FAILED, "9: no slave at this position, there are 2"),
+    ],
+)
+def test_sdo_says_why_not(daemon: Fake, words: list[str], code: int, said: str) -> None:
+    fails(daemon("sdo", *words), code, said)
+
+
+def test_clear_sets_counters_to_zero(daemon: Fake) -> None:
+    assert json_of(daemon("histogram", "wake", "--json"))["count"] >= 2000
+    works(daemon("clear"))
+    assert json_of(daemon("histogram", "wake", "--json"))["count"] < 2000
+
+
+def test_stop_waits_until_ecdaqd_is_gone(daemon: Fake) -> None:
+    # Its parent, this test, has to take note of its end before it is gone altogether.
+    process = daemon.start("stop", "--wait", "20s", stderr=-1)
+    assert daemon.process.wait(20) == 0
+    _, said = process.communicate(timeout=60)
+    assert (process.returncode, said) == (OK, "")
+    fails(daemon("stop"), NO_DAEMON, "nobody listens: is ecdaqd running?")
+
+
+def test_an_ecdaqd_that_hangs_up_is_named(fake: Callable[..., Fake]) -> None:
+    fails(fake("ADMIN=mute")("clear"), NO_DAEMON, "ecdaqd: hung up without an answer")
+
+
+def test_an_answer_of_another_version_is_refused(fake: Callable[..., Fake]) -> None:
+    fails(fake("ADMIN=garbage")("clear"), FAILED, "its answer is of another version")
+
+
+def test_a_socket_that_nobody_serves_is_named(fake: Callable[..., Fake], run_dir: Path) -> None:
+    daemon = fake("ADMIN=none")
+    fails(daemon("clear"), NO_DAEMON, "nobody listens")
+    (run_dir / "admin").write_text("")
+    fails(daemon("clear"), NO_DAEMON, "nobody listens")

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: MIT
+"""The live screens of ecdaq on a terminal of their own."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import pty
+import re
+import select
+import signal
+import struct
+import subprocess
+import termios
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from ecdaq import ECDAQ, NO_DAEMON, OK, Fake, environment
+
+ENTER, LEAVE = "\x1b[?1049h", "\x1b[?1049l"
+
+
+class Terminal:
+    """A pseudo terminal with a program on it."""
+
+    def __init__(self, rows: int, columns: int) -> None:
+        self.master, self.slave = pty.openpty()
+        fcntl.ioctl(self.slave, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
+        self.before = termios.tcgetattr(self.slave)
+        self.text = ""
+        self.process: subprocess.Popen[bytes] | None = None
+
+    def start(self, daemon: Fake, *words: str) -> None:
+        self.process = subprocess.Popen(
+            [ECDAQ, *words],
+            env=environment(daemon.run_dir, LANG="C.UTF-8"),
+            stdin=self.slave,
+            stdout=self.slave,
+            stderr=subprocess.PIPE,
+        )
+
+    def read_some(self) -> bool:
+        if not select.select([self.master], [], [], 0.05)[0]:
+            return False
+        self.text += os.read(self.master, 65536).decode(errors="replace")
+        return True
+
+    def wait_for(self, pattern: str) -> None:
+        deadline = time.monotonic() + 20
+        while not re.search(pattern, self.text):
+            assert time.monotonic() < deadline, self.text[-2000:]
+            self.read_some()
+
+    def press(self, keys: str) -> None:
+        os.write(self.master, keys.encode())
+
+    def end(self) -> tuple[int, str]:
+        """Wait for the program's end: its exit code and standard error."""
+        assert self.process is not None and self.process.stderr is not None
+        deadline = time.monotonic() + 20
+        while self.process.poll() is None:
+            assert time.monotonic() < deadline
+            self.read_some()
+        while self.read_some():
+            pass
+        return self.process.returncode, self.process.stderr.read().decode()
+
+    def is_restored(self) -> bool:
+        left = self.text.rfind(LEAVE) > self.text.rfind(ENTER) >= 0
+        return left and termios.tcgetattr(self.slave) == self.before
+
+    def close(self) -> None:
+        if self.process is not None:
+            self.process.kill()
+            self.process.wait(20)
+            if self.process.stderr is not None:
+                self.process.stderr.close()
+        os.close(self.master)
+        os.close(self.slave)
+
+
+@pytest.fixture
+def terminal() -> Iterator[Terminal]:
+    one = Terminal(24, 90)
+    yield one
+    one.close()
+
+
+def screens(text: str) -> list[list[str]]:
+    """What was drawn, frame by frame, without the sequences."""
+    frames = text.split("\x1b[H")[1:]
+    plain = [re.sub(r"\x1b\[[0-9;?]*[A-Za-z]|\r", "", frame) for frame in frames]
+    return [frame.split("\n") for frame in plain]
+
+
+def test_top_draws_again_and_again_and_leaves_with_q(daemon: Fake, terminal: Terminal) -> None:
+    terminal.start(daemon, "top", "--interval", "20ms")
+    terminal.wait_for(r"(?s)(\x1b\[H.*){4}")
+    terminal.press("q")
+    assert terminal.end() == (OK, "")
+    assert terminal.is_restored()
+    cycles = [re.search(r"cycle +(\d+)", "\n".join(s)) for s in screens(terminal.text)[:4]]
+    seen = [int(c.group(1)) for c in cycles if c]
+    assert len(seen) == 4 and seen[0] < seen[3]
+    for screen in screens(terminal.text)[:4]:
+        assert len(screen) <= 24 and all(len(line) <= 90 for line in screen)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_leaves_the_terminal_as_it_was(
+    daemon: Fake, terminal: Terminal, number: signal.Signals
+) -> None:
+    terminal.start(daemon, "top")
+    terminal.wait_for("piccolo1")
+    assert terminal.process is not None
+    terminal.process.send_signal(number)
+    assert terminal.end() == (OK, "")
+    assert terminal.is_restored()
+
+
+def test_top_ends_with_ecdaqd_and_leaves_the_last_state(daemon: Fake, terminal: Terminal) -> None:
+    terminal.start(daemon, "top", "--interval", "20ms")
+    terminal.wait_for("piccolo1")
+    daemon.end()
+    assert terminal.end() == (OK, "")
+    assert terminal.is_restored()
+    assert "STOPPED" in terminal.text[terminal.text.rfind(LEAVE) :]
+
+
+def test_a_live_plot_starts_full_and_scrolls(daemon: Fake, terminal: Terminal) -> None:
+    terminal.start(daemon, "watch", "piccolo1.adc", "--plot", "--window", "1s")
+    terminal.wait_for(r"(?s)(\x1b\[H.*){4}")
+    terminal.press("q")
+    assert terminal.end() == (OK, "")
+    assert terminal.is_restored()
+    frames = screens(terminal.text[: terminal.text.rfind(LEAVE)])
+    # A second of samples was in the ring: a whole period of the sine is seen at once.
+    assert re.match(r"piccolo1\.adc   now \d+   min 62\d   max 186\d$", frames[1][0])
+    assert any("\u2801" <= c <= "\u28ff" for line in frames[1] for c in line)
+    assert any(frame[1:20] != frames[1][1:20] for frame in frames[2:]), "it scrolls"
+    assert all(len(frame) <= 24 for frame in frames)
+
+
+def test_a_small_terminal_is_no_trouble(daemon: Fake, terminal: Terminal) -> None:
+    fcntl.ioctl(terminal.slave, termios.TIOCSWINSZ, struct.pack("HHHH", 3, 10, 0, 0))
+    terminal.start(daemon, "watch", "piccolo*", "--plot")
+    terminal.wait_for(r"(?s)(\x1b\[H.*){2}")
+    terminal.press("q")
+    assert terminal.end() == (OK, "")
+    for frame in screens(terminal.text)[:1]:
+        assert len(frame) <= 3 and all(len(line) <= 10 for line in frame)
+
+
+def test_without_ecdaqd_the_terminal_is_not_taken(daemon: Fake, terminal: Terminal) -> None:
+    daemon.end()
+    (daemon.run_dir / "status").unlink()
+    terminal.start(daemon, "top", "--wait", "50ms")
+    code, said = terminal.end()
+    assert code == NO_DAEMON and said.startswith("ecdaq: top: ")
+    assert ENTER not in terminal.text

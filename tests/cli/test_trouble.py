@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: MIT
+"""ecdaq before files that it may not read, or that are not what they should be."""
+
+from __future__ import annotations
+
+import os
+import random
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from ecdaq import ECDAQ, FAILED, NOBODY, PERMISSION, Fake, ecdaq, fails, json_of, works
+
+READING = [
+    ["status"],
+    ["slaves"],
+    ["channels"],
+    ["watch", "piccolo0.adc", "--count", "1"],
+    ["events"],
+]
+
+
+def can_become_nobody() -> bool:
+    if os.geteuid() != 0 or not ECDAQ.exists():
+        return False
+    tried = subprocess.run(
+        [ECDAQ, "version"], user=NOBODY, group=NOBODY, capture_output=True, check=False
+    )
+    return tried.returncode == 0
+
+
+needs_nobody = pytest.mark.skipif(
+    not can_become_nobody(),
+    reason="needs root, and a build directory that others may enter",
+)
+
+
+@needs_nobody
+@pytest.mark.parametrize("words", READING, ids=" ".join)
+def test_what_may_not_be_read_is_named(daemon: Fake, words: list[str]) -> None:
+    said = "be root or in its group"
+    fails(daemon(*words, user=NOBODY), PERMISSION, "no permission to read", said)
+
+
+@needs_nobody
+@pytest.mark.parametrize(
+    "words", [["set", "piccolo0.led=1"], ["clear"], ["stop"], ["oneshot", "all", "--in", "1s"]]
+)
+def test_commands_need_the_group_of_the_socket(daemon: Fake, words: list[str]) -> None:
+    # Everyone may read here, so that it is the socket that says no.
+    for name in ("status", "samples", "events"):
+        (daemon.run_dir / name).chmod(0o644)
+    fails(daemon(*words, user=NOBODY), PERMISSION, "admin socket: no permission on")
+
+
+@pytest.mark.parametrize("name", ["status", "samples", "events"])
+@pytest.mark.parametrize("content", ["", "x", "random", "short"])
+def test_a_damaged_file_is_refused(daemon: Fake, name: str, content: str) -> None:
+    path = daemon.run_dir / name
+    whole = path.read_bytes()
+    daemon.kill()
+    path.unlink()
+    path.write_bytes(
+        {
+            "": b"",
+            "x": b"x",
+            "random": random.Random(1).randbytes(len(whole)),
+            "short": whole[: len(whole) // 2],
+        }[content]
+    )
+    words = {"status": ["status"], "samples": ["channels"], "events": ["events"]}[name]
+    fails(daemon(*words), FAILED, f"{path} is of another version of ecdaq, or damaged")
+
+
+def test_a_ring_whose_description_lies_never_crashes_the_reader(daemon: Fake) -> None:
+    """Every byte of the header's and the meta area's first part, turned over one by one."""
+    path = daemon.run_dir / "samples"
+    daemon.end()
+    whole = bytearray(path.read_bytes())
+    dice = random.Random(2)
+    places = [*range(0, 128, 3), *range(4096, 4096 + 40), *dice.sample(range(4136, 5800), 80)]
+    for place in places:
+        changed = bytearray(whole[: 1 << 16])
+        changed[place] ^= 0xFF
+        with path.open("r+b") as file:
+            file.write(changed)
+        result = daemon("channels", "--json")
+        assert result.returncode in (0, FAILED), (place, result.stderr)
+        if result.returncode == 0:
+            json_of(result)
+
+
+def test_a_status_page_that_claims_too_many_slaves_is_bounded(fake: Callable[..., Fake]) -> None:
+    daemon = fake("SLAVES=4000000000")
+    assert len(json_of(daemon("slaves", "--json"))) == 64
+    assert len(works(daemon("status")).splitlines()) > 64
+
+
+def test_an_event_of_an_unknown_kind_is_shown_as_such(daemon: Fake) -> None:
+    path = daemon.run_dir / "events"
+    daemon.end()
+    whole = bytearray(path.read_bytes())
+    # The first slot's event: its number stands 40 bytes behind the slot's sequence.
+    slot = 4096
+    whole[slot + 8 + 40 : slot + 8 + 42] = b"\xff\x7f"
+    path.write_bytes(whole)
+    first = works(daemon("events", "--json")).splitlines()[0]
+    assert '"event":"unknown"' in first and '"severity":"error"' in first
+    assert "event 32767" in works(daemon("events"))
+
+
+def test_a_run_directory_with_too_long_a_path_is_refused() -> None:
+    fails(ecdaq(Path("/" + "x" * 300), "status"), 2, "the path is too long")
+    fails(ecdaq(None, "--run-dir", "/" + "y" * 300, "status"), 2, "--run-dir: the path is too long")
+
+
+def test_a_path_too_long_for_a_socket_is_said(daemon: Fake, tmp_path: Path) -> None:
+    deep = tmp_path / ("z" * 120)
+    deep.mkdir()
+    fails(ecdaq(deep, "clear"), FAILED, "File name too long")

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: MIT
+"""The command line of ecdaq: help, versions, mistakes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from ecdaq import NO_DAEMON, OK, ROOT, USAGE, Fake, ecdaq, fails, works
+
+VERBS = {
+    "status": "",
+    "top": "",
+    "slaves": "",
+    "channels": "",
+    "watch": "CHANNEL...",
+    "set": "OUTPUT=VALUE...",
+    "oneshot": "SLAVE|all",
+    "sdo": "read|write",
+    "events": "",
+    "histogram": "wake|",
+    "clear": "",
+    "stop": "",
+    "version": "",
+}
+READING = [
+    ["status"],
+    ["status", "--summary"],
+    ["slaves"],
+    ["channels"],
+    ["watch", "piccolo0.adc", "--count", "1"],
+    ["histogram", "wake"],
+    ["sdo", "read", "0", "0x1018:1"],
+]
+
+
+def test_help_names_every_verb_and_the_exit_codes() -> None:
+    text = works(ecdaq(None, "--help"))
+    for verb in [*VERBS, "log"]:
+        assert f"\n  {verb} " in text
+    assert "exit codes: 0 ok, 1 failed, 2 command line, 3 no ecdaqd" in text
+    assert max(len(line) for line in text.splitlines()) <= 100
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_has_help(verb: str) -> None:
+    text = works(ecdaq(None, verb, "--help"))
+    assert text.startswith(f"usage: ecdaq {verb}")
+    assert VERBS[verb] in text.splitlines()[0]
+
+
+def test_the_manual_names_every_verb_and_every_option() -> None:
+    manual = (ROOT / "app/doc/cli.md").read_text()
+    for verb in VERBS:
+        assert f"`ecdaq {verb}" in manual, verb
+        for word in works(ecdaq(None, verb, "--help")).split():
+            if word.startswith("--"):
+                assert f"`{word.rstrip(',')}" in manual, (verb, word)
+
+
+def test_versions_agree() -> None:
+    version = works(ecdaq(None, "--version"))
+    assert version.startswith("ecdaq ") and version.count("\n") == 1
+    assert works(ecdaq(None, "version")) == version
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "wants a verb"),
+        (["frob"], "frob: no such verb"),
+        (["--frob"], "--frob: unknown option"),
+        (["--run-dir"], "--run-dir: wants a value"),
+        (["status", "--frob"], "status: --frob: unknown option"),
+        (["status", "word"], "status: word: one word too many"),
+        (["status", "--json=1"], "--json: takes no value"),
+        (["watch"], "watch: wants CHANNEL..."),
+        (["watch", "a", "--count", "0"], '--count: "0" is no count above 0'),
+        (["watch", "a", "--rate", "-1"], '--rate: "-1" is no number above 0'),
+        (["watch", "a", "--window", "1furlong"], '--window: unknown unit "furlong"'),
+        (["watch", "a", "--plot", "--json"], "--plot and --json: one or the other"),
+        (["watch", "a", "--rate", "2", "--every", "2"], "--rate and --every"),
+        (["set"], "set: wants OUTPUT=VALUE..."),
+        (["oneshot", "all"], "oneshot: wants --at or --in"),
+        (["oneshot", "all", "--at", "1", "--in", "1s"], "oneshot: wants --at or --in"),
+        (["oneshot", "--in", "1s"], "oneshot: wants SLAVE|all"),
+        (["sdo", "peek", "0", "0x1018"], "peek: wants read or write"),
+        (["sdo", "read", "0", "0x1018:1", "5"], "read: wants SLAVE INDEX:SUB"),
+        (["sdo", "write", "0", "0x1018:1"], "write: wants SLAVE INDEX:SUB VALUE"),
+        (["sdo", "read", "0", "0x1018:1:2"], "wants INDEX:SUB such as"),
+        (["sdo", "read", "0", "0x10180"], "wants INDEX:SUB such as"),
+        (["sdo", "read", "0", "0x1018:256"], "wants INDEX:SUB such as"),
+        (["sdo", "read", "0", "0x1018", "--type", "U8"], "--type: U8: is none of BOOL|SINT"),
+        (["events", "--level", "loud"], "--level: loud: is none of info"),
+        (["line\nbreak"], "line?break: no such verb"),
+    ],
+)
+def test_a_mistake_is_one_line_and_exit_code_2(words: list[str], said: str) -> None:
+    fails(ecdaq(Path("/nonexistent"), *words), USAGE, said)
+
+
+def test_the_wrong_histogram_is_named(daemon: Fake) -> None:
+    fails(daemon("histogram", "sleep"), USAGE, "sleep: is none of wake, round-trip, phase, work")
+
+
+@pytest.mark.parametrize("words", READING, ids=" ".join)
+def test_without_ecdaqd_a_reading_verb_says_so(run_dir: Path, words: list[str]) -> None:
+    fails(ecdaq(run_dir, *words), NO_DAEMON, str(run_dir), "is ecdaqd running?")
+
+
+@pytest.mark.parametrize("words", [["clear"], ["stop"]], ids=" ".join)
+def test_without_ecdaqd_a_command_says_so(run_dir: Path, words: list[str]) -> None:
+    fails(ecdaq(run_dir, *words), NO_DAEMON, "admin", "is ecdaqd running?")
+
+
+def test_top_can_wait_for_ecdaqd(run_dir: Path) -> None:
+    fails(ecdaq(run_dir, "top", "--wait", "100ms"), NO_DAEMON, "is ecdaqd running?")
+
+
+def test_the_run_directory_comes_from_option_configuration_and_environment(
+    daemon: Fake, tmp_path: Path
+) -> None:
+    nowhere = Path("/nonexistent")
+    config = tmp_path / "ecdaq.yaml"
+    config.write_text(f"runtime:\n  run_dir: {daemon.run_dir}\n")
+    where = str(daemon.run_dir)
+    for words in (
+        ["--run-dir", where, "slaves"],
+        [f"--run-dir={where}", "slaves"],
+        ["slaves", "--run-dir", where],
+        ["--config", str(config), "slaves"],
+        ["--config", "/dev/null", "--run-dir", where, "slaves"],
+    ):
+        assert "piccolo1" in works(ecdaq(nowhere, *words))
+    assert ecdaq(nowhere, "slaves").returncode == NO_DAEMON
+
+
+def test_a_broken_configuration_is_named_with_its_line(tmp_path: Path) -> None:
+    config = tmp_path / "ecdaq.yaml"
+    config.write_text("runtime:\n  rundir: /x\n")
+    fails(
+        ecdaq(None, "--config", str(config), "status"),
+        USAGE,
+        f"{config}:2: runtime.rundir: unknown option; did you mean runtime.run_dir?",
+    )
+
+
+def test_a_full_disk_is_a_failure(daemon: Fake) -> None:
+    with Path("/dev/full").open("w") as full:
+        process = daemon.start("slaves", stdout=full, stderr=-1)
+        _, said = process.communicate(timeout=60)
+    assert process.returncode != OK
+    assert said == "ecdaq: slaves: standard output: No space left on device\n"
