@@ -16,9 +16,10 @@ enum {
 	TIME_FILTER = 0x00,    /* 0x0934: none, as the good masters have it */
 	SPEED_FILTER = 0x0c,   /* 0x0935: the ET1100's own default */
 	SPEED_COUNTER_START = 0x1000,
-	BURST_PER_FRAME = 12,
+	BURST_PER_FRAME = 1,   /* a slave compares once a frame, at its end (ET1100 data sheet, 0x0910) */
 	DIFF_MAGNITUDE = 0x7fffffff,
-	SETTLE_BURST = 1200,   /* FRMWs between two looks at 0x092C */
+	SETTLE_FRAMES = 500,   /* between two looks at 0x092C */
+	GOOD_LOOKS = 2,
 };
 
 static int is_follower(const struct bus *bus, size_t pos)
@@ -180,31 +181,22 @@ static int set_clocks(struct bus *bus)
 
 /* --- static drift --- */
 
-static int burst(struct bus *bus, uint32_t count)
+/* One FRMW a frame: several in one frame measure the same moment and count as one. */
+static int burst(struct bus *bus, uint32_t frames)
 {
-	uint16_t reference = bus->slave[bus->reference].info.station_addr;
-	uint8_t time[8];
+	struct access access = { .cmd = ECAT_CMD_FRMW,
+				 .adp = bus->slave[bus->reference].info.station_addr,
+				 .reg = ESC_REG_DC_SYSTEM_TIME,
+				 .len = 8 };
 
-	while (count > 0) {
-		struct access access[BURST_PER_FRAME];
-		uint32_t n = count < BURST_PER_FRAME ? count : BURST_PER_FRAME;
-
-		memset(time, 0, sizeof(time));
-		for (uint32_t i = 0; i < n; i++) {
-			access[i] = (struct access){ .cmd = ECAT_CMD_FRMW,
-						     .adp = reference,
-						     .reg = ESC_REG_DC_SYSTEM_TIME,
-						     .len = sizeof(time),
-						     .data = NULL };
-		}
-		if (registers_run(bus, access, n) < 0) {
+	for (uint32_t i = 0; i < frames; i++) {
+		if (registers_run(bus, &access, 1) < 0) {
 			return bus_fail(bus, -EIO, "no frame comes back during drift compensation");
 		}
-		if (access[0].wkc == 0) {
+		if (access.wkc == 0) {
 			return bus_fail_slave(bus, (size_t)bus->reference, -EIO,
 					      "the reference clock does not answer any more");
 		}
-		count -= n;
 	}
 	return 0;
 }
@@ -238,35 +230,36 @@ static int find_straggler(struct bus *bus, int64_t *ret_diff_ns)
 	return straggler;
 }
 
+/* Rates have settled when the clocks stay together, not when they meet: two good looks in a row. */
 static int settle(struct bus *bus)
 {
 	mono_t give_up = mono_add(bus_now(bus), (span_t){ bus->cfg->dc_lock_timeout_ns });
-	uint32_t count = bus->cfg->dc_burst_frames;
+	uint32_t frames = bus->cfg->dc_burst_frames;
+	unsigned good = 0;
 
-	for (;;) {
+	while (good < GOOD_LOOKS) {
 		int64_t diff_ns = 0;
 		int straggler;
-		int r = burst(bus, count);
+		int r = burst(bus, frames);
 
 		if (r < 0) {
 			return r;
 		}
 		straggler = find_straggler(bus, &diff_ns);
-		if (straggler < 0) {
-			return 0;
-		}
-		if (diff_ns < 0) {
+		if (straggler >= 0 && diff_ns < 0) {
 			return bus_fail_slave(bus, (size_t)straggler, -EIO,
 					      "its system time difference (0x092C) cannot be read");
 		}
-		if (bus_now(bus).ns >= give_up.ns) {
+		if (straggler >= 0 && bus_now(bus).ns >= give_up.ns) {
 			return bus_fail_slave(bus, (size_t)straggler, -ETIME,
 					      "its clock is still %" PRId64 " ns off the reference "
 					      "(limit %" PRId64 " ns, dc.diff_limit)",
 					      diff_ns, bus->cfg->dc_diff_limit_ns);
 		}
-		count = SETTLE_BURST;
+		good = straggler < 0 ? good + 1 : 0;
+		frames = SETTLE_FRAMES;
 	}
+	return 0;
 }
 
 /* --- public --- */

@@ -91,7 +91,8 @@ static void note_presence(struct bus *bus, size_t pos, int is_here, const struct
 
 	if (is_here) {
 		sl->misses = 0;
-		if (sl->is_lost) {
+		/* One that has just got its address again is not back before it has been identified. */
+		if (sl->is_lost && sl->step != RECOVERY_IDENTIFY) {
 			sl->is_lost = 0;
 			sl->step = RECOVERY_BACK;
 			bus_emit_event(bus, emit,
