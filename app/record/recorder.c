@@ -207,7 +207,7 @@ static void note_tai_offset(struct sample_feed *samples)
 	}
 }
 
-/* Events go where samples go: only while a file is open. Returns how many were taken. */
+/* Events go where samples go; one that comes while no file is open opens it. Returns how many were taken. */
 static int take_events(struct recorder *rec)
 {
 	struct event_mark mark = event_mark(rec);
@@ -217,7 +217,7 @@ static int take_events(struct recorder *rec)
 
 	int taken = 0;
 
-	if (!sink_has_file(rec->sink) || sink_state(rec->sink) != SINK_READY) {
+	if (sink_state(rec->sink) != SINK_READY) {
 		return 0;
 	}
 	event_feed_open(rec->events, &mark);

@@ -317,13 +317,14 @@ enum sample_feed_result sample_feed_read(struct sample_feed *s, unsigned most)
 
 int sample_feed_event(struct sample_feed *s, const struct event *ev, uint64_t sequence)
 {
+	int64_t utc_ns = timemap_tai_to_utc_ns(s->map, ev->tai_ns);
 	char text[256];
+	int r = sink_open_file(s->sink, s->next_cycle, utc_ns);
 
 	event_format(ev, text, sizeof(text));
-	return sink_event(s->sink,
-			  &(struct messages_event){
-				  .event = *ev,
-				  .sequence = sequence,
-				  .utc_ns = timemap_tai_to_utc_ns(s->map, ev->tai_ns),
-				  .text = text });
+	return r < 0 ? r :
+		       sink_event(s->sink, &(struct messages_event){ .event = *ev,
+								     .sequence = sequence,
+								     .utc_ns = utc_ns,
+								     .text = text });
 }

@@ -1,0 +1,327 @@
+/* SPDX-License-Identifier: MIT */
+#include "record/layout.h"
+
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "harness/test.h"
+#include "record/names.h"
+#include "record/ros2msg.h"
+
+enum { SLAVES = 3, CHANNELS = 9, IMAGE_BYTES = 32 };
+
+struct meta {
+	struct sample_meta head;
+	struct slave_info slave[SLAVES];
+	struct channel channel[CHANNELS];
+};
+
+static struct channel make_channel(const char *name, unsigned pos, enum channel_type type,
+				   unsigned bits, unsigned offset)
+{
+	struct channel ch = { .slave_pos = (uint16_t)pos,
+			      .type = (uint8_t)type,
+			      .bit_len = (uint8_t)bits,
+			      .bit_offset = offset,
+			      .scale = 1 };
+
+	snprintf(ch.name, sizeof(ch.name), "%s", name);
+	return ch;
+}
+
+/* A slave of all types, one without channels, one whose names are a trap. */
+static void fill(struct meta *m)
+{
+	*m = (struct meta){
+		.head = { .version = SAMPLE_VERSION,
+			  .slave_count = SLAVES,
+			  .channel_count = CHANNELS,
+			  .image_bytes = IMAGE_BYTES,
+			  .period_ns = 1000000,
+			  .session = 5 },
+		.slave = { { .name = "all types", .slave_pos = 0 },
+			   { .name = "coupler", .slave_pos = 1 },
+			   { .name = "cycle", .slave_pos = 2 } },
+		.channel = { make_channel("all types.bit", 0, CHANNEL_BOOL, 1, 3),
+			     make_channel("all types.Five", 0, CHANNEL_INT, 5, 4),
+			     make_channel("all types.word", 0, CHANNEL_UINT, 16, 16),
+			     make_channel("all types.int40", 0, CHANNEL_INT, 40, 32),
+			     make_channel("all types.real", 0, CHANNEL_FLOAT, 32, 72),
+			     make_channel("all types.wide", 0, CHANNEL_FLOAT, 64, 104),
+			     make_channel("cycle.good", 2, CHANNEL_UINT, 8, 0),
+			     make_channel("cycle.Good", 2, CHANNEL_UINT, 8, 8),
+			     make_channel("cycle.class", 2, CHANNEL_UINT, 8, 16) },
+	};
+}
+
+static int create(const struct meta *m, struct layout **l)
+{
+	return layout_create(m, sizeof(*m), l);
+}
+
+TEST(layout, each_slave_with_channels_is_a_topic_with_its_fields)
+{
+	struct meta m;
+	struct layout *l;
+	size_t count;
+	const struct layout_topic *t;
+
+	fill(&m);
+	CHECK_EQ(create(&m, &l), 0);
+	t = layout_topics(l, &count);
+	CHECK_EQ(count, 2);
+	CHECK_STR(t[0].topic, "/ecdaq/all_types");
+	CHECK_STR(t[0].type, "AllTypes");
+	CHECK_EQ(t[0].field_count, 6);
+	CHECK_STR(t[0].field[0].ros_type, "bool");
+	CHECK_STR(t[0].field[1].ros_type, "int8");
+	CHECK_STR(t[0].field[1].name, "five");
+	CHECK_STR(t[0].field[2].ros_type, "uint16");
+	CHECK_STR(t[0].field[3].ros_type, "int64");
+	CHECK_STR(t[0].field[4].ros_type, "float32");
+	CHECK_STR(t[0].field[5].ros_type, "float64");
+	layout_destroy(l);
+	layout_destroy(NULL);
+}
+
+TEST(layout, names_that_are_taken_or_reserved_get_others)
+{
+	struct meta m;
+	struct layout *l;
+	size_t count;
+	const struct layout_topic *t;
+
+	fill(&m);
+	CHECK_EQ(create(&m, &l), 0);
+	t = layout_topics(l, &count);
+	CHECK_STR(t[1].topic, "/ecdaq/cycle_at_2");
+	CHECK_STR(t[1].type, "CycleAt2");
+	CHECK_STR(t[1].field[0].name, "good_2");
+	CHECK_STR(t[1].field[1].name, "good_3");
+	CHECK_STR(t[1].field[2].name, "class_value");
+	layout_destroy(l);
+}
+
+TEST(layout, two_slaves_of_one_name_are_two_topics)
+{
+	struct meta m;
+	struct layout *l;
+	size_t count;
+	const struct layout_topic *t;
+
+	fill(&m);
+	snprintf(m.slave[2].name, sizeof(m.slave[2].name), "all_types");
+	CHECK_EQ(create(&m, &l), 0);
+	t = layout_topics(l, &count);
+	CHECK(strcmp(t[0].topic, t[1].topic) != 0);
+	CHECK(strcmp(t[0].type, t[1].type) != 0);
+	layout_destroy(l);
+}
+
+TEST(layout, values_are_what_the_image_holds_with_their_sign)
+{
+	struct meta m;
+	struct layout *l;
+	size_t count;
+	const struct layout_topic *t;
+	struct sample_header header = { .cycle = 77, .dc_time_ns = -3, .flags = 9 };
+	uint8_t image[IMAGE_BYTES] = { 0 };
+	struct ros2msg msg;
+	struct ros2msg_value v[16];
+	uint8_t buf[256];
+	char *text;
+	float real = -1.5f;
+	double wide = 1e300;
+	size_t len;
+
+	fill(&m);
+	CHECK_EQ(create(&m, &l), 0);
+	t = layout_topics(l, &count);
+	image[0] = 0x08 | 0xf0; /* bit 1, the low four bits of -1 */
+	image[1] = 0x01;        /* its sign */
+	image[2] = 0x34;
+	image[3] = 0x12;
+	memset(image + 4, 0xff, 5); /* -1 in 40 bits */
+	memcpy(image + 9, &real, 4);
+	memcpy(image + 13, &wide, 8);
+	len = layout_encode(&t[0], &header, image, buf, sizeof(buf));
+	CHECK_EQ(len, t[0].message_bytes);
+	text = layout_ros2msg(&t[0]);
+	CHECK(text != NULL);
+	CHECK_EQ(ros2msg_parse(text, strlen(text), &msg), 0);
+	CHECK_EQ(msg.count, 4 + 6);
+	CHECK_EQ(ros2msg_decode(&msg, buf, len, v), 0);
+	CHECK_EQ(v[0].raw, 77);
+	CHECK_EQ((int64_t)v[1].raw, -3);
+	CHECK_EQ(v[2].raw, 9);
+	CHECK_EQ(v[3].raw, 1);
+	CHECK_EQ(v[4].raw, 1);
+	CHECK_EQ((int64_t)v[5].raw, -1);
+	CHECK_EQ(v[6].raw, 0x1234);
+	CHECK_EQ((int64_t)v[7].raw, -1);
+	CHECK(ros2msg_number(&msg.field[8], &v[8]) == -1.5);
+	CHECK(ros2msg_number(&msg.field[9], &v[9]) == 1e300);
+	for (size_t cut = 0; cut < len; cut++) {
+		CHECK_EQ(ros2msg_decode(&msg, buf, cut, v), -EBADMSG);
+	}
+	free(text);
+	ros2msg_done(&msg);
+	layout_destroy(l);
+}
+
+TEST(layout, a_bad_sample_is_said_in_the_message_of_its_slave_only)
+{
+	struct meta m;
+	struct layout *l;
+	size_t count;
+	const struct layout_topic *t;
+	struct sample_header header = { .slaves_bad = 1u << 2 };
+	uint8_t image[IMAGE_BYTES] = { 0 };
+	uint8_t buf[256];
+
+	fill(&m);
+	CHECK_EQ(create(&m, &l), 0);
+	t = layout_topics(l, &count);
+	layout_encode(&t[0], &header, image, buf, sizeof(buf));
+	CHECK_EQ(buf[4 + 20], 1);
+	layout_encode(&t[1], &header, image, buf, sizeof(buf));
+	CHECK_EQ(buf[4 + 20], 0);
+	layout_destroy(l);
+}
+
+TEST(layout, a_meta_area_that_does_not_hold_together_is_refused)
+{
+	struct meta m;
+	struct layout *l = NULL;
+
+	fill(&m);
+	for (size_t len = 0; len < sizeof(m); len += 7) {
+		CHECK_EQ(layout_create(&m, len, &l), -EPROTO);
+	}
+	m.head.version++;
+	CHECK_EQ(create(&m, &l), -EPROTO);
+	fill(&m);
+	m.head.slave_count = UINT32_MAX;
+	CHECK_EQ(create(&m, &l), -EPROTO);
+	fill(&m);
+	m.head.channel_count = UINT32_MAX;
+	CHECK_EQ(create(&m, &l), -EPROTO);
+	fill(&m);
+	m.head.period_ns = 0;
+	CHECK_EQ(create(&m, &l), -EPROTO);
+	fill(&m);
+	m.channel[3].bit_offset = IMAGE_BYTES * 8 - 39;
+	CHECK_EQ(create(&m, &l), -EPROTO);
+	fill(&m);
+	m.channel[0].slave_pos = 9; /* of no slave */
+	CHECK_EQ(create(&m, &l), -EPROTO);
+	fill(&m);
+	m.slave[1].slave_pos = 0;
+	CHECK_EQ(create(&m, &l), -EPROTO);
+	CHECK(l == NULL);
+}
+
+TEST(layout, texts_survive_names_from_a_hostile_eeprom)
+{
+	struct meta m;
+	struct layout *l;
+	size_t count;
+	const struct layout_topic *t;
+	struct ros2msg msg;
+	char *text;
+
+	fill(&m);
+	memset(m.slave[0].name, '\n', sizeof(m.slave[0].name));
+	memset(m.slave[0].device, 0xff, sizeof(m.slave[0].device));
+	memset(m.channel[0].name, '"', sizeof(m.channel[0].name));
+	memset(m.channel[0].unit, '\n', sizeof(m.channel[0].unit));
+	CHECK_EQ(create(&m, &l), 0);
+	t = layout_topics(l, &count);
+	text = layout_ros2msg(&t[0]);
+	CHECK_EQ(ros2msg_parse(text, strlen(text), &msg), 0);
+	CHECK_EQ(msg.count, 4 + 6);
+	ros2msg_done(&msg);
+	free(text);
+	text = layout_json(l);
+	CHECK(strchr(text, '\n') == NULL);
+	CHECK(strstr(text, "\\\"") != NULL);
+	free(text);
+	text = layout_idl(l);
+	CHECK(strstr(text, "struct Unnamed {") != NULL);
+	free(text);
+	layout_destroy(l);
+}
+
+static const char *field(const char *name)
+{
+	static char buf[32];
+
+	name_make_field(name, buf, sizeof(buf));
+	return buf;
+}
+
+TEST(names, are_made_fit_for_ros_and_idl)
+{
+	char type[32];
+
+	CHECK_STR(field("adc"), "adc");
+	CHECK_STR(field("Status Word.1"), "status_word_1");
+	CHECK_STR(field("__a__b__"), "a_b");
+	CHECK_STR(field("3rd"), "n_3rd");
+	CHECK_STR(field(""), "unnamed");
+	CHECK_STR(field("\xc3\xa4"), "unnamed");
+	CHECK_STR(field("switch"), "switch_value");
+	CHECK_STR(field("a name that is much longer than the buffer"), "a_name_that_is_much_long");
+	name_make_type("piccolo0_left", type, sizeof(type));
+	CHECK_STR(type, "Piccolo0Left");
+}
+
+static int parse(const char *text)
+{
+	struct ros2msg msg;
+	int r = ros2msg_parse(text, strlen(text), &msg);
+
+	if (r == 0) {
+		r = (int)msg.count;
+		ros2msg_done(&msg);
+	}
+	return r;
+}
+
+TEST(ros2msg, flat_definitions_are_read_and_others_are_refused)
+{
+	CHECK_EQ(parse(""), 0);
+	CHECK_EQ(parse("# only a comment\n\n  \n"), 0);
+	CHECK_EQ(parse("uint8 a\nstring b # text\r\n  float64   c"), 3);
+	CHECK_EQ(parse("uint8"), -EBADMSG);
+	CHECK_EQ(parse("uint8 # a"), -EBADMSG);
+	CHECK_EQ(parse("uint8[4] a"), -ENOTSUP);
+	CHECK_EQ(parse("std_msgs/Header h"), -ENOTSUP);
+	CHECK_EQ(parse("uint8 A=3"), -ENOTSUP);
+	CHECK_EQ(parse("uint8 a 3"), -ENOTSUP);
+}
+
+TEST(ros2msg, strings_are_bounded_by_the_message)
+{
+	static const char text[] = "uint8 a\nstring s\nuint8 b\n";
+	const uint8_t data[] = { 0, 1, 0, 0, 7, 0, 0, 0, 3, 0, 0, 0, 'h', 'i', 0, 9 };
+	struct ros2msg msg;
+	struct ros2msg_value v[3];
+	uint8_t bad[sizeof(data)];
+
+	CHECK_EQ(ros2msg_parse(text, strlen(text), &msg), 0);
+	CHECK_EQ(ros2msg_decode(&msg, data, sizeof(data), v), 0);
+	CHECK_EQ(v[0].raw, 7);
+	CHECK_EQ(v[1].raw, 2);
+	CHECK_MEM(v[1].text, "hi", 2);
+	CHECK_EQ(v[2].raw, 9);
+	memcpy(bad, data, sizeof(data));
+	bad[8] = 200;
+	CHECK_EQ(ros2msg_decode(&msg, bad, sizeof(bad), v), -EBADMSG);
+	bad[1] = 0; /* big-endian */
+	CHECK_EQ(ros2msg_decode(&msg, bad, sizeof(bad), v), -EBADMSG);
+	CHECK_EQ(ros2msg_find(&msg, "b"), 2);
+	CHECK_EQ(ros2msg_find(&msg, "c"), -ENOENT);
+	ros2msg_done(&msg);
+}
