@@ -15,7 +15,7 @@ DEBIAN_STANDARDS_VERSION ??= "4.7.2"
 DESCRIPTION ??= "${SUMMARY}"
 TEMPLATE_FILES ??= ""
 TEMPLATE_VARS ??= "PN BPN PV CHANGELOG_V DPKG_ARCH DEBIAN_BUILD_DEPENDS DEBIAN_DEPENDS DEBIAN_SECTION \
-                   DEBIAN_COMPAT DESCRIPTION MAINTAINER DISTRO_ARCH MACHINE"
+                   DEBIAN_COMPAT DESCRIPTION MAINTAINER DISTRO_ARCH"
 
 # Debian source packages: apt://NAME or apt://NAME=VERSION.
 def apt_source(d):
@@ -33,10 +33,17 @@ do_unpack[vardeps] += "unpack_apt_source"
 
 fetch_apt_source() {
 	sdk_run -w apt-get -q update
-	rm -rf "${WORKDIR}/apt-source"
-	mkdir -p "${WORKDIR}/apt-source"
-	sdk_run sh -euc 'cd "$1" && apt-get -q -o APT::Sandbox::User=root --download-only --only-source source "$2"' \
-		fetch "${PP}/apt-source" "${APT_SOURCE}"
+	for source in "${APT_SOURCE}" "${APT_SOURCE}/${BASE_DISTRO_CODENAME}"; do
+		rm -rf "${WORKDIR}/apt-source"
+		mkdir -p "${WORKDIR}/apt-source"
+		if sdk_run sh -euc 'cd "$1" && apt-get -q -o APT::Sandbox::User=root --download-only --only-source source "$2"' \
+			fetch "${PP}/apt-source" "$source"; then
+			return 0
+		fi
+		# Some mirrors list the security suite's sources and do not hold them.
+		bbwarn "the mirror does not give the source of $source"
+	done
+	bbfatal "no source of ${APT_SOURCE}"
 }
 
 unpack_apt_source() {

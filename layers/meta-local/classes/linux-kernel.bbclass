@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: MIT
 # A kernel of its own configuration: .cfg files of SRC_URI merged over KERNEL_DEFCONFIG, by the very
-# commands that Isar's class of this name uses. One package, linux-image-${KERNEL_NAME_PROVIDED}.
+# commands that Isar's class of this name uses. One package, linux-image-${KERNEL_NAME_PROVIDED}. A symbol
+# that was asked for and is not in the final configuration ends the build before it has begun.
 inherit dpkg
 
 KERNEL_NAME_PROVIDED ?= "${@d.getVar('BPN').partition('linux-')[2]}"
 KERNEL_DEFCONFIG ??= "defconfig"
 KERNEL_FRAGMENTS = "${@' '.join(os.path.basename(u)[7:] if u.startswith('file:///') else u[7:].split(';')[0] for u in d.getVar('SRC_URI').split() if u.startswith('file://') and u.split(';')[0].endswith('.cfg'))}"
-DEB_KREL = "debian/krel"
 
+do_prepare_build[file-checksums] += "${LAYERDIR_core}/lib/kconfig.py:True"
 do_prepare_build() {
 	rm -rf "${S}/debian"
 	deb_debianize
@@ -28,6 +29,7 @@ CONTROL
 	for name in ${KERNEL_FRAGMENTS}; do
 		cp "${WORKDIR}/$name" "${S}/debian/fragments/"
 	done
+	cp "${LAYERDIR_core}/lib/kconfig.py" "${S}/debian/"
 	cat > "${S}/debian/rules" <<'RULES'
 #!/usr/bin/make -f
 export ARCH = arm64
@@ -48,6 +50,7 @@ override_dh_auto_configure:
 	$(kmake) defconfig KBUILD_DEFCONFIG=@DEFCONFIG@
 	scripts/kconfig/merge_config.sh -O build-full/ build-full/.config \
 		$(addprefix debian/fragments/,@FRAGMENTS@)
+	python3 debian/kconfig.py build-full/.config $(addprefix debian/fragments/,@FRAGMENTS@)
 
 override_dh_auto_build:
 	$(kmake) $(PARALLEL_MAKE) Image modules dtbs

@@ -77,7 +77,8 @@ def _fill_boot(inputs: Inputs, out: Path, boot: Path) -> None:
 
 def _plan(inputs: Inputs, layout: wks.Layout) -> str:
     """What make-disk.sh reads: one shell-safe line for the disk, one for each partition."""
-    lines = [f"disk {inputs.name} {layout.table} {uuid.uuid5(NAMESPACE, inputs.name)}"]
+    identity = layout.identity or str(uuid.uuid5(NAMESPACE, inputs.name))
+    lines = [f"disk {inputs.name} {layout.table} {identity}"]
     for part in layout.partitions:
         given = part.uuid or str(uuid.uuid5(NAMESPACE, f"{inputs.name}/{part.label}"))
         lines.append(
@@ -105,6 +106,9 @@ def prepare(inputs: Inputs) -> None:
     (out / f"{inputs.name}.manifest").write_text(sbom.manifest(packages))
     (out / f"{inputs.name}.spdx.json").write_text(
         sbom.spdx(packages, inputs.name, inputs.version, inputs.epoch)
+    )
+    shutil.copy(
+        next(Path(inputs.rootfs).glob("boot/config-*")), out / f"{inputs.name}.kernel-config"
     )
     (out / f"{inputs.name}.cmdline").write_text(inputs.cmdline + "\n")
     with tar.open("rb") as stream:

@@ -61,7 +61,10 @@ while read -r word a b c d e; do
 		image=$out/$a.img
 		table=$b
 		identity=$c
-		[ "$table" = gpt ] || identity=0x$(volume_id "$c")
+		case $table/$c in
+		gpt/* | msdos/0x*) ;;
+		msdos/*) identity=0x$(volume_id "$c") ;;
+		esac
 		rm -f "$image"
 		printf 'label: %s\nlabel-id: %s\n' \
 			"$(echo "$table" | sed 's/msdos/dos/')" "$identity" > "$disk/table"

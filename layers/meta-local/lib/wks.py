@@ -30,9 +30,10 @@ class Partition:
 
 @dataclass(frozen=True)
 class Layout:
-    """A whole file: the kind of partition table and its partitions in order."""
+    """A whole file: the kind and the identity of the partition table, and its partitions in order."""
 
     table: str
+    identity: str
     partitions: tuple[Partition, ...]
 
     def find(self, source: str) -> Partition:
@@ -67,36 +68,39 @@ def _part_parser() -> _Parser:
     return parser
 
 
-def _parse_line(words: list[str], table: str, partitions: list[Partition]) -> str:
-    if words[0] == "bootloader":
-        parser = _Parser(add_help=False)
-        parser.add_argument("--ptable", choices=("gpt", "msdos"), default="msdos")
-        return str(parser.parse_args(words[1:]).ptable)
-    if words[0] not in ("part", "partition"):
-        raise WksError(f"'{words[0]}' is not understood here")
-    given = _part_parser().parse_args(words[1:])
-    partitions.append(
-        Partition(
-            mountpoint=given.mountpoint,
-            source=given.source,
-            fstype=given.fstype,
-            label=given.label,
-            size_bytes=_size(given.fixed_size),
-            uuid=given.uuid,
-        )
+def _parse_bootloader(words: list[str]) -> tuple[str, str]:
+    parser = _Parser(add_help=False)
+    parser.add_argument("--ptable", choices=("gpt", "msdos"), default="msdos")
+    parser.add_argument("--diskid", default="")
+    given = parser.parse_args(words)
+    return given.ptable, given.diskid
+
+
+def _parse_part(words: list[str]) -> Partition:
+    given = _part_parser().parse_args(words)
+    return Partition(
+        mountpoint=given.mountpoint,
+        source=given.source,
+        fstype=given.fstype,
+        label=given.label,
+        size_bytes=_size(given.fixed_size),
+        uuid=given.uuid,
     )
-    return table
 
 
 def parse(path: Path) -> Layout:
     """The layout in `path`; WksError with file and line if it is not one of ours."""
-    table = "msdos"
+    table, identity = "msdos", ""
     partitions: list[Partition] = []
     for number, line in enumerate(path.read_text().splitlines(), 1):
         try:
             words = shlex.split(line, comments=True)
-            if words:
-                table = _parse_line(words, table, partitions)
+            if words[:1] == ["bootloader"]:
+                table, identity = _parse_bootloader(words[1:])
+            elif words[:1] in (["part"], ["partition"]):
+                partitions.append(_parse_part(words[1:]))
+            elif words:
+                raise WksError(f"'{words[0]}' is not understood here")
         except (WksError, ValueError) as error:
             raise WksError(f"{path}:{number}: {error}") from error
     for source in ("rootfs", "bootimg-partition"):
@@ -104,4 +108,4 @@ def parse(path: Path) -> Layout:
             raise WksError(f"{path}: exactly one partition has to be of --source {source}")
     if table == "msdos" and len(partitions) > 4:
         raise WksError(f"{path}: an msdos table holds four partitions")
-    return Layout(table, tuple(partitions))
+    return Layout(table, identity, tuple(partitions))

@@ -1,0 +1,93 @@
+#!/bin/sh
+# SPDX-License-Identifier: MIT
+# The image in QEMU, for a person. `./build.sh boot` calls this.
+set -eu
+
+here=$(CDPATH='' cd -- "$(dirname -- "$0")" && pwd)
+root=$(CDPATH='' cd -- "$here/../../.." && pwd)
+
+usage()
+{
+	cat <<'USAGE'
+usage: ./build.sh boot [--fresh] [--ssh-port N] [--key FILE] [--icount] [-- QEMU-OPTION...]
+
+Boots the image of machine qemuarm64 in QEMU (no KVM needed): its serial console here, its SSH port on
+127.0.0.1, the EtherCAT segment simulated inside. Nobody has a password: log in with
+
+  ssh -p 2222 -i build/image/boot/key operator@127.0.0.1
+
+and end it with `sudo poweroff` there, or Ctrl-a x here. The disk keeps what was recorded.
+
+  --fresh       start from a new disk (default: the disk of the last time, if the image is the same)
+  --ssh-port N  port on 127.0.0.1 that leads to the guest's SSH (default: 2222)
+  --key FILE    public key that may log in (default: one made for this, build/image/boot/key)
+  --icount      the guest's clock counts instructions: slower, and a 1 ms cycle holds in guest time
+USAGE
+}
+
+die()
+{
+	printf 'build.sh: boot: %s\n' "$*" >&2
+	exit 1
+}
+
+fresh=no
+port=2222
+key=
+timing='-accel tcg,thread=multi'
+while [ $# -gt 0 ]; do
+	case $1 in
+	--fresh) fresh=yes ;;
+	--icount) timing='-accel tcg,thread=single -icount shift=auto,sleep=on' ;;
+	--ssh-port | --key)
+		[ $# -ge 2 ] || die "$1 needs a value"
+		case $1 in
+		--ssh-port) port=$2 ;;
+		--key) key=$2 ;;
+		esac
+		shift
+		;;
+	--help | -h)
+		usage
+		exit 0
+		;;
+	--)
+		shift
+		break
+		;;
+	*) die "unknown option '$1' (see --help)" ;;
+	esac
+	shift
+done
+case $port in
+'' | *[!0-9]*) die "--ssh-port: '$port' is no port" ;;
+esac
+
+image=$root/build/image/qemuarm64
+name=ecdaq-image-ecdaq-qemuarm64
+[ -f "$image/$name.img" ] || die "no image yet: run ./build.sh image first"
+vm=$root/build/image/boot
+mkdir -p "$vm"
+if [ -z "$key" ]; then
+	[ -f "$vm/key" ] || ssh-keygen -q -t ed25519 -N '' -C 'made by build.sh boot' -f "$vm/key"
+	key=$vm/key.pub
+fi
+[ -f "$key" ] || die "--key: no file $key"
+if [ "$fresh" = yes ] || [ ! -f "$vm/disk.img" ] || ! cmp -s "$image/$name.sha256" "$vm/made-of"; then
+	cp --sparse=always "$image/$name.img" "$vm/disk.img"
+	# Room for recordings: the data partition grows into it.
+	truncate -s 4G "$vm/disk.img"
+	cp "$image/$name.sha256" "$vm/made-of"
+fi
+cp "$image/$name-vmlinux" "$vm/vmlinux"
+cp "$key" "$vm/authorized_keys"
+# The boot partition starts at 4 MiB.
+"$here/qemu.sh" "$vm" mcopy -o -i disk.img@@4M authorized_keys ::ecdaq/authorized_keys
+
+echo "-- ssh -p $port -i $vm/key operator@127.0.0.1    (end: Ctrl-a x)" >&2
+# shellcheck disable=SC2086 # a list of options
+exec "$here/qemu.sh" "$vm" qemu-system-aarch64 -M virt,gic-version=3 -cpu cortex-a72 -smp 2 -m 1024 \
+	$timing -nographic -no-reboot -kernel vmlinux -append "$(cat "$image/$name.cmdline")" \
+	-drive file=disk.img,if=none,format=raw,id=disk -device virtio-blk-pci,drive=disk \
+	-netdev "user,id=lan,hostfwd=tcp:127.0.0.1:$port-:22" -device virtio-net-pci,netdev=lan \
+	-device virtio-rng-pci "$@"

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: MIT
+"""The program that takes a machine's settings from its boot partition, run here on made-up folders."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+from conftest import TOP
+
+PROGRAM = TOP / "recipes/recipes-core/ecdaq-config/files/root/usr/lib/ecdaq/boot-config"
+# Stands in for `ecdaqd --check --config FILE`: what names a colour is wrong.
+DAEMON = """#!/bin/sh
+file=$3
+if grep -n colour "$file"; then
+    echo "ecdaqd: $file:1: no option colour" >&2
+    exit 3
+fi
+"""
+
+
+class Place:
+    """Folders in place of those of a machine."""
+
+    def __init__(self, base: Path) -> None:
+        self.source = base / "boot"
+        self.target = base / "run"
+        self.networkd = base / "networkd"
+        self.console = base / "console"
+        self.source.mkdir()
+        (base / "daemon").write_text(DAEMON)
+        (base / "daemon").chmod(0o755)
+        (base / "standard.yaml").write_text("cycle:\n  period: 1ms\n")
+        (base / "isolated").write_text("3\n")
+        self.environment = os.environ | {
+            "ECDAQ_BOOT_DIR": str(self.source),
+            "ECDAQ_TARGET_DIR": str(self.target),
+            "ECDAQ_NETWORKD_DIR": str(self.networkd),
+            "ECDAQ_ISOLATED": str(base / "isolated"),
+            "ECDAQ_DAEMON": str(base / "daemon"),
+            "ECDAQ_STANDARD": str(base / "standard.yaml"),
+            "ECDAQ_DATA_DIR": str(base),
+            "ECDAQ_CONSOLE": str(self.console),
+        }
+
+    def run(self) -> str:
+        """What it said. It never fails: whatever the folder holds, the machine has to come up."""
+        self.console.write_text("")
+        done = subprocess.run(
+            [PROGRAM], env=self.environment, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stderr
+
+    def options(self) -> str:
+        return (self.target / "environment").read_text()
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Place:
+    return Place(tmp_path)
+
+
+@pytest.fixture
+def public_key(tmp_path: Path) -> str:
+    key = tmp_path / "key"
+    subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", key], check=True)
+    return key.with_suffix(".pub").read_text()
+
+
+def test_without_a_folder_the_built_in_settings_hold(place: Place) -> None:
+    place.source.rmdir()
+    said = place.run()
+    assert "no ecdaq/ folder on the boot partition" in said
+    assert "nobody can log in" in said
+    assert "period: 1ms" in (place.target / "ecdaq.yaml").read_text()
+    assert "--set bus.interface=ecat0" in place.options()
+    assert "--set cycle.cpu=3" in place.options()
+    assert "--set record.dir=/data/record" in place.options()
+    assert "--set record.budget=" in place.options()
+
+
+def test_what_a_file_says_is_not_said_again(place: Place) -> None:
+    (place.source / "ecdaq.yaml").write_text(
+        "bus:\n  interface: lan9\ncycle:\n  cpu: 2\nrecord:\n  dir: /data/x\n  budget: 1GiB\n"
+    )
+    place.run()
+    assert "lan9" in (place.target / "ecdaq.yaml").read_text()
+    assert place.options().strip() == "ECDAQ_OPTIONS="
+
+
+def test_a_broken_file_is_named_and_not_used(place: Place) -> None:
+    (place.source / "ecdaq.yaml").write_text("colour: blue\n")
+    said = place.run()
+    assert "ecdaq.yaml on the boot partition is not used" in said
+    assert "going on with the built-in settings" in said
+    assert "colour" not in (place.target / "ecdaq.yaml").read_text()
+    assert "is not used" in place.console.read_text()
+
+
+@pytest.mark.parametrize("text", ["", "x" * 70000])
+def test_an_empty_or_huge_file_is_left_out(place: Place, text: str) -> None:
+    (place.source / "ecdaq.yaml").write_text(text)
+    assert "left out" in place.run()
+    assert "period: 1ms" in (place.target / "ecdaq.yaml").read_text()
+
+
+def test_keys_with_windows_line_ends_are_taken(place: Place, public_key: str) -> None:
+    (place.source / "authorized_keys").write_text(public_key.replace("\n", "\r\n"))
+    said = place.run()
+    assert "nobody can log in" not in said
+    assert (place.target / "ssh/operator").read_text() == public_key
+
+
+def test_a_file_without_a_key_lets_nobody_in(place: Place) -> None:
+    (place.source / "authorized_keys").write_text("please let me in\n")
+    said = place.run()
+    assert "no usable key" in said
+    assert (place.target / "ssh/operator").read_text() == ""
+
+
+@pytest.mark.parametrize("name", ["-x", "a b;reboot", "x" * 64, "ä"])
+def test_what_is_no_host_name_is_refused(place: Place, name: str) -> None:
+    (place.source / "hostname").write_text(name + "\n")
+    assert "hostname:" in place.run()
+    assert not (place.target / "hostname").exists()
+
+
+def test_network_files_are_taken_but_never_for_the_ethercat_port(place: Place) -> None:
+    (place.source / "network").mkdir()
+    (place.source / "network/10-a.network").write_text("[Match]\nName=lan0\n")
+    (place.source / "network/20-b.network").write_text("[Match]\nName=ecat0\n")
+    said = place.run()
+    assert [p.name for p in place.networkd.iterdir()] == ["10-a.network"]
+    assert "20-b.network: touches the EtherCAT port" in said
+
+
+def test_time_servers_are_addresses_and_nothing_else(place: Place) -> None:
+    (place.source / "time-servers").write_text("# ours\r\nntp1.example\r\n$(reboot)\n192.0.2.1\n")
+    said = place.run()
+    sources = (place.target / "chrony.d/boot.sources").read_text()
+    assert sources == "server ntp1.example iburst\nserver 192.0.2.1 iburst\n"
+    assert "is no address" in said

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: MIT
+"""Each rule is shown a breach, and has to find it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rules
+import wks
+from kconfig import differences
+from metadata import Recipe
+
+
+class Data:
+    """A datastore with a few variables."""
+
+    def __init__(self, **values: str) -> None:
+        self.values = values
+
+    def getVar(self, name: str) -> Any:  # noqa: N802 - BitBake's name
+        return self.values.get(name)
+
+
+def recipe(**values: str) -> Recipe:
+    good = {
+        "SUMMARY": "s",
+        "DESCRIPTION": "d",
+        "SECTION": "net",
+        "LICENSE": "MIT",
+        "LIC_FILES_CHKSUM": "file://LICENSE;md5=0",
+    }
+    return Recipe("x", Path("x.bb"), Data(**(good | values)))
+
+
+def test_a_good_recipe_has_no_breach() -> None:
+    assert rules.license_fields(recipe()) == []
+
+
+@pytest.mark.parametrize(
+    "values", [{"LICENSE": "Beer"}, {"LICENSE": ""}, {"SUMMARY": ""}, {"LIC_FILES_CHKSUM": ""}]
+)
+def test_a_missing_or_unknown_licence_is_found(values: dict[str, str]) -> None:
+    assert rules.license_fields(recipe(**values)) != []
+
+
+def test_a_changed_licence_text_is_found(tmp_path: Path) -> None:
+    (tmp_path / "LICENSE").write_text("other")
+    assert rules.license_texts(recipe(), tmp_path) != []
+
+
+@pytest.mark.parametrize(
+    "values",
+    [{"SRC_URI": "https://x/y.tar.gz"}, {"PYPI_PACKAGE": "p", "PYPI_SHA256": "abc"}],
+)
+def test_an_unpinned_source_is_found(values: dict[str, str]) -> None:
+    assert rules.pins(recipe(**values)) != []
+
+
+def test_another_soem_is_found(tmp_path: Path) -> None:
+    lock = tmp_path / "soem.lock"
+    lock.write_text("package = p\nversion = 1\nsha256 = aa\n")
+    same = recipe(PYPI_PACKAGE="p", PYPI_VERSION="1", PYPI_SHA256="aa")
+    assert rules.soem_pin(same, lock) == []
+    assert len(rules.soem_pin(recipe(PYPI_PACKAGE="p", PYPI_VERSION="2", PYPI_SHA256="b"), lock)) == 2
+
+
+def test_a_forgotten_patch_is_found(tmp_path: Path) -> None:
+    (tmp_path / "0001-a.patch").write_text("")
+    assert rules.soem_patches(recipe(SRC_URI=""), tmp_path) != []
+    assert rules.soem_patches(recipe(SRC_URI="file://0001-a.patch"), tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    "text", ['LICENSE = "MIT"\nSUMMARY = "x"\n', "SUMMARY='x'\n", 'SUMMARY="x"\n']
+)
+def test_disorder_in_a_recipe_is_found(text: str) -> None:
+    assert rules.field_order("x.bb", text) != []
+
+
+def test_a_registry_by_name_is_found() -> None:
+    host = "deb." + "debian.org"
+    assert rules.no_hosts("x", f"deb http://{host}/debian trixie main\n") != []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        'BBFILE_COLLECTIONS += "x"\n',
+        'BBFILE_COLLECTIONS += "x"\nBBFILE_PATTERN_x = ""\nBBFILE_PRIORITY_x = ""\n'
+        'LAYERVERSION_x = ""\nLAYERSERIES_COMPAT_x = ""\nMACHINE ?= "y"\n',
+    ],
+)
+def test_a_layer_that_breaks_a_rule_is_found(text: str) -> None:
+    assert rules.layer_conf("layer.conf", text) != []
+
+
+@pytest.mark.parametrize(
+    ("config", "fragment", "breaches"),
+    [
+        ("CONFIG_A=y\n", "CONFIG_A=y\n", 0),
+        ("CONFIG_A=m\n", "CONFIG_A=y\n", 1),
+        ("# CONFIG_A is not set\n", "CONFIG_A=y\n", 1),
+        ("", "CONFIG_A=y\n", 1),
+        ("", "CONFIG_A=n\n", 0),
+        ("CONFIG_A=y\n", "CONFIG_A=n\n", 1),
+        ('CONFIG_A="x"\n', 'CONFIG_A="y"\n', 1),
+    ],
+)
+def test_a_symbol_that_did_not_arrive_is_found(
+    tmp_path: Path, config: str, fragment: str, breaches: int
+) -> None:
+    (tmp_path / "config").write_text(config)
+    (tmp_path / "a.cfg").write_text(fragment)
+    assert len(differences(tmp_path / "config", [tmp_path / "a.cfg"])) == breaches
+
+
+def test_two_fragments_that_contradict_are_found(tmp_path: Path) -> None:
+    (tmp_path / "config").write_text("CONFIG_A=y\n")
+    (tmp_path / "a.cfg").write_text("CONFIG_A=y\n")
+    (tmp_path / "b.cfg").write_text("CONFIG_A=m\n")
+    assert differences(tmp_path / "config", [tmp_path / "a.cfg", tmp_path / "b.cfg"]) != []
+
+
+def test_a_fragment_line_that_says_nothing_is_an_error(tmp_path: Path) -> None:
+    (tmp_path / "a.cfg").write_text("CONFIG-A=y\n")
+    with pytest.raises(ValueError, match=r"a\.cfg:1"):
+        differences(tmp_path / "a.cfg", [])
+
+
+GOOD = """\
+bootloader --ptable gpt
+part /boot --source bootimg-partition --fstype=vfat --label boot --fixed-size 8M
+part / --source rootfs --fstype=ext4 --label root --fixed-size 16M
+"""
+
+
+def test_a_layout_is_read(tmp_path: Path) -> None:
+    (tmp_path / "a.wks").write_text(GOOD)
+    layout = wks.parse(tmp_path / "a.wks")
+    assert layout.table == "gpt"
+    assert [p.size_bytes for p in layout.partitions] == [8 << 20, 16 << 20]
+    assert layout.find("rootfs").label == "root"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "part / --source rootfs --fstype=ext4 --label again --fixed-size 1M",
+        "part --label x",
+        "part --label x --fixed-size much",
+        "part --label x --fixed-size 1M --fstype=ntfs",
+        "partition 'open",
+        "something else",
+    ],
+)
+def test_a_layout_that_is_wrong_is_told_by_line_or_file(tmp_path: Path, line: str) -> None:
+    (tmp_path / "a.wks").write_text(GOOD + line + "\n")
+    with pytest.raises(wks.WksError, match=r"a\.wks"):
+        wks.parse(tmp_path / "a.wks")
