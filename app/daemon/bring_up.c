@@ -189,6 +189,7 @@ static void line_wait(void *ctx, mono_t until)
 	struct session *s = ctx;
 
 	s->spec.hooks.wait(s->spec.hooks.ctx, until);
+	session_listen(s);
 	if (s->spec.hooks.alive != NULL) {
 		s->spec.hooks.alive(s->spec.hooks.ctx);
 	}
@@ -224,6 +225,9 @@ static void arrive(struct session *s)
 	cycle_phase_set(s->cycle, CYCLE_OP);
 	s->lost_since = (mono_t){ 0 };
 	s->wkc_low_seen = 0;
+	s->silent_cycles = 0;
+	s->cycles_seen = atomic_load_explicit(&s->home.page->cycle.cycles, memory_order_relaxed);
+	s->lost_seen = atomic_load_explicit(&s->home.page->cycle.frames_lost, memory_order_relaxed);
 	s->next_watch = session_now(s);
 	session_state_set(s, BUS_OP);
 	session_say(s, "");

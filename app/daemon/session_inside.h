@@ -33,6 +33,9 @@ struct session {
 	int is_link_up;
 	enum bus_state state;
 	mono_t next_watch;
+	uint64_t silent_cycles; /* in a row without a frame */
+	uint64_t cycles_seen;
+	uint64_t lost_seen;
 	mono_t lost_since; /* all slaves, from then on; 0: not so */
 	uint64_t wkc_low_seen;
 };
@@ -60,6 +63,9 @@ int session_lead_to_op(struct session *s, struct failure *failure);
 /** Stop the cycle and give the transport back; its result. */
 int session_cycle_end(struct session *s);
 
+/** Does anything come back at all? The cycle's counters say so, also while the bus is being asked.
+ */
+void session_listen(struct session *s);
 /** Look after the bus; an enum session_news. */
 enum session_news session_watch(struct session *s);
 

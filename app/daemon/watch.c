@@ -6,6 +6,8 @@
 #include "daemon/session.h"
 #include "daemon/session_inside.h"
 
+/* Not one frame back for so long: the cable at the master, or the first slave, is gone. */
+#define SILENCE_NS (50 * NS_PER_MS)
 #define WATCH_PERIOD_NS (100 * NS_PER_MS)
 /* Recovery goes one step a look. */
 #define RECOVERY_PERIOD_NS (20 * NS_PER_MS)
@@ -123,16 +125,53 @@ static void follow_bus(struct session *s, const struct bus_watch_report *report)
 	}
 }
 
+static uint64_t silence_limit(const struct session *s)
+{
+	return (uint64_t)(SILENCE_NS / s->spec.cfg->cycle_period_ns);
+}
+
+/* The cycle knows first whether anything comes back. */
+static void count_silence(struct session *s)
+{
+	const struct cycle_stats *st = &s->home.page->cycle;
+	uint64_t cycles = atomic_load_explicit(&st->cycles, memory_order_relaxed);
+	uint64_t lost = atomic_load_explicit(&st->frames_lost, memory_order_relaxed);
+
+	if (lost < s->lost_seen || lost - s->lost_seen < cycles - s->cycles_seen) {
+		s->silent_cycles = 0;
+	} else {
+		s->silent_cycles += cycles - s->cycles_seen;
+	}
+	s->lost_seen = lost;
+	s->cycles_seen = cycles;
+}
+
+static void follow_silence(struct session *s)
+{
+	struct bus_watch_report report = {
+		.slaves_lost =
+			atomic_load_explicit(&s->home.page->slave_count, memory_order_relaxed),
+	};
+
+	follow_bus(s, &report);
+}
+
+void session_listen(struct session *s)
+{
+	count_silence(s);
+	if (s->state == BUS_OP && s->silent_cycles >= silence_limit(s)) {
+		follow_silence(s);
+	}
+}
+
 enum session_news session_watch(struct session *s)
 {
 	struct bus_watch_report report = { 0 };
-	char text[BUS_ERROR_BYTES];
-	int r = bus_watch(s->bus, s->home.page, emit_event, s, &report);
 
-	if (r < 0) {
-		snprintf(text, sizeof(text), "bus: cannot be watched: error %d", -r);
-		session_say(s, text);
-	} else {
+	if (s->silent_cycles >= silence_limit(s)) {
+		/* Nobody is there to be asked; each question would cost its time-out. */
+		follow_silence(s);
+	} else if (bus_watch(s->bus, s->home.page, emit_event, s, &report) == 0) {
 		follow_bus(s, &report);
 	}
 	if (s->lost_since.ns != 0 && mono_sub(session_now(s), s->lost_since).ns > LOST_LIMIT_NS) {
@@ -182,6 +221,9 @@ int session_service(struct session *session, struct failure *failure)
 		return report_ended_cycle(s, failure);
 	}
 	serve_admin(s);
+	if (s->is_riding) {
+		session_listen(s);
+	}
 	if (now.ns >= s->next_watch.ns || is_wkc_alarming(s)) {
 		s->wkc_low_seen =
 			atomic_load_explicit(&s->home.page->cycle.wkc_low, memory_order_relaxed);
