@@ -2,7 +2,6 @@
 /* ecdaq oneshot: arm SYNC0 of one slave or of all for one instant, and wait for the conversion. */
 #include <inttypes.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/clock.h"

@@ -149,25 +149,37 @@ static struct span span_of(const struct plot *plot, unsigned panel)
 	return span;
 }
 
+/* One panel while it is drawn. */
+struct view {
+	const struct plot *plot;
+	unsigned panel;
+	struct span axis;
+	int height; /* in dot rows */
+};
+
 /* Dot row of @value, 0 on top. */
-static int row_of(double value, const struct span *axis, int height)
+static int row_of(const struct view *view, double value)
 {
+	const struct span *axis = &view->axis;
+
 	/* Halves: the span of the largest numbers is more than a double holds. */
 	double share = (axis->max / 2 - value / 2) / (axis->max / 2 - axis->min / 2);
-	int row = (int)lround(share * (height - 1));
+	int row = (int)lround(share * (view->height - 1));
 
-	return row < 0 ? 0 : row >= height ? height - 1 : row;
+	if (row < 0) {
+		return 0;
+	}
+	return row >= view->height ? view->height - 1 : row;
 }
 
 /*
  * The dot rows that column @x covers: its own span, stretched so that the curve has no hole between
  * this column and the one before.
  */
-static int covered(const struct plot *plot, unsigned panel, int x, const struct span *axis,
-		   int height, int *ret_top, int *ret_bottom)
+static int covered(const struct view *view, int x, int *ret_top, int *ret_bottom)
 {
-	const struct bin *bin = visible(plot, panel, x);
-	const struct bin *before = x > 0 ? visible(plot, panel, x - 1) : NULL;
+	const struct bin *bin = visible(view->plot, view->panel, x);
+	const struct bin *before = x > 0 ? visible(view->plot, view->panel, x - 1) : NULL;
 	double min;
 	double max;
 
@@ -182,8 +194,8 @@ static int covered(const struct plot *plot, unsigned panel, int x, const struct 
 		min = middle < min ? middle : min;
 		max = middle > max ? middle : max;
 	}
-	*ret_top = row_of(max, axis, height);
-	*ret_bottom = row_of(min, axis, height);
+	*ret_top = row_of(view, max);
+	*ret_bottom = row_of(view, min);
 	return 1;
 }
 
@@ -197,21 +209,20 @@ static void put_braille(unsigned dots, FILE *out)
 }
 
 /* The dots of one character cell. Unicode numbers them down the left column, then the right. */
-static unsigned cell_dots(const struct plot *plot, unsigned panel, int cell, int row,
-			  const struct span *axis, int height)
+static unsigned cell_dots(const struct view *view, int cell, int row)
 {
 	static const unsigned bits[4][2] = { { 1, 8 }, { 2, 16 }, { 4, 32 }, { 64, 128 } };
 	unsigned dots = 0;
 
-	for (int dx = 0; dx < dots_x(plot); dx++) {
+	for (int dx = 0; dx < dots_x(view->plot); dx++) {
 		int top;
 		int bottom;
 
-		if (!covered(plot, panel, cell * dots_x(plot) + dx, axis, height, &top, &bottom)) {
+		if (!covered(view, cell * dots_x(view->plot) + dx, &top, &bottom)) {
 			continue;
 		}
-		for (int dy = 0; dy < dots_y(plot); dy++) {
-			int y = row * dots_y(plot) + dy;
+		for (int dy = 0; dy < dots_y(view->plot); dy++) {
+			int y = row * dots_y(view->plot) + dy;
 
 			dots |= y >= top && y <= bottom ? bits[dy][dx] : 0;
 		}
@@ -230,25 +241,39 @@ static void write_label(int row, int rows, const struct span *axis, FILE *out)
 	}
 }
 
+/* A flat curve runs through the middle of its panel. */
+static void open_axis(struct span *axis)
+{
+	double magnitude = fabs(axis->max);
+
+	if (axis->is_empty || axis->max - axis->min <= magnitude * 1e-12) {
+		double pad = magnitude * 1e-9 > 1 ? magnitude * 1e-9 : 1;
+
+		axis->min -= pad;
+		axis->max += pad;
+	}
+}
+
 static void write_panel(const struct plot *plot, unsigned panel, int rows, FILE *out)
 {
-	struct span axis = span_of(plot, panel);
-	int height = rows * dots_y(plot);
+	struct view view = {
+		.plot = plot,
+		.panel = panel,
+		.axis = span_of(plot, panel),
+		.height = rows * dots_y(plot),
+	};
 
-	if (axis.is_empty) {
+	if (view.axis.is_empty) {
 		fprintf(out, "%s   no values yet\n", plot->spec.titles[panel]);
 	} else {
 		fprintf(out, "%s   now %.6g   min %.6g   max %.6g\n", plot->spec.titles[panel],
-			axis.last, axis.min, axis.max);
+			view.axis.last, view.axis.min, view.axis.max);
 	}
-	if (axis.is_empty || axis.max - axis.min < fabs(axis.max) * 1e-12 || axis.max == axis.min) {
-		axis.min -= 1;
-		axis.max += 1;
-	}
+	open_axis(&view.axis);
 	for (int row = 0; row < rows; row++) {
-		write_label(row, rows, &axis, out);
+		write_label(row, rows, &view.axis, out);
 		for (int cell = 0; cell < plot->cells; cell++) {
-			unsigned dots = cell_dots(plot, panel, cell, row, &axis, height);
+			unsigned dots = cell_dots(&view, cell, row);
 
 			if (dots == 0) {
 				fputc(' ', out);

@@ -1,6 +1,4 @@
 /* SPDX-License-Identifier: MIT */
-#include <string.h>
-
 #include "base/event.h"
 #include "cli/report.h"
 #include "cli/source.h"

@@ -88,7 +88,7 @@ static uint64_t bits_of(const struct admin_reply *reply)
 static void format_hex(const struct admin_reply *reply, char *buf, size_t buf_len)
 {
 	buf[0] = '\0';
-	for (uint32_t i = 0; i < reply->data_len && 3 * i + 4 < buf_len; i++) {
+	for (size_t i = 0; i < reply->data_len && 3 * i + 4 < buf_len; i++) {
 		snprintf(buf + 3 * i, buf_len - 3 * i, "%02x ", reply->data[i]);
 	}
 	if (buf[0] != '\0') {

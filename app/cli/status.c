@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* ecdaq status */
-#include <stdio.h>
-
 #include "cli/args.h"
 #include "cli/report.h"
 #include "cli/source.h"

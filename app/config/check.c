@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* How options must fit to each other. */
 #include <errno.h>
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 

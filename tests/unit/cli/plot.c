@@ -168,6 +168,20 @@ TEST(plot, panels_share_the_rows)
 	plot_destroy(plot);
 }
 
+TEST(plot, flat_curve_of_a_huge_value_runs_through_the_middle)
+{
+	struct plot *plot = make(1, PLOT_ASCII);
+
+	for (int i = 0; i < 40; i++) {
+		plot_add(plot, 0, i * NS_PER_MS, 8e17);
+	}
+	lines_of(plot, 14, lines);
+	for (int row = 1; row <= 11; row++) {
+		CHECK_EQ(lines[row][11 + 20], row == 6 ? '*' : ' ');
+	}
+	plot_destroy(plot);
+}
+
 TEST(plot, extreme_values_do_no_harm)
 {
 	struct plot *plot = make(1, PLOT_BRAILLE);
