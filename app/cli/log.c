@@ -4,13 +4,33 @@
 
 #ifdef ECDAQ_HAVE_RECORD
 
+#include <stdio.h>
+#include <stdlib.h>
+
 #include "record/log.h"
 
 enum cli_exit verb_log(struct cli *cli, int argc, char **argv)
 {
-	(void)cli;
+	char config[CONFIG_PATH_BYTES + 16];
+	char **words = calloc((size_t)argc + 3, sizeof(*words));
+	int count = 0;
+	int result;
+
+	if (words == NULL) {
+		return cli_fail(cli, CLI_FAILED, "out of memory");
+	}
 	/* argv[-1] is the verb itself: log_main() takes it for the program's name. */
-	return (enum cli_exit)log_main(argc + 1, argv - 1);
+	for (int i = -1; i < argc; i++) {
+		words[count++] = argv[i];
+		/* A configuration named before the verb is meant for it, too. */
+		if (i == 0 && cli->config != NULL) {
+			snprintf(config, sizeof(config), "--config=%s", cli->config);
+			words[count++] = config;
+		}
+	}
+	result = log_main(count, words);
+	free(words);
+	return (enum cli_exit)result;
 }
 
 #else
