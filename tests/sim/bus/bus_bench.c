@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 #include "sim/bus/bus_bench.h"
 
+#include "base/bytes.h"
 #include "base/prng.h"
 #include "harness/test.h"
 #include "sim/catalogue.h"
 #include "sim/devices/fb1111_piccolo.h"
+#include "wire/datagram.h"
 
-enum { SETTLE_CYCLES = 400, WATCH_CYCLES = 50, TRANSMIT_NS = 4000, SIGMA_NS = 2000 };
+enum { SETTLE_CYCLES = 400, WATCH_CYCLES = 50, TRANSMIT_NS = 4000, SIGMA_NS = 2000, FEATURES_DC = 0x000c, MAILBOX_START = 0x1000 };
 
 #define TAI_START_NS (INT64_C(1795000000) * NS_PER_S)
 #define DATA_FOLDER "../shared/data/sii"
@@ -34,6 +36,7 @@ static void make_segment(struct bus_bench *b, const struct bench_spec *spec)
 {
 	static struct segment_slave_spec slaves[LIMIT_SLAVES];
 	static uint8_t sii[BENCH_SIIS][SEGMENT_SII_BYTES];
+	static struct esc_features clockless;
 	struct prng prng = { spec->seed };
 	size_t n = 0;
 
@@ -45,7 +48,14 @@ static void make_segment(struct bus_bench *b, const struct bench_spec *spec)
 
 		CHECK_EQ(catalogue_sii_slave(sii[i], len, (int)n, &slaves[n]), 0);
 	}
+	clockless = esc_et1100;
+	clockless.dc = ESC_DC_NONE;
+	clockless.has_sync_unit = 0;
+	clockless.features = (uint16_t)(clockless.features & ~FEATURES_DC);
 	for (size_t i = 0; i < n; i++) {
+		if ((spec->clockless >> i & 1) != 0) {
+			slaves[i].features = &clockless;
+		}
 		slaves[i].ppm = spec->ppm[i];
 		slaves[i].clock_start_ns = spec->clock_start_ns[i] != 0 ?
 						   spec->clock_start_ns[i] :
@@ -54,9 +64,40 @@ static void make_segment(struct bus_bench *b, const struct bench_spec *spec)
 	CHECK_EQ(segment_create(slaves, n, 0, &b->segment), 0);
 }
 
+/* --- the master's transport: the host's, counted --- */
+
+static int counted_send(void *ctx, const uint8_t *frame, size_t frame_len)
+{
+	struct bus_bench *b = ctx;
+
+	b->frames_sent++;
+	b->mailbox_writes += frame[16] == ECAT_CMD_FPWR && get_le16(frame + 20) == MAILBOX_START;
+	return b->wire.send(b->wire.ctx, frame, frame_len);
+}
+
+static int counted_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadline, mono_t *ret_at)
+{
+	struct bus_bench *b = ctx;
+
+	return b->wire.receive(b->wire.ctx, frame, capacity, deadline, ret_at);
+}
+
+unsigned bench_frames_sent(const struct bus_bench *b)
+{
+	return b->frames_sent;
+}
+
+unsigned bench_mailbox_writes(const struct bus_bench *b)
+{
+	return b->mailbox_writes;
+}
+
 static void make_master(struct bus_bench *b)
 {
-	CHECK_EQ(line_create(in_process_platform(b->host), in_process_transport(b->host), &b->line), 0);
+	struct transport transport = { .send = counted_send, .receive = counted_receive, .ctx = b };
+
+	b->wire = in_process_transport(b->host);
+	CHECK_EQ(line_create(in_process_platform(b->host), transport, &b->line), 0);
 	line_bind(b->line);
 	CHECK_EQ(bus_create(&b->cfg, b->line, &b->bus), 0);
 }

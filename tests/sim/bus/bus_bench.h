@@ -22,6 +22,7 @@ struct bench_spec {
 	double ppm[LIMIT_SLAVES];
 	double host_ppm;
 	uint64_t seed;
+	uint64_t clockless;             /* bit n: slave n has no distributed clock */
 	int64_t tai_start_ns;           /* 0: 2026 */
 	uint64_t clock_start_ns[LIMIT_SLAVES];
 	const char *const *settings;    /* of config_set(), NULL at the end */
@@ -31,6 +32,9 @@ struct bus_bench {
 	struct segment *segment;
 	struct in_process *host;
 	struct fault_plan *faults;
+	struct transport wire;          /* of the host; the master's goes through the bench */
+	unsigned frames_sent;
+	unsigned mailbox_writes;
 	struct config cfg;
 	struct line *line;
 	struct bus *bus;
@@ -72,6 +76,10 @@ int bench_stop(struct bus_bench *b);
 
 /** A line of sim/fault.h; its times count from now. */
 void bench_fault(struct bus_bench *b, const char *line);
+/** Frames that any master sent so far. */
+unsigned bench_frames_sent(const struct bus_bench *b);
+/** Of those, writes to a board's mailbox. */
+unsigned bench_mailbox_writes(const struct bus_bench *b);
 /** True time. */
 int64_t bench_now_ns(const struct bus_bench *b);
 const struct channel *bench_channel(const struct bus_bench *b, const char *name);
