@@ -31,9 +31,13 @@ struct esc_features {
 	uint8_t port_descriptor;
 	uint16_t features;
 	enum esc_dc_kind dc;
-	int has_sync_unit;     /* 0x0980 to 0x09a7 */
+	int has_sync_unit;            /* 0x0980 to 0x09a7 */
+	int is_dc_by_eeprom;          /* 0x0141 bits 2 and 3, if both 0, leave the receive times alone */
+	int has_open_bits;            /* SyncManager status bits 6 and 7: a buffer is open */
 	unsigned eeprom_bytes_a_read; /* 4 or 8 */
-	int is_device_emulation;
+	int has_long_eeprom;          /* two address bytes: 0x0502 bit 7 */
+	/* What 0x0900 to 0x090f hold before a port has seen a frame. */
+	uint32_t receive_time_at_power_on[4];
 };
 
 /* ET1100: 8 FMMUs, 8 SMs, 8 KiB, 64-bit DC, four ports. */
@@ -46,7 +50,7 @@ enum {
 	ESC_LIMIT_FMMU = 16,
 };
 
-/* AL event request bits (0x0220). */
+/* AL event request bits (0x0220). SM and SYNC bits come only where 0x0804 and 0x0151 let them. */
 enum esc_al_event {
 	ESC_AL_EVENT_CONTROL = 1u << 0,
 	ESC_AL_EVENT_SYNC0 = 1u << 2,
@@ -56,20 +60,29 @@ enum esc_al_event {
 	ESC_AL_EVENT_SM0 = 1u << 8,
 };
 
+/* ECAT event request bits (0x0210), which with 0x0200 are put into each datagram's IRQ field. */
+enum esc_ecat_event {
+	ESC_ECAT_EVENT_DL_STATUS = 1u << 2,
+	ESC_ECAT_EVENT_AL_STATUS = 1u << 3,
+	ESC_ECAT_EVENT_SM0 = 1u << 4,
+};
+
 /* The buffers behind one SyncManager. */
 struct esc_sm {
 	uint16_t start;
 	uint16_t len;
 	uint8_t control;
-	uint8_t is_active;     /* by the master's activate and the PDI's control bit */
+	uint8_t is_active; /* by the master's activate and the PDI's control bit */
 	uint8_t is_mailbox;
-	uint8_t is_ecat_write; /* the master writes, the PDI reads */
-	uint8_t is_full;       /* mailbox */
-	uint8_t has_data;      /* buffered: something was written since activation */
-	uint8_t writer;        /* buffered: index of the writer's buffer, 0 to 2 */
-	uint8_t newest;        /* buffered: last complete one */
-	uint8_t reader;        /* buffered: the one the reader has */
-	uint8_t ecat_repeat;   /* repeat request bit as last seen */
+	uint8_t is_ecat_write;  /* the master writes, the PDI reads */
+	uint8_t is_reader_open; /* between the first and the last byte of the area */
+	uint8_t is_writer_open;
+	uint8_t is_full;  /* mailbox */
+	uint8_t has_data; /* buffered: something was written since activation */
+	uint8_t writer;   /* buffered: index of the writer's buffer, 0 to 2 */
+	uint8_t newest;   /* buffered: last complete one */
+	uint8_t reader;   /* buffered: the one the reader has */
+	uint8_t activate; /* 0x0806 as last seen */
 };
 
 struct esc_fmmu {
@@ -86,25 +99,31 @@ struct esc_fmmu {
 
 /* The clock: system time s at true time t, and how fast it runs. */
 struct esc_clock {
-	double ppm;            /* of the crystal */
-	double correction;     /* of the time loop control, relative */
+	double ppm;        /* of the crystal */
+	double correction; /* of the time loop control, relative */
 	int64_t base_true_ns;
 	uint64_t base_local_ns;
 	double base_fraction;
-	uint64_t offset_ns;    /* 0x0920 */
+	uint64_t offset_ns; /* 0x0920 */
 	double diff_filtered_ns;
-	double integral;       /* frequency part of the correction, relative */
+	double integral; /* frequency part of the correction, relative */
 	int64_t last_compare_true_ns;
-	uint8_t time_filter;   /* depth in force: 0x0934 as of the last write to 0x0930 */
+	uint8_t time_filter; /* depth in force: 0x0934 as of the last write to 0x0930 */
 	uint8_t speed_filter;
 	uint16_t speed_start;
 };
 
 struct esc_sync {
+	uint8_t activation; /* 0x0981 in force */
 	uint8_t is_running;
-	uint8_t is_single;     /* SYNC0 cycle time 0 */
-	uint64_t next_local_ns;/* system time of the next SYNC0 */
-	int64_t next_true_ns;  /* INT64_MAX: none */
+	uint8_t is_pending;     /* the first SYNC0 has not come yet */
+	uint8_t is_sync0_high;  /* acknowledge mode: until the PDI reads 0x098e */
+	uint32_t cycle_ns;      /* SYNC0; 0: once */
+	uint32_t sync1_ns;      /* 0x09a4 */
+	uint64_t next_local_ns; /* system time of the next SYNC0 */
+	int64_t next_true_ns;   /* INT64_MAX: none */
+	uint64_t next1_local_ns;
+	int64_t next1_true_ns;
 	uint64_t edges;
 };
 
@@ -122,25 +141,32 @@ struct esc {
 	struct esc_clock clock;
 	struct esc_sync sync;
 	uint32_t al_event;
+	uint32_t ecat_event;
+	uint32_t sm_activations; /* bit n: 0x0806 + 8n changed and was not read by the PDI */
 	uint8_t *sii;
 	size_t sii_bytes;
 	int is_eeprom_loaded;
+	int was_eeprom_loaded;        /* the alias is taken once only */
 	int64_t eeprom_busy_until_ns; /* 0: idle */
 	uint16_t eeprom_command;
-	int64_t watchdog_deadline_ns; /* INT64_MAX: not running */
+	int64_t watchdog_deadline_ns;     /* process data; INT64_MAX: not running */
+	int64_t pdi_watchdog_deadline_ns; /* INT64_MAX: not running, or expired */
+	int64_t mailbox_stuck_until_ns;   /* a fault: the PDI's mailbox writes are lost */
+	uint8_t ports;                    /* with a link */
+	uint8_t is_loop_changed;          /* 0x0101 was written: the segment looks */
 	esc_sync0_sink sink;
 	void *sink_ctx;
 };
 
 /* When the start of a frame passed this slave. */
 struct esc_frame {
-	int64_t pu_ns;        /* the processing unit */
-	int64_t port_ns[4];   /* each port on the way in; unused ports 0 */
-	uint8_t ports_used;   /* bit n: port n has a link */
+	int64_t pu_ns;      /* the processing unit */
+	int64_t port_ns[4]; /* each port on the way in; unused ports 0 */
+	uint8_t ports_used; /* bit n: port n has a link */
 };
 
 /**
- * Power on with SII contents @sii (kept by reference, writable: the EEPROM). @local_ns is what the clock starts at.
+ * Power on with SII contents @sii (kept by reference, writable: the EEPROM). The clock starts at 0.
  */
 void esc_init(struct esc *esc, const struct esc_features *features, uint8_t *sii, size_t sii_bytes,
 	      int64_t t_ns);
@@ -149,27 +175,39 @@ void esc_clock_start(struct esc *esc, int64_t t_ns, uint64_t local_ns, double pp
 void esc_clock_drift(struct esc *esc, int64_t t_ns, double ppm);
 void esc_sync0_to(struct esc *esc, esc_sync0_sink sink, void *ctx);
 
-/** Take part in one datagram of a frame; changes its address, data and working counter in place. */
+/** Take part in one datagram of a frame; changes its address, IRQ, data and working counter. */
 void esc_datagram(struct esc *esc, const struct esc_frame *frame, struct ecat_datagram *dg);
 
-/** True time of the ESC's next own event (SYNC0 edge, watchdog, EEPROM done); INT64_MAX: none. */
+/** True time of the ESC's next own event (SYNC edge, watchdog, EEPROM done); INT64_MAX: none. */
 int64_t esc_next_event_ns(const struct esc *esc);
 /** Run all own events up to and including @t_ns. */
 void esc_advance(struct esc *esc, int64_t t_ns);
 
-/** System time (0x0910) at true time @t_ns; and the true time at which it will be @system_ns. */
+/** Copy of the system time at true time @t_ns (what the PDI reads from 0x0910). */
 uint64_t esc_system_time(const struct esc *esc, int64_t t_ns);
 
-/** PDI access. Reading or writing the first and last byte of a SyncManager's area opens and closes its buffer. */
+/**
+ * PDI access. The first byte of a SyncManager's area opens its buffer, the last one closes it; bytes
+ * between are refused unless it is open. Nothing works before the EEPROM is loaded.
+ */
 void esc_pdi_read(struct esc *esc, int64_t t_ns, uint16_t addr, void *buf, size_t len);
 void esc_pdi_write(struct esc *esc, int64_t t_ns, uint16_t addr, const void *buf, size_t len);
 int esc_eeprom_loaded(const struct esc *esc);
 /** Level of the PDI's interrupt: AL event request and mask. */
 int esc_irq(const struct esc *esc);
 
-/** Count an error on @port: 0 invalid frame (0x0300), 1 RX error (0x0301), 2 forwarded (0x0308), 3 lost link (0x0310). */
-void esc_count_error(struct esc *esc, unsigned port, unsigned kind);
-/** Which ports have a link: into DL status (0x0110). */
+enum esc_error {
+	ESC_ERROR_INVALID_FRAME, /* 0x0300 */
+	ESC_ERROR_RX,            /* 0x0301 */
+	ESC_ERROR_FORWARDED,     /* 0x0308 */
+	ESC_ERROR_LOST_LINK,     /* 0x0310 */
+	ESC_ERROR_UNIT,          /* 0x030c; has no port */
+};
+void esc_count_error(struct esc *esc, unsigned port, enum esc_error error);
+/** Which ports have a link, into DL status (0x0110); and which the master has closed (0x0101). */
 void esc_set_links(struct esc *esc, uint8_t ports);
+int esc_is_port_closed(const struct esc *esc, unsigned port);
+/** AL status and code as a fault sets them, whoever the application is. */
+void esc_force_al_status(struct esc *esc, uint8_t status, uint16_t code);
 
 #endif

@@ -7,42 +7,49 @@
 #include "sim/esc.h"
 #include "wire/esc_reg.h"
 
-/* --- esc_sm.c --- */
-
+/* Who accesses, and when. A frame's registers are all latched at its start. */
 enum esc_side { ESC_ECAT, ESC_PDI };
 
-/** The SyncManager whose area holds @addr, or NULL. */
-struct esc_sm *esc_sm_at(struct esc *esc, uint16_t addr);
+/* --- esc_sm.c --- */
+
 /**
- * Process RAM from one side, SyncManagers minded. 1 if the access was allowed (at least one byte), else 0 and
- * nothing changed. @addr .. @addr + @len lies in 0x1000 and up.
+ * Process RAM from one side, SyncManagers minded. 1 if at least one byte was allowed. What was not is
+ * left alone, in @buf too. @addr is 0x1000 or more.
  */
 int esc_ram_read(struct esc *esc, enum esc_side side, uint16_t addr, uint8_t *buf, size_t len);
 int esc_ram_write(struct esc *esc, enum esc_side side, int64_t t_ns, uint16_t addr,
 		  const uint8_t *buf, size_t len);
-/** The SM registers of SM @n were written by @side: take them over. */
+/** The SM registers of SM @n were written: take them over. */
 void esc_sm_configure(struct esc *esc, unsigned n, enum esc_side side);
-/** Put the status byte of every SM into the register file. */
-void esc_sm_status(struct esc *esc, unsigned n);
+/** The digital outputs at 0x0f00 were written up to before @end: what an SM over them does. */
+void esc_sm_outputs_written(struct esc *esc, int64_t t_ns, uint16_t addr, size_t len);
+/** The area of an active SM at @addr as it would be read back, for bits that a write leaves alone. */
+const uint8_t *esc_ram_last_written(const struct esc *esc, uint16_t addr);
 
 /* --- esc_fmmu.c --- */
 
 void esc_fmmu_configure(struct esc *esc, unsigned n);
 /** A logical datagram; adds to the working counter. */
-void esc_fmmu_access(struct esc *esc, int64_t t_ns, struct ecat_datagram *dg);
+void esc_fmmu_access(struct esc *esc, const struct esc_frame *frame, struct ecat_datagram *dg);
 
 /* --- esc_register.c --- */
 
 void esc_register_layout(struct esc *esc);
-/** Registers from the wire; 1 if at least one byte exists (is writable). */
-int esc_register_read(struct esc *esc, const struct esc_frame *frame, uint16_t addr, uint8_t *buf,
-		      size_t len);
+/** Registers; 1 if at least one byte exists (is writable by the master). */
+int esc_register_read(struct esc *esc, enum esc_side side, int64_t t_ns, uint16_t addr,
+		      uint8_t *buf, size_t len);
 int esc_register_write(struct esc *esc, const struct esc_frame *frame, uint16_t addr,
 		       const uint8_t *buf, size_t len);
+static inline int esc_touches(uint16_t addr, size_t len, unsigned reg, size_t reg_len)
+{
+	return addr < reg + reg_len && reg < addr + len;
+}
 
 /* --- esc_clock.c --- */
 
 uint64_t esc_local_time(const struct esc *esc, int64_t t_ns);
+/** First true time at or after @t_ns at which the copy of the system time is @system_ns; INT64_MAX. */
+int64_t esc_clock_when(const struct esc *esc, int64_t t_ns, uint64_t system_ns);
 /** The master's time @received came with a frame that passed at @t_ns: compare and regulate. */
 void esc_clock_compare(struct esc *esc, int64_t t_ns, uint64_t received_ns);
 /** 0x0930 was written: filters in force from now on, loop reset. */
@@ -56,10 +63,19 @@ void esc_sync_activate(struct esc *esc, int64_t t_ns);
 /** The clock's rate or offset changed: when is the next edge? */
 void esc_sync_replan(struct esc *esc, int64_t t_ns);
 void esc_sync_edge(struct esc *esc);
+void esc_sync1_edge(struct esc *esc);
+/** 0x098e or 0x098f was read by the PDI. */
+void esc_sync_acknowledge(struct esc *esc, unsigned sync);
+/** 0x0984, 0x098e, 0x0990, 0x0998 as they are now. */
+void esc_sync_to_registers(struct esc *esc);
 
 /* --- esc_eeprom.c --- */
 
 void esc_eeprom_power_on(struct esc *esc, int64_t t_ns);
+/** 0x0500 or 0x0501 was written by @side. */
+void esc_eeprom_owner(struct esc *esc, enum esc_side side);
+/** May @side write 0x0502 to 0x050f now? */
+int esc_eeprom_is_free(const struct esc *esc, enum esc_side side);
 void esc_eeprom_command(struct esc *esc, int64_t t_ns, uint16_t control);
 void esc_eeprom_done(struct esc *esc);
 
@@ -68,6 +84,10 @@ void esc_eeprom_done(struct esc *esc);
 void esc_watchdog_trigger(struct esc *esc, int64_t t_ns);
 void esc_watchdog_stop(struct esc *esc);
 void esc_watchdog_expire(struct esc *esc);
+/** The PDI has done something. */
+void esc_pdi_watchdog_trigger(struct esc *esc, int64_t t_ns);
+void esc_pdi_watchdog_expire(struct esc *esc);
+int esc_pdi_watchdog_is_running(const struct esc *esc);
 
 static inline int esc_bit(const uint8_t *map, unsigned n)
 {

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* ecdaq-sim: the simulated segment on a network interface, in real time. */
 #include <errno.h>
-#include <getopt.h>
 #include <sched.h>
 #include <signal.h>
 #include <stdatomic.h>
@@ -17,45 +16,11 @@
 #include "sim/control.h"
 #include "sim/devices/fb1111_piccolo.h"
 #include "sim/fault.h"
+#include "sim/options.h"
 #include "sim/segment.h"
 #include "sim/wire_socket.h"
 
-enum { PIECE_BYTES = 96, CATCH_UP_NS = 1000000, HELD_MAX = 64, FRAME_BYTES = 1600 };
-
-static const char usage_text[] =
-	"usage: ecdaq-sim --interface NIC [OPTION...]\n"
-	"\n"
-	"A simulated EtherCAT segment on a network interface.\n"
-	"\n"
-	"  --interface NIC    where the master is: a veth, a tap, a real NIC\n"
-	"  --slaves WHAT      1 to 64: so many FB1111+Piccolo slaves (default 2); or names in order, of\n"
-	"                     SII images in --sii: ek1100,el2828; fb1111_piccolo is built in\n"
-	"  --sii DIR          folder of SII images NAME.bin\n"
-	"  --ppm A,B,...      crystals of the slaves, ppm (default: seeded, +-50)\n"
-	"  --signal SPEC      sine:HZ:V:OFFSET_V[:PHASE_DEG] at every ADC (default sine:1:0.5:1)\n"
-	"  --seed N           of everything that is random (default 1)\n"
-	"  --faults FILE      fault plan; times count from the first frame\n"
-	"  --control SOCKET   take fault lines at run time, one a datagram, times from now\n"
-	"  --edges FILE       write every SYNC0 edge: slave, CLOCK_MONOTONIC ns, DC ns\n"
-	"  --priority N       SCHED_FIFO\n"
-	"  --cpu N            run on this core only\n"
-	"  --help, --version\n"
-	"\n"
-	"exit codes: 0 ended by a signal, 1 failed, 2 wrong options\n";
-
-struct options {
-	const char *interface;
-	const char *slaves;
-	const char *sii_dir;
-	const char *ppm;
-	const char *faults;
-	const char *control;
-	const char *edges;
-	struct signal_spec signal;
-	uint64_t seed;
-	int priority;
-	int cpu;
-};
+enum { PIECE_BYTES = 96, SII_PATH_BYTES = 1024, CATCH_UP_NS = 1000000, HELD_MAX = 64, FRAME_BYTES = 1600 };
 
 /* A frame that a fault holds back. */
 struct held {
@@ -66,7 +31,7 @@ struct held {
 };
 
 struct simulation {
-	struct options opt;
+	struct sim_options opt;
 	struct segment *segment;
 	struct fault_plan *faults;
 	struct held held[HELD_MAX];
@@ -86,137 +51,23 @@ static void on_signal(int number)
 	atomic_store_explicit(&stop_wanted, 1, memory_order_relaxed);
 }
 
-static int complain(const char *what)
-{
-	fprintf(stderr, "ecdaq-sim: %s\n", what);
-	return -1;
-}
-
-/* --- options --- */
-
-static int number_of(const char *text, const char *what, long low, long high, long *ret)
-{
-	char line[128];
-	char *end;
-	long v = strtol(text, &end, 0);
-
-	if (end == text || *end != '\0' || v < low || v > high) {
-		snprintf(line, sizeof(line), "%s: '%.40s' is not %ld to %ld", what, text, low, high);
-		return complain(line);
-	}
-	*ret = v;
-	return 0;
-}
-
-static int take_option(int c, const char *value, struct options *opt)
-{
-	long n = 0;
-
-	switch (c) {
-	case 'i':
-		opt->interface = value;
-		return 0;
-	case 'n':
-		opt->slaves = value;
-		return 0;
-	case 'd':
-		opt->sii_dir = value;
-		return 0;
-	case 'p':
-		opt->ppm = value;
-		return 0;
-	case 'f':
-		opt->faults = value;
-		return 0;
-	case 'c':
-		opt->control = value;
-		return 0;
-	case 'e':
-		opt->edges = value;
-		return 0;
-	case 'g':
-		return signal_parse(value, &opt->signal) < 0
-			       ? complain("--signal: not sine:HZ:V:OFFSET_V[:PHASE_DEG]")
-			       : 0;
-	case 's':
-		if (number_of(value, "--seed", 0, INT32_MAX, &n) < 0) {
-			return -1;
-		}
-		opt->seed = (uint64_t)n;
-		return 0;
-	case 'r':
-		if (number_of(value, "--priority", 1, 99, &n) < 0) {
-			return -1;
-		}
-		opt->priority = (int)n;
-		return 0;
-	case 'u':
-		if (number_of(value, "--cpu", 0, 1023, &n) < 0) {
-			return -1;
-		}
-		opt->cpu = (int)n;
-		return 0;
-	default:
-		return -1;
-	}
-}
-
-static void read_options(int argc, char **argv, struct options *opt)
-{
-	static const struct option table[] = {
-		{ "interface", required_argument, NULL, 'i' },
-		{ "slaves", required_argument, NULL, 'n' },
-		{ "sii", required_argument, NULL, 'd' },
-		{ "ppm", required_argument, NULL, 'p' },
-		{ "signal", required_argument, NULL, 'g' },
-		{ "seed", required_argument, NULL, 's' },
-		{ "faults", required_argument, NULL, 'f' },
-		{ "control", required_argument, NULL, 'c' },
-		{ "edges", required_argument, NULL, 'e' },
-		{ "priority", required_argument, NULL, 'r' },
-		{ "cpu", required_argument, NULL, 'u' },
-		{ "help", no_argument, NULL, 'h' },
-		{ "version", no_argument, NULL, 'v' },
-		{ NULL, 0, NULL, 0 },
-	};
-	int c;
-
-	while ((c = getopt_long(argc, argv, "", table, NULL)) != -1) {
-		if (c == 'h') {
-			fputs(usage_text, stdout);
-			exit(0);
-		}
-		if (c == 'v') {
-			puts("ecdaq-sim " ECDAQ_VERSION);
-			exit(0);
-		}
-		if (c == '?' || take_option(c, optarg, opt) < 0) {
-			exit(2);
-		}
-	}
-	if (optind < argc) {
-		complain("more words than options (see --help)");
-		exit(2);
-	}
-	if (opt->interface == NULL) {
-		complain("--interface is missing: on which NIC is the master?");
-		exit(2);
-	}
-}
-
 /* --- making the segment --- */
 
 static int read_sii(struct simulation *sim, const char *name, unsigned i, size_t *ret_bytes)
 {
-	char path[512];
-	char line[600];
+	char path[SII_PATH_BYTES];
+	char line[SII_PATH_BYTES + 64];
 	FILE *file;
+	int len;
 
 	if (sim->opt.sii_dir == NULL) {
-		snprintf(line, sizeof(line), "slave '%s': --sii DIR is missing", name);
-		return complain(line);
+		snprintf(line, sizeof(line), "slave '%.60s': --sii DIR is missing", name);
+		return sim_complain(line);
 	}
-	snprintf(path, sizeof(path), "%s/%s.bin", sim->opt.sii_dir, name);
+	len = snprintf(path, sizeof(path), "%s/%s.bin", sim->opt.sii_dir, name);
+	if (len >= (int)sizeof(path)) {
+		return sim_complain("--sii: path too long");
+	}
 	file = fopen(path, "rb");
 	sim->sii[i] = malloc(SEGMENT_SII_BYTES);
 	if (file == NULL || sim->sii[i] == NULL) {
@@ -224,7 +75,7 @@ static int read_sii(struct simulation *sim, const char *name, unsigned i, size_t
 		if (file != NULL) {
 			fclose(file);
 		}
-		return complain(line);
+		return sim_complain(line);
 	}
 	*ret_bytes = fread(sim->sii[i], 1, SEGMENT_SII_BYTES, file);
 	fclose(file);
@@ -258,7 +109,7 @@ static int list_slaves(struct simulation *sim, char names[LIMIT_SLAVES][PIECE_BY
 
 	if (*end == '\0' && end != text) {
 		if (count < 1 || count > LIMIT_SLAVES) {
-			return complain("--slaves: not 1 to 64");
+			return sim_complain("--slaves: not 1 to 64");
 		}
 		for (; n < count; n++) {
 			snprintf(names[n], PIECE_BYTES, "fb1111_piccolo");
@@ -270,12 +121,12 @@ static int list_slaves(struct simulation *sim, char names[LIMIT_SLAVES][PIECE_BY
 
 		if (n == LIMIT_SLAVES || len == 0 || len >= PIECE_BYTES ||
 		    memchr(text, '/', len) != NULL) {
-			return complain("--slaves: a list of at most 64 names is NAME,NAME,...");
+			return sim_complain("--slaves: a list of at most 64 names is NAME,NAME,...");
 		}
 		snprintf(names[n++], PIECE_BYTES, "%.*s", (int)len, text);
 		text += len + (text[len] == ',');
 	}
-	return n > 0 ? n : complain("--slaves: nothing given");
+	return n > 0 ? n : sim_complain("--slaves: nothing given");
 }
 
 static int set_crystals(const struct simulation *sim, struct segment_slave_spec *specs, int count)
@@ -292,7 +143,7 @@ static int set_crystals(const struct simulation *sim, struct segment_slave_spec 
 			specs[i].ppm = strtod(text, &end);
 			if (end == text || (*end != ',' && *end != '\0') || specs[i].ppm < -1000 ||
 			    specs[i].ppm > 1000) {
-				return complain("--ppm: numbers from -1000 to 1000, with commas");
+				return sim_complain("--ppm: numbers from -1000 to 1000, with commas");
 			}
 			text = *end == ',' ? end + 1 : end;
 		}
@@ -318,7 +169,7 @@ static int make_segment(struct simulation *sim)
 		return -1;
 	}
 	if (segment_create(specs, (size_t)count, wire_socket_now_ns(), &sim->segment) < 0) {
-		return complain("the segment cannot be made: no memory");
+		return sim_complain("the segment cannot be made: no memory");
 	}
 	return 0;
 }
@@ -337,18 +188,18 @@ static int open_all(struct simulation *sim)
 
 	sim->faults = fault_plan_create(sim->opt.seed, wire_socket_now_ns());
 	if (sim->faults == NULL) {
-		return complain("no memory");
+		return sim_complain("no memory");
 	}
 	if (sim->opt.faults != NULL &&
 	    fault_plan_load(sim->faults, sim->opt.faults, segment_slave_count(sim->segment), error,
 			    sizeof(error)) < 0) {
-		return complain(error);
+		return sim_complain(error);
 	}
 	if (sim->opt.edges != NULL) {
 		sim->edges = fopen(sim->opt.edges, "w");
 		if (sim->edges == NULL) {
 			snprintf(error, sizeof(error), "%s: %s", sim->opt.edges, strerror(errno));
-			return complain(error);
+			return sim_complain(error);
 		}
 		segment_sync0_to(sim->segment, write_edge, sim);
 	}
@@ -356,14 +207,14 @@ static int open_all(struct simulation *sim)
 	if (sim->opt.control != NULL) {
 		sim->control_fd = control_open(sim->opt.control, error, sizeof(error));
 		if (sim->control_fd < 0) {
-			return complain(error);
+			return sim_complain(error);
 		}
 	}
 	sim->fd = wire_socket_open(sim->opt.interface, error, sizeof(error));
-	return sim->fd < 0 ? complain(error) : 0;
+	return sim->fd < 0 ? sim_complain(error) : 0;
 }
 
-static void go_real_time(const struct options *opt)
+static void go_real_time(const struct sim_options *opt)
 {
 	struct sched_param p = { .sched_priority = opt->priority };
 	cpu_set_t set;
@@ -466,7 +317,7 @@ static int serve(struct simulation *sim)
 		if (n < 0 && n != -ENETDOWN) {
 			snprintf(line, sizeof(line), "interface %s: %s", sim->opt.interface,
 				 strerror(-n));
-			return complain(line);
+			return sim_complain(line);
 		}
 		/* Nobody asks: let the slaves live on meanwhile, so that no frame has to wait for them. */
 		segment_advance(sim->segment, wire_socket_now_ns());
@@ -488,7 +339,7 @@ int main(int argc, char **argv)
 	int r;
 
 	sim.opt.signal = signal_default();
-	read_options(argc, argv, &sim.opt);
+	sim_options_read(argc, argv, &sim.opt);
 	sigaction(SIGTERM, &action, NULL);
 	sigaction(SIGINT, &action, NULL);
 	if (make_segment(&sim) < 0 || open_all(&sim) < 0) {

@@ -1,0 +1,144 @@
+/* SPDX-License-Identifier: MIT */
+#include "sim/options.h"
+
+#include <getopt.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+static const char usage_text[] =
+	"usage: ecdaq-sim --interface NIC [OPTION...]\n"
+	"\n"
+	"A simulated EtherCAT segment on a network interface.\n"
+	"\n"
+	"  --interface NIC    where the master is: a veth, a tap, a real NIC\n"
+	"  --slaves WHAT      1 to 64: so many FB1111+Piccolo slaves (default 2); or names in order, of\n"
+	"                     SII images in --sii: ek1100,el2828; fb1111_piccolo is built in\n"
+	"  --sii DIR          folder of SII images NAME.bin\n"
+	"  --ppm A,B,...      crystals of the slaves, ppm (default: seeded, +-50)\n"
+	"  --signal SPEC      sine:HZ:V:OFFSET_V[:PHASE_DEG] at every ADC (default sine:1:0.5:1)\n"
+	"  --seed N           of everything that is random (default 1)\n"
+	"  --faults FILE      fault plan; times count from the first frame\n"
+	"  --control SOCKET   take fault lines at run time, one a datagram, times from now\n"
+	"  --edges FILE       write every SYNC0 edge: slave, CLOCK_MONOTONIC ns, DC ns\n"
+	"  --priority N       SCHED_FIFO\n"
+	"  --cpu N            run on this core only\n"
+	"  --help, --version\n"
+	"\n"
+	"exit codes: 0 ended by a signal, 1 failed, 2 wrong options\n";
+
+int sim_complain(const char *what)
+{
+	fprintf(stderr, "ecdaq-sim: %s\n", what);
+	return -1;
+}
+
+static int number_of(const char *text, const char *what, long low, long high, long *ret)
+{
+	char line[128];
+	char *end;
+	long v = strtol(text, &end, 0);
+
+	if (end == text || *end != '\0' || v < low || v > high) {
+		snprintf(line, sizeof(line), "%s: '%.40s' is not %ld to %ld", what, text, low, high);
+		return sim_complain(line);
+	}
+	*ret = v;
+	return 0;
+}
+
+static int take_option(int c, const char *value, struct sim_options *opt)
+{
+	long n = 0;
+
+	switch (c) {
+	case 'i':
+		opt->interface = value;
+		return 0;
+	case 'n':
+		opt->slaves = value;
+		return 0;
+	case 'd':
+		opt->sii_dir = value;
+		return 0;
+	case 'p':
+		opt->ppm = value;
+		return 0;
+	case 'f':
+		opt->faults = value;
+		return 0;
+	case 'c':
+		opt->control = value;
+		return 0;
+	case 'e':
+		opt->edges = value;
+		return 0;
+	case 'g':
+		return signal_parse(value, &opt->signal) < 0
+			       ? sim_complain("--signal: not sine:HZ:V:OFFSET_V[:PHASE_DEG]")
+			       : 0;
+	case 's':
+		if (number_of(value, "--seed", 0, INT32_MAX, &n) < 0) {
+			return -1;
+		}
+		opt->seed = (uint64_t)n;
+		return 0;
+	case 'r':
+		if (number_of(value, "--priority", 1, 99, &n) < 0) {
+			return -1;
+		}
+		opt->priority = (int)n;
+		return 0;
+	case 'u':
+		if (number_of(value, "--cpu", 0, 1023, &n) < 0) {
+			return -1;
+		}
+		opt->cpu = (int)n;
+		return 0;
+	default:
+		return -1;
+	}
+}
+
+void sim_options_read(int argc, char **argv, struct sim_options *opt)
+{
+	static const struct option table[] = {
+		{ "interface", required_argument, NULL, 'i' },
+		{ "slaves", required_argument, NULL, 'n' },
+		{ "sii", required_argument, NULL, 'd' },
+		{ "ppm", required_argument, NULL, 'p' },
+		{ "signal", required_argument, NULL, 'g' },
+		{ "seed", required_argument, NULL, 's' },
+		{ "faults", required_argument, NULL, 'f' },
+		{ "control", required_argument, NULL, 'c' },
+		{ "edges", required_argument, NULL, 'e' },
+		{ "priority", required_argument, NULL, 'r' },
+		{ "cpu", required_argument, NULL, 'u' },
+		{ "help", no_argument, NULL, 'h' },
+		{ "version", no_argument, NULL, 'v' },
+		{ NULL, 0, NULL, 0 },
+	};
+	int c;
+
+	while ((c = getopt_long(argc, argv, "", table, NULL)) != -1) {
+		if (c == 'h') {
+			fputs(usage_text, stdout);
+			exit(0);
+		}
+		if (c == 'v') {
+			puts("ecdaq-sim " ECDAQ_VERSION);
+			exit(0);
+		}
+		if (c == '?' || take_option(c, optarg, opt) < 0) {
+			exit(2);
+		}
+	}
+	if (optind < argc) {
+		sim_complain("more words than options (see --help)");
+		exit(2);
+	}
+	if (opt->interface == NULL) {
+		sim_complain("--interface is missing: on which NIC is the master?");
+		exit(2);
+	}
+}
+

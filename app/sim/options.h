@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: MIT */
+/* The command line of ecdaq-sim. */
+#ifndef SIM_OPTIONS_H
+#define SIM_OPTIONS_H
+
+#include <stdint.h>
+
+#include "sim/signal.h"
+
+struct sim_options {
+	const char *interface;
+	const char *slaves;
+	const char *sii_dir;
+	const char *ppm;
+	const char *faults;
+	const char *control;
+	const char *edges;
+	struct signal_spec signal;
+	uint64_t seed;
+	int priority;
+	int cpu;
+};
+
+/** Fill @opt over its defaults; ends the program on --help, --version (0) and on wrong options (2). */
+void sim_options_read(int argc, char **argv, struct sim_options *opt);
+
+/** "ecdaq-sim: WHAT" on stderr. Returns -1. */
+int sim_complain(const char *what);
+
+#endif
