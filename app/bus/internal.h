@@ -96,7 +96,7 @@ struct bus {
 	ec_slavet soem_slave[LIMIT_SLAVES + 1];
 	int soem_slave_count;
 	ec_groupt group[EC_MAXGROUP];
-	uint8_t sii_cache[EC_MAXEEPBUF + 8]; /* SOEM stores the last 8 bytes past the end */
+	uint8_t sii_cache[(EC_MAXEEPBUF) + 8]; /* SOEM stores the last 8 bytes past the end */
 	uint32_t sii_map[EC_MAXEEPBITMAP + 1];
 	ec_eringt errors;
 	ec_idxstackT index_stack;
