@@ -15,4 +15,4 @@ IMAGE_INSTALL = "ecdaq ecdaq-config"
 IMAGE_PREINSTALL = "init systemd-sysv udev dbus kmod \
                     openssh-server sudo chrony \
                     iproute2 ethtool iputils-ping nftables \
-                    e2fsprogs fdisk dosfstools procps less gpiod libddsc0debian zlib1g"
+                    e2fsprogs fdisk dosfstools procps less gpiod"

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: MIT
+"""One virtual machine a test file: fixtures, and the console log where a test failed."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+from machine import IMAGE, NAME, Machine
+
+KEEP = Path(__file__).resolve().parents[2] / "build" / "test-logs"
+
+
+@pytest.fixture(scope="session")
+def image() -> Path:
+    """The image under test. No image is a failure, not a skip."""
+    disk = IMAGE / f"{NAME}.img"
+    assert disk.exists(), "no image in build/image/qemuarm64: run ./build.sh image first"
+    assert os.geteuid() == 0, "boot tests need root (QEMU runs in the image chroot)"
+    return disk
+
+
+@pytest.fixture(scope="session")
+def key(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A key pair of this run; the public half has .pub behind its name."""
+    path = tmp_path_factory.mktemp("key") / "key"
+    subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", path], check=True)
+    return path
+
+
+@pytest.fixture(scope="module")
+def machine(
+    request: pytest.FixtureRequest, image: Path, key: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Machine]:
+    """The machine of a file, set up by its BOOT_FILES, up to its login prompt."""
+    vm = Machine(tmp_path_factory.mktemp("vm"), image, key)
+    files = dict(getattr(request.module, "BOOT_FILES", {}))
+    if getattr(request.module, "WITH_KEY", True):
+        files["authorized_keys"] = key.with_suffix(".pub").read_text()
+    failed_before = request.session.testsfailed
+    try:
+        vm.lay_boot_files(files)
+        vm.start()
+        vm.wait_for_login()
+        yield vm
+    finally:
+        vm.stop()
+        if request.session.testsfailed > failed_before or vm.has_console():
+            KEEP.mkdir(parents=True, exist_ok=True)
+            target = KEEP / f"console-{Path(request.module.__file__).stem}.log"
+            target.write_text(vm.console())

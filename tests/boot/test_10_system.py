@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: MIT
+"""A machine with a key and a name on its boot partition comes up as it is meant to."""
+
+from __future__ import annotations
+
+import gzip
+import base64
+import re
+from pathlib import Path
+
+import pytest
+from machine import TOP, Machine
+
+BOOT_FILES = {"hostname": "bench-7\r\n"}
+HERE = Path(__file__).parent
+# What systemd-analyze says today; a unit may get better, never worse (0 is best, 10 worst).
+EXPOSURE_LIMITS = {
+    "ecdaqd.service": 2.0,
+    "ecdaq-record.service": 1.5,
+    "ecdaq-dds.service": 2.0,
+    "ecdaq-sync0.service": 2.0,
+}
+
+
+def test_the_kernel_is_a_real_time_kernel(machine: Machine) -> None:
+    assert machine.run("cat /sys/kernel/realtime").strip() == "1"
+
+
+def test_the_command_line_isolates_the_last_core(machine: Machine) -> None:
+    words = machine.run("cat /proc/cmdline").split()
+    for word in ("isolcpus=managed_irq,domain,1", "nohz_full=1", "rcu_nocbs=1", "irqaffinity=0"):
+        assert word in words
+    assert machine.run("cat /sys/devices/system/cpu/isolated").strip() == "1"
+    assert machine.run("cat /sys/devices/system/cpu/nohz_full").strip() == "1"
+
+
+def test_every_kernel_symbol_asked_for_is_set(machine: Machine, tmp_path: Path) -> None:
+    import sys
+
+    sys.path.insert(0, str(TOP / "layers" / "meta-local" / "lib"))
+    from kconfig import differences
+
+    text = gzip.decompress(base64.b64decode(machine.run("base64 /proc/config.gz")))
+    (tmp_path / "config").write_bytes(text)
+    assert differences(tmp_path / "config", sorted((TOP / "kernel-config").glob("*.cfg"))) == []
+
+
+def test_no_unit_has_failed(machine: Machine) -> None:
+    machine.wait_until("boot is over", "systemctl is-system-running --wait")
+    assert machine.run("systemctl --failed --no-legend --plain").strip() == ""
+
+
+def test_the_log_has_no_error_that_is_not_known(machine: Machine) -> None:
+    lines = (HERE / "log_errors_allowed.txt").read_text().splitlines()
+    allowed = [re.compile(line) for line in lines if line and not line.startswith("#")]
+    journal = machine.run("sudo journalctl --boot --priority=err --output=cat --no-pager")
+    unknown = [x for x in journal.splitlines() if x and not any(a.search(x) for a in allowed)]
+    assert unknown == []
+
+
+def test_the_boot_has_no_ordering_cycle(machine: Machine) -> None:
+    assert machine.try_run("sudo journalctl --boot --grep='ordering cycle'").returncode == 1
+
+
+def test_the_name_is_that_of_the_boot_partition(machine: Machine) -> None:
+    assert machine.run("hostname").strip() == "bench-7"
+
+
+def test_the_root_is_read_only_and_the_data_partition_has_grown(machine: Machine) -> None:
+    assert machine.try_run("sudo touch /usr/x").returncode != 0
+    assert " ro," in machine.run("grep ' / ' /proc/mounts")
+    size = int(machine.run("df --output=size -B1M /data | tail -n 1"))
+    assert size > 500, "the image's data partition has 256 MiB, this disk has room for 800"
+    machine.run("sudo touch /data/x /etc/x /var/x && sudo rm /data/x /etc/x /var/x")
+
+
+def test_only_ssh_listens(machine: Machine) -> None:
+    tcp = machine.run("ss --no-header --listening --numeric --tcp")
+    assert {line.split()[3].rpartition(":")[2] for line in tcp.splitlines()} == {"22"}
+    udp = machine.run("ss --no-header --listening --numeric --udp")
+    # 68: the answers to our own DHCP requests.
+    assert {line.split()[3].rpartition(":")[2] for line in udp.splitlines()} <= {"68", "546"}
+
+
+def test_nobody_has_a_password(machine: Machine) -> None:
+    shadow = machine.run("sudo cat /etc/shadow").splitlines()
+    assert shadow
+    assert [line for line in shadow if line.split(":")[1][:1] not in ("!", "*")] == []
+
+
+def test_passwords_and_root_are_refused_over_ssh(machine: Machine) -> None:
+    settings = machine.run("sudo sshd -T").splitlines()
+    for line in ("passwordauthentication no", "permitrootlogin no", "allowusers operator"):
+        assert line in settings
+
+
+def test_the_journal_is_kept_and_bounded(machine: Machine) -> None:
+    assert machine.run("sudo find /var/log/journal -name system.journal").strip()
+    used = machine.run("sudo journalctl --disk-usage")
+    figure, unit = re.findall(r"([\d.]+)([KMG])", used)[0]
+    assert unit in "KM"
+    assert unit == "K" or float(figure) <= 64
+
+
+def test_the_watchdog_is_fed_by_systemd(machine: Machine) -> None:
+    usec = machine.run("systemctl show --property=RuntimeWatchdogUSec --value").strip()
+    assert usec == "15s"
+
+
+@pytest.mark.parametrize("unit", sorted(EXPOSURE_LIMITS))
+def test_the_exposure_of_a_service_is_bounded(machine: Machine, unit: str) -> None:
+    said = machine.run(f"systemd-analyze security --no-pager {unit} | tail -n 1")
+    figure = float(re.findall(r": ([\d.]+) ", said)[0])
+    print(f"{unit}: {figure}")
+    assert figure <= EXPOSURE_LIMITS[unit]
