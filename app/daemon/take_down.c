@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* From OP, or from wherever bring-up has come to, back to nothing. */
 #include <errno.h>
-#include <stdio.h>
 
 #include "daemon/session.h"
 #include "daemon/session_inside.h"

@@ -1,10 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* From power-on to OP and back. */
 #include <errno.h>
-#include <sys/stat.h>
 
 #include "harness/test.h"
-#include "sim/devices/fb1111_piccolo.h"
 #include "sim/harness/virtual_master.h"
 #include "wire/al.h"
 #include "wire/esc_reg.h"

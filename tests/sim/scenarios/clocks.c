@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* Distributed clocks: the master's servo, and SYNC0 of the slaves against each other. */
-#include <math.h>
 
 #include "base/clock.h"
 #include "base/prng.h"

@@ -2,7 +2,6 @@
 /* Outputs and one-shot conversions, through the admin socket as `ecdaq` uses it. */
 #include <errno.h>
 
-#include "base/event.h"
 #include "harness/test.h"
 #include "sim/devices/fb1111_piccolo.h"
 #include "sim/harness/virtual_master.h"

@@ -7,7 +7,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/event.h"
 #include "harness/test.h"
 
 struct bench {
