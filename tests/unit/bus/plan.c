@@ -1,0 +1,116 @@
+/* SPDX-License-Identifier: MIT */
+#include "bus/plan.h"
+
+#include <errno.h>
+
+#include "harness/test.h"
+
+static struct exchange_plan plan_of(uint32_t bytes)
+{
+	return (struct exchange_plan){ .image_bytes = bytes, .dc_reference = 0x1001, .monitor = 1 };
+}
+
+static struct plan_area area_of(uint32_t start, uint32_t end, uint16_t slave, int is_output)
+{
+	return (struct plan_area){ .start = start, .end = end, .slave_pos = slave, .is_output = (uint8_t)is_output };
+}
+
+TEST(plan, lrw_counts_two_for_written_and_one_for_read)
+{
+	struct exchange_plan plan = plan_of(44);
+	const struct plan_area area[] = { area_of(0, 9, 0, 1), area_of(9, 18, 1, 1), area_of(18, 31, 0, 0),
+					  area_of(31, 44, 1, 0) };
+	int blocked;
+
+	CHECK_EQ(plan_chunks(&plan, area, 4, &blocked), 0);
+	CHECK_EQ(plan.chunk_count, 1);
+	CHECK_EQ(plan.chunk_bytes[0], 44);
+	CHECK_EQ(plan.wkc_expected, 6);
+}
+
+/* SOEM is wrong here: slaves that share a byte are counted each. */
+TEST(plan, slaves_that_share_a_byte_count_each)
+{
+	struct exchange_plan plan = plan_of(1);
+	const struct plan_area area[] = { area_of(0, 1, 0, 1), area_of(0, 1, 1, 1), area_of(0, 1, 2, 1) };
+	int blocked;
+
+	CHECK_EQ(plan_chunks(&plan, area, 3, &blocked), 0);
+	CHECK_EQ(plan.wkc_expected, 6);
+}
+
+TEST(plan, slave_with_two_managers_of_one_kind_counts_once)
+{
+	struct exchange_plan plan = plan_of(2);
+	const struct plan_area area[] = { area_of(0, 1, 0, 1), area_of(1, 2, 0, 1) };
+	int blocked;
+
+	CHECK_EQ(plan_chunks(&plan, area, 2, &blocked), 0);
+	CHECK_EQ(plan.wkc_expected, 2);
+}
+
+/* T41 */
+TEST(plan, no_buffer_is_split_between_frames)
+{
+	struct exchange_plan plan = plan_of(3000);
+	const struct plan_area area[] = { area_of(0, 1000, 0, 1), area_of(1000, 2000, 1, 1),
+					  area_of(2000, 3000, 2, 0) };
+	int blocked;
+
+	CHECK_EQ(plan_chunks(&plan, area, 3, &blocked), 0);
+	CHECK_EQ(plan.chunk_count, 3);
+	CHECK_EQ(plan.chunk_bytes[0], 1000);
+	CHECK_EQ(plan.chunk_bytes[2], 1000);
+	CHECK_EQ(plan.chunk_wkc[0], 2);
+	CHECK_EQ(plan.chunk_wkc[2], 1);
+	CHECK_EQ(plan.wkc_expected, 5);
+}
+
+TEST(plan, frames_are_filled_up_to_what_they_hold)
+{
+	struct exchange_plan plan = plan_of(1436 + 100);
+	struct plan_area area[16];
+	int blocked;
+
+	for (unsigned i = 0; i < 16; i++) {
+		area[i] = area_of(i * 96, i * 96 + 96, (uint16_t)i, 0);
+	}
+	CHECK_EQ(plan_chunks(&plan, area, 16, &blocked), 0);
+	CHECK_EQ(plan.chunk_count, 2);
+	CHECK_EQ(plan.chunk_bytes[0], 14 * 96);
+	CHECK_EQ(plan.chunk_wkc[0], 14);
+	CHECK_EQ(plan.chunk_wkc[1], 2);
+}
+
+TEST(plan, buffer_larger_than_a_frame_is_named)
+{
+	struct exchange_plan plan = plan_of(2000);
+	const struct plan_area area[] = { area_of(0, 100, 0, 1), area_of(100, 2000, 1, 1) };
+	int blocked = -1;
+
+	CHECK_EQ(plan_chunks(&plan, area, 2, &blocked), -E2BIG);
+	CHECK_EQ(blocked, 1);
+}
+
+TEST(plan, more_frames_than_the_limit_are_refused)
+{
+	struct exchange_plan plan = plan_of(9 * 1400);
+	struct plan_area area[9];
+	int blocked = 5;
+
+	for (unsigned i = 0; i < 9; i++) {
+		area[i] = area_of(i * 1400, i * 1400 + 1400, (uint16_t)i, 0);
+	}
+	CHECK_EQ(plan_chunks(&plan, area, 9, &blocked), -E2BIG);
+	CHECK_EQ(blocked, -1);
+}
+
+TEST(plan, nothing_mapped_needs_no_datagram)
+{
+	struct exchange_plan plan = plan_of(0);
+	int blocked;
+
+	CHECK_EQ(plan_chunks(&plan, NULL, 0, &blocked), 0);
+	CHECK_EQ(plan.chunk_count, 0);
+	CHECK_EQ(plan.wkc_expected, 0);
+}
