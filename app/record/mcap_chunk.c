@@ -8,6 +8,7 @@
 #include <zlib.h>
 
 #include "base/bytes.h"
+#include "record/mcap_parse.h"
 
 enum {
 	ENTRY_BYTES = 16,                          /* time and offset of one message */
@@ -122,6 +123,15 @@ static int add_channel(struct mcap_chunk_index *ix, uint16_t id)
 	return 0;
 }
 
+/* Schemas and channels must be readable; of a message the length is enough. */
+static int is_sound(const struct mcap_inner *inner)
+{
+	struct mcap_item item = { .record = inner->content - MCAP_HEAD_BYTES,
+				  .record_len = inner->content_len + MCAP_HEAD_BYTES };
+
+	return mcap_parse_record(&item) == 0;
+}
+
 static int count_messages(struct mcap_chunk_index *ix, const uint8_t *records, size_t records_len)
 {
 	struct mcap_inner inner;
@@ -133,6 +143,9 @@ static int count_messages(struct mcap_chunk_index *ix, const uint8_t *records, s
 		uint64_t log_time_ns;
 
 		if (inner.opcode != MCAP_OP_MESSAGE) {
+			if (!is_sound(&inner)) {
+				return -EBADMSG;
+			}
 			continue;
 		}
 		id = get_le16(inner.content);

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The command line of `ecdaq log`. */
+#include "record/log.h"
+
 #include <errno.h>
 #include <getopt.h>
 #include <inttypes.h>
