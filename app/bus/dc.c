@@ -125,9 +125,7 @@ static int write_clock(struct bus *bus, size_t pos, int64_t offset_ns)
 	if (r >= 0) {
 		r = register_write(bus, pos, ESC_REG_DC_SPEED_COUNTER_START, start, sizeof(start));
 	}
-	if (r >= 0) {
-		sl->clock_offset_ns = offset_ns;
-	}
+	sl->is_clock_set = r >= 0;
 	return r;
 }
 
@@ -323,17 +321,22 @@ int bus_reference_time(struct bus *bus, int64_t *ret_ns)
 	return 0;
 }
 
-/* A living clock other than @pos to set it by: the reference, else any. -1: none. */
+static int is_guide(const struct bus *bus, size_t pos)
+{
+	const struct bus_slave *sl = &bus->slave[pos];
+
+	return sl->clock.kind == CLOCK_SYSTEM_TIME && sl->is_clock_64bit && sl->is_clock_set &&
+	       !sl->is_lost && sl->misses == 0;
+}
+
+/* A living clock other than @pos to set it by: the reference, else any that kept its time. -1: none. */
 static int find_guide(const struct bus *bus, size_t pos)
 {
-	if (bus->reference >= 0 && (size_t)bus->reference != pos && !bus->slave[bus->reference].is_lost) {
+	if ((size_t)bus->reference != pos && is_guide(bus, (size_t)bus->reference)) {
 		return bus->reference;
 	}
 	for (size_t i = 0; i < bus->slave_count; i++) {
-		const struct bus_slave *sl = &bus->slave[i];
-
-		if (i != pos && sl->clock.kind == CLOCK_SYSTEM_TIME && sl->is_clock_64bit &&
-		    !sl->is_lost && sl->step == RECOVERY_NONE) {
+		if (i != pos && is_guide(bus, i)) {
 			return (int)i;
 		}
 	}

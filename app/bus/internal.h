@@ -54,7 +54,6 @@ struct bus_slave {
 	uint8_t is_clock_64bit;
 	uint16_t assign_activate;   /* low byte 0x0980, high byte 0x0981; 0: no SYNC0 */
 	int64_t sync0_shift_ns;
-	int64_t clock_offset_ns;    /* 0x0920 as last written */
 	size_t pdo_first;           /* its entries in bus->pdo */
 	size_t pdo_count;
 	enum config_mode mode;
@@ -64,7 +63,8 @@ struct bus_slave {
 	uint16_t al_status;         /* as last seen */
 	unsigned misses;            /* looks in a row without an answer */
 	int is_lost;
-	int was_reset;              /* came back without its station address */
+	int is_clock_set;           /* offset and delay are in place since its last power-up */
+	unsigned good_looks;        /* at 0x092C, in a row */
 	enum recovery_step step;
 	mono_t step_deadline;
 	mono_t retry_at;

@@ -10,7 +10,7 @@
 #include "bus/internal.h"
 #include "bus/registers.h"
 
-enum { SII_WORD_VENDOR = 0x08, SII_WORD_PRODUCT = 0x0a, EEPROM_TIMEOUT_US = 20000 };
+enum { SII_WORD_VENDOR = 0x08, SII_WORD_PRODUCT = 0x0a, EEPROM_TIMEOUT_US = 20000, GOOD_LOOKS = 4 };
 
 #define STEP_TIMEOUT_NS (2 * NS_PER_S)
 #define PAUSE_NS NS_PER_S
@@ -116,7 +116,7 @@ static void identify(struct bus *bus, size_t pos, const struct bus_emit *emit)
 	if (vendor == sl->info.vendor && product == sl->info.product) {
 		sl->is_lost = 0;
 		sl->misses = 0;
-		sl->was_reset = 1;
+		sl->is_clock_set = 0;
 		bus_emit_event(bus, emit,
 			       (struct event){ .id = EVENT_SLAVE_BACK, .slave_pos = (uint16_t)pos });
 		enter(bus, pos, RECOVERY_INIT);
@@ -166,37 +166,62 @@ static void to_state(struct bus *bus, size_t pos, enum al_state state, enum reco
 	}
 }
 
+static int has_clock(const struct bus *bus, size_t pos)
+{
+	return bus->plan.dc_reference != 0 && bus->slave[pos].clock.kind == CLOCK_SYSTEM_TIME;
+}
+
+static int needs_clock(const struct bus *bus, size_t pos)
+{
+	return has_clock(bus, pos) && !bus->slave[pos].is_clock_set;
+}
+
 static void set_up(struct bus *bus, size_t pos)
 {
 	if (bus_startup_sdos(bus, pos) < 0 || bus_restore_mapping(bus, pos) < 0) {
 		start_over(bus, pos);
 		return;
 	}
-	enter(bus, pos, bus->slave[pos].was_reset ? RECOVERY_CLOCK : RECOVERY_SAFEOP);
+	enter(bus, pos, needs_clock(bus, pos) ? RECOVERY_CLOCK : RECOVERY_SAFEOP);
 }
 
 /* --- clock --- */
 
-static int is_clock_settled(struct bus *bus, size_t pos)
+/* Nothing can be said of a follower while the reference itself is not set. */
+static int is_reference_set(const struct bus *bus)
+{
+	const struct bus_slave *reference = &bus->slave[bus->reference];
+
+	return reference->is_clock_set && !reference->is_lost;
+}
+
+static int is_follower(const struct bus *bus, size_t pos)
+{
+	return has_clock(bus, pos) && (int)pos != bus->reference;
+}
+
+static int is_clock_near(struct bus *bus, size_t pos)
 {
 	int64_t diff_ns;
 
-	if (bus->plan.dc_reference == 0 || bus->slave[pos].clock.kind != CLOCK_SYSTEM_TIME ||
-	    (int)pos == bus->reference) {
+	if (!is_follower(bus, pos)) {
 		return 1;
 	}
 	diff_ns = bus_clock_diff(bus, pos);
 	return diff_ns >= 0 && diff_ns <= bus->cfg->dc_diff_limit_ns;
 }
 
+/* Near once may be in passing: clocks that settle swing. */
 static void settle(struct bus *bus, size_t pos)
 {
-	if (!is_clock_settled(bus, pos)) {
+	struct bus_slave *sl = &bus->slave[pos];
+
+	sl->good_looks = is_clock_near(bus, pos) ? sl->good_looks + 1 : 0;
+	if (sl->good_looks < GOOD_LOOKS && is_follower(bus, pos)) {
 		return;
 	}
-	enter(bus, pos, RECOVERY_SYNC0);
-	if (bus_sync0_restore(bus, pos) < 0) {
-		enter(bus, pos, RECOVERY_SETTLE);
+	if (bus_sync0_restore(bus, pos) >= 0) {
+		enter(bus, pos, RECOVERY_SYNC0);
 	}
 }
 
@@ -219,7 +244,10 @@ static void choose_way(struct bus *bus, size_t pos)
 	switch (state_of(sl)) {
 	case AL_OP:
 	case AL_SAFEOP:
-		if (!is_clock_settled(bus, pos)) {
+		if (is_follower(bus, pos) && !is_reference_set(bus)) {
+			return;
+		}
+		if (needs_clock(bus, pos) || !is_clock_near(bus, pos)) {
 			enter(bus, pos, RECOVERY_CLOCK);
 		} else if (bus_sync0_is_wanted(bus, pos) && bus_sync0_is_running(bus, pos) == 0) {
 			enter(bus, pos, RECOVERY_SETTLE);
@@ -238,12 +266,15 @@ static void choose_way(struct bus *bus, size_t pos)
 	}
 }
 
-static void finish(struct bus *bus, size_t pos)
+static void set_clock(struct bus *bus, size_t pos)
 {
-	if (!has_error(&bus->slave[pos]) && state_of(&bus->slave[pos]) == AL_OP) {
-		bus->slave[pos].was_reset = 0;
+	if (is_follower(bus, pos) && !is_reference_set(bus)) {
+		return;
 	}
-	to_state(bus, pos, AL_OP, RECOVERY_NONE);
+	if (bus_clock_restore(bus, pos) >= 0) {
+		bus->slave[pos].good_looks = 0;
+		enter(bus, pos, RECOVERY_SETTLE);
+	}
 }
 
 static int is_overdue(const struct bus *bus, const struct bus_slave *sl)
@@ -284,9 +315,7 @@ void bus_recover(struct bus *bus, size_t pos, const struct bus_emit *emit)
 		set_up(bus, pos);
 		return;
 	case RECOVERY_CLOCK:
-		if (bus_clock_restore(bus, pos) >= 0) {
-			enter(bus, pos, RECOVERY_SETTLE);
-		}
+		set_clock(bus, pos);
 		return;
 	case RECOVERY_SETTLE:
 		settle(bus, pos);
@@ -298,7 +327,7 @@ void bus_recover(struct bus *bus, size_t pos, const struct bus_emit *emit)
 		to_state(bus, pos, AL_SAFEOP, RECOVERY_OP);
 		return;
 	case RECOVERY_OP:
-		finish(bus, pos);
+		to_state(bus, pos, AL_OP, RECOVERY_NONE);
 		return;
 	}
 }

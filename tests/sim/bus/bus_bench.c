@@ -7,8 +7,9 @@
 #include "sim/catalogue.h"
 #include "sim/devices/fb1111_piccolo.h"
 #include "wire/datagram.h"
+#include "wire/esc_reg.h"
 
-enum { SETTLE_CYCLES = 400, WATCH_CYCLES = 50, TRANSMIT_NS = 4000, SIGMA_NS = 2000, FEATURES_DC = 0x000c, MAILBOX_START = 0x1000 };
+enum { SETTLE_CYCLES = 400, WATCH_CYCLES = 50, TRANSMIT_NS = 4000, SIGMA_NS = 2000, FEATURES_DC = 0x000c, MAILBOX_START = 0x1000, NOBODY = 0x7777 };
 
 #define TAI_START_NS (INT64_C(1795000000) * NS_PER_S)
 #define DATA_FOLDER "../shared/data/sii"
@@ -66,20 +67,69 @@ static void make_segment(struct bus_bench *b, const struct bench_spec *spec)
 
 /* --- the master's transport: the host's, counted --- */
 
+/*
+ * A reference that does not answer: its reads go to an address that nobody has, and an FRMW becomes the write that
+ * the others would see. It counts the reference itself as one of them, which is taken back on the way in.
+ */
+static void mute(uint8_t *frame, size_t frame_len)
+{
+	struct ecat_datagram dg;
+	size_t pos = 0;
+
+	while (ecat_frame_next(frame, frame_len, &pos, &dg) == 1) {
+		if (dg.ado == ESC_REG_DC_SYSTEM_TIME && (dg.cmd == ECAT_CMD_FRMW || dg.cmd == ECAT_CMD_FPRD)) {
+			put_le16(dg.data - 8, NOBODY);
+		}
+	}
+}
+
+void bench_mute_reference(struct bus_bench *b, int is_mute)
+{
+	b->is_reference_mute = is_mute;
+}
+
+static int muted_send(struct bus_bench *b, const uint8_t *frame, size_t frame_len)
+{
+	uint8_t copy[LIMIT_FRAME_BYTES];
+
+	memcpy(copy, frame, frame_len);
+	mute(copy, frame_len);
+	return b->wire.send(b->wire.ctx, copy, frame_len);
+}
+
+/* The master must find its own address in the echo. */
+static void unmute(const struct bus_bench *b, uint8_t *frame, size_t frame_len)
+{
+	struct ecat_datagram dg;
+	size_t pos = 0;
+
+	while (ecat_frame_next(frame, frame_len, &pos, &dg) == 1) {
+		if (dg.adp == NOBODY) {
+			put_le16(dg.data - 8, bus_plan(b->bus)->dc_reference);
+			put_le16(dg.wkc, (uint16_t)(get_le16(dg.wkc) - (dg.cmd == ECAT_CMD_FRMW ? 1 : 0)));
+		}
+	}
+}
+
 static int counted_send(void *ctx, const uint8_t *frame, size_t frame_len)
 {
 	struct bus_bench *b = ctx;
 
 	b->frames_sent++;
 	b->mailbox_writes += frame[16] == ECAT_CMD_FPWR && get_le16(frame + 20) == MAILBOX_START;
-	return b->wire.send(b->wire.ctx, frame, frame_len);
+	return b->is_reference_mute ? muted_send(b, frame, frame_len) :
+				      b->wire.send(b->wire.ctx, frame, frame_len);
 }
 
 static int counted_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadline, mono_t *ret_at)
 {
 	struct bus_bench *b = ctx;
+	int r = b->wire.receive(b->wire.ctx, frame, capacity, deadline, ret_at);
 
-	return b->wire.receive(b->wire.ctx, frame, capacity, deadline, ret_at);
+	if (r > 0) {
+		unmute(b, frame, (size_t)r);
+	}
+	return r;
 }
 
 unsigned bench_frames_sent(const struct bus_bench *b)

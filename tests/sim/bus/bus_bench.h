@@ -35,6 +35,7 @@ struct bus_bench {
 	struct transport wire;          /* of the host; the master's goes through the bench */
 	unsigned frames_sent;
 	unsigned mailbox_writes;
+	int is_reference_mute;
 	struct config cfg;
 	struct line *line;
 	struct bus *bus;
@@ -74,6 +75,8 @@ unsigned bench_recover(struct bus_bench *b, unsigned limit);
 struct bus_watch_report bench_watch(struct bus_bench *b);
 int bench_stop(struct bus_bench *b);
 
+/** 1: the reference's system time answers no more (WKC 0), all else goes on; 0: it does again. */
+void bench_mute_reference(struct bus_bench *b, int is_mute);
 /** A line of sim/fault.h; its times count from now. */
 void bench_fault(struct bus_bench *b, const char *line);
 /** Frames that any master sent so far. */

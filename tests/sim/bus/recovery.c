@@ -1,0 +1,226 @@
+/* SPDX-License-Identifier: MIT */
+/* Slaves that go and come back while the bus is in OP. */
+#include "base/bytes.h"
+#include "harness/test.h"
+#include "sim/bus/bus_bench.h"
+#include "wire/esc_reg.h"
+
+enum { LIMIT_CYCLES = 6000 };
+
+/* System times of two slaves at one true time. */
+static int64_t apart_ns(const struct bus_bench *b, size_t a, size_t c)
+{
+	int64_t t_ns = bench_now_ns(b);
+
+	return llabs((int64_t)(esc_system_time(segment_esc(b->segment, a), t_ns) -
+			       esc_system_time(segment_esc(b->segment, c), t_ns)));
+}
+
+static void check_counts_again(struct bus_bench *b, unsigned slave)
+{
+	uint64_t before;
+	char name[64];
+
+	snprintf(name, sizeof(name), "piccolo%u.counter", slave);
+	bench_run(b, 10);
+	before = bench_value(b, name);
+	bench_run(b, 100);
+	CHECK_EQ((uint16_t)(bench_value(b, name) - before), 100);
+}
+
+static void watch_for(struct bus_bench *b, unsigned looks)
+{
+	for (unsigned i = 0; i < looks; i++) {
+		bench_run(b, 50);
+		bench_watch(b);
+	}
+}
+
+static void power_cycle(unsigned slaves, unsigned victim, uint64_t seed)
+{
+	struct bus_bench *b = bench_create(&(struct bench_spec){
+		.piccolos = slaves, .ppm = { 80, -60, 40 }, .seed = seed });
+	unsigned cycles;
+
+	bench_bring_up(b);
+	bench_run(b, 100);
+	segment_power_off(b->segment, victim, bench_now_ns(b));
+	watch_for(b, 10);
+	CHECK(b->events[EVENT_SLAVE_LOST] >= slaves - victim);
+	CHECK_EQ(atomic_load(&b->page->slave[victim].is_lost), 1);
+	CHECK_EQ(bench_watch(b).slaves_lost, slaves - victim);
+	segment_power_on(b->segment, victim, bench_now_ns(b));
+	cycles = bench_recover(b, LIMIT_CYCLES);
+	printf("slave %u of %u: in OP again after %u cycles\n", victim, slaves, cycles);
+	CHECK_EQ(atomic_load(&b->page->slave[victim].is_lost), 0);
+	bench_run(b, 200);
+	CHECK_EQ(b->last.status, EXCHANGE_OK);
+	CHECK(b->last.dc_time_ns > 0);
+	for (unsigned i = 0; i < slaves; i++) {
+		check_counts_again(b, i);
+		CHECK(apart_ns(b, i, 0) < 100);
+	}
+	bench_destroy(b);
+}
+
+/* T18 */
+TEST(recovery, last_slave_is_power_cycled)
+{
+	power_cycle(2, 1, 70);
+}
+
+TEST(recovery, slave_in_the_middle_is_power_cycled)
+{
+	power_cycle(3, 1, 71);
+}
+
+/* T17, T18: everything behind is gone with it; clocks go on by themselves. */
+TEST(recovery, reference_clock_is_power_cycled)
+{
+	power_cycle(3, 0, 72);
+}
+
+TEST(recovery, only_slave_is_power_cycled)
+{
+	power_cycle(1, 0, 73);
+}
+
+/* T33 */
+static void cut_and_heal(unsigned slaves, unsigned at, unsigned away_looks, uint64_t seed)
+{
+	struct bus_bench *b = bench_create(&(struct bench_spec){
+		.piccolos = slaves, .ppm = { 80, -60, 40 }, .seed = seed });
+
+	bench_bring_up(b);
+	bench_run(b, 100);
+	segment_cut(b->segment, at, bench_now_ns(b));
+	watch_for(b, away_looks);
+	CHECK(b->events[EVENT_SLAVE_LOST] > 0);
+	segment_heal(b->segment, at, bench_now_ns(b));
+	bench_recover(b, LIMIT_CYCLES);
+	bench_run(b, 200);
+	CHECK_EQ(b->last.status, EXCHANGE_OK);
+	for (unsigned i = 0; i < slaves; i++) {
+		check_counts_again(b, i);
+		CHECK(apart_ns(b, i, 0) < 100);
+	}
+	bench_destroy(b);
+}
+
+TEST(recovery, cable_is_pulled_and_put_back_at_every_position)
+{
+	for (unsigned at = 0; at < 3; at++) {
+		for (unsigned looks = 3; looks <= 43; looks += 10) {
+			cut_and_heal(3, at, looks, 80 + at * 10 + looks);
+		}
+	}
+}
+
+/* T17: what is cut off keeps its time; the master does not write it. */
+TEST(recovery, clocks_behind_a_lost_reference_do_not_jump)
+{
+	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 3, .ppm = { 50, -50, 20 }, .seed = 90 });
+	int64_t rate_ns;
+	int64_t before_ns;
+	int64_t t_ns;
+
+	bench_bring_up(b);
+	bench_run(b, 500);
+	t_ns = bench_now_ns(b);
+	before_ns = (int64_t)esc_system_time(segment_esc(b->segment, 2), t_ns);
+	/* The reference's processing unit stops, its ports still forward: only 0x0910 is dead. */
+	bench_mute_reference(b, 1);
+	bench_run(b, 1000);
+	CHECK_EQ(b->last.dc_time_ns, 0);
+	rate_ns = (int64_t)esc_system_time(segment_esc(b->segment, 2), bench_now_ns(b)) - before_ns -
+		  (bench_now_ns(b) - t_ns);
+	CHECK(llabs(rate_ns) < 120000);
+	bench_mute_reference(b, 0);
+	bench_run(b, 2000);
+	CHECK(b->last.dc_time_ns > 0);
+	CHECK(apart_ns(b, 2, 0) < 100);
+	bench_destroy(b);
+}
+
+TEST(recovery, slave_that_falls_to_safe_op_is_led_back_and_told)
+{
+	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 2, .seed = 91 });
+
+	bench_bring_up(b);
+	bench_run(b, 100);
+	bench_watch(b);
+	bench_fault(b, "at=1ms al-error slave=1 code=0x001a");
+	bench_run(b, 20);
+	CHECK_EQ(bench_watch(b).is_all_op, 0);
+	CHECK(b->events[EVENT_SLAVE_STATE] > 0);
+	CHECK_EQ(b->last_event[EVENT_SLAVE_STATE].slave_pos, 1);
+	bench_recover(b, LIMIT_CYCLES);
+	check_counts_again(b, 1);
+	CHECK_EQ(b->events[EVENT_SLAVE_LOST], 0);
+	bench_destroy(b);
+}
+
+TEST(recovery, watchdog_that_tripped_is_mended)
+{
+	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 2, .seed = 92 });
+
+	bench_bring_up(b);
+	bench_run(b, 100);
+	in_process_stall(b->host, 300 * NS_PER_MS);
+	b->deadline.ns += 300 * NS_PER_MS;
+	bench_run(b, 20);
+	CHECK(bench_watch(b).slaves_op < 2);
+	bench_recover(b, LIMIT_CYCLES);
+	check_counts_again(b, 0);
+	check_counts_again(b, 1);
+	bench_destroy(b);
+}
+
+TEST(recovery, another_slave_in_the_place_is_not_taken)
+{
+	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 2, .seed = 93 });
+	struct esc *esc;
+
+	bench_bring_up(b);
+	segment_power_off(b->segment, 1, bench_now_ns(b));
+	watch_for(b, 5);
+	esc = segment_esc(b->segment, 1);
+	put_le32(esc->sii + 0x14, 0x12345678);
+	segment_power_on(b->segment, 1, bench_now_ns(b));
+	watch_for(b, 80);
+	CHECK_EQ(bench_watch(b).slaves_lost, 1);
+	CHECK_EQ(bench_watch(b).slaves_op, 1);
+	bench_destroy(b);
+}
+
+TEST(recovery, error_counters_reach_the_status_page)
+{
+	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 2, .seed = 94 });
+
+	bench_bring_up(b);
+	for (unsigned i = 0; i < 3; i++) {
+		bench_fault(b, "at=1ms port-error slave=1 port=0");
+		bench_run(b, 5);
+	}
+	bench_watch(b);
+	CHECK_EQ(atomic_load(&b->page->slave[1].rx_errors[0]), 3);
+	CHECK_EQ(atomic_load(&b->page->slave[0].rx_errors[0]), 0);
+	CHECK_EQ(atomic_load(&b->page->slave[1].al_state), AL_OP);
+	CHECK(atomic_load(&b->page->slave[1].dc_diff_ns) < 100);
+	bench_destroy(b);
+}
+
+TEST(recovery, watching_costs_no_cycle)
+{
+	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 8, .seed = 95 });
+	uint64_t cycles;
+	uint64_t ok;
+
+	bench_bring_up(b);
+	bench_run(b, 100);
+	cycles = b->cycles;
+	ok = b->ok;
+	watch_for(b, 50);
+	CHECK_EQ(b->ok - ok, b->cycles - cycles);
+	bench_destroy(b);
+}
