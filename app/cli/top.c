@@ -4,7 +4,6 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <sys/stat.h>
 
 #include "base/clock.h"
 #include "cli/args.h"
@@ -132,20 +131,38 @@ static enum cli_exit follow(struct top *top, const struct status_page *page)
 	return CLI_OK;
 }
 
-/* ecdaqd may just be starting. */
+/* Is there a page that cannot change any more, or none? */
+static int is_worth_waiting(struct top *top)
+{
+	const struct status_page *page;
+	char path[CONFIG_PATH_BYTES];
+	int is_alive;
+
+	if (cli_path(top->cli, CONFIG_RUN_STATUS, path) != CLI_OK) {
+		return 0;
+	}
+	page = status_open(path, STATUS_MAGIC, sizeof(*page));
+	if (page == NULL) {
+		return errno == ENOENT;
+	}
+	is_alive = source_is_alive(page->pid);
+	source_status_close(page);
+	return !is_alive;
+}
+
+/* ecdaqd may just be starting; what an earlier one has left is not what is meant. */
 static void wait_for_page(struct top *top)
 {
 	const int64_t step_ns = 50 * NS_PER_MS;
-	char path[CONFIG_PATH_BYTES];
-	struct stat st;
 
-	if (cli_path(top->cli, CONFIG_RUN_STATUS, path) != CLI_OK) {
-		return;
-	}
 	for (int64_t waited_ns = 0; waited_ns < top->wait_ns && !screen_is_over();
 	     waited_ns += step_ns) {
-		if (stat(path, &st) == 0 || errno != ENOENT) {
+		if (!is_worth_waiting(top)) {
 			return;
+		}
+		if (waited_ns == 4 * step_ns && screen_is_terminal()) {
+			printf("waiting for ecdaqd in %s (Ctrl-C: leave)\n", top->cli->dir);
+			fflush(stdout);
 		}
 		screen_wait(step_ns);
 	}

@@ -159,7 +159,7 @@ void fake_make_rings(struct fake *f)
 	struct ring_spec samples = {
 		.kind = "sample",
 		.payload_bytes = sizeof(struct sample_header) + IMAGE_BYTES,
-		.slot_count = 16384,
+		.slot_count = 65536,
 		.meta = &f->meta,
 		.meta_bytes = sizeof(f->meta),
 		.period_ns = STEP_NS,

@@ -57,7 +57,9 @@ def test_status_as_json_has_the_keys_that_scripts_rely_on(daemon: Fake, words: l
     assert status["rt_degraded"] == ["priority"]
     assert status["message"] == 'slave 1: "quoted"\ttext'
     assert status["session"] > 2**53
-    assert status["samples_good"] == 2 * (status["cycles"] - status["frames_lost"])
+    # The cycle goes on while its figures are read.
+    good = 2 * (status["cycles"] - status["frames_lost"])
+    assert abs(status["samples_good"] - good) < 100
 
 
 def test_status_lists_the_slaves(daemon: Fake) -> None:
@@ -238,7 +240,7 @@ def test_a_plot_shows_one_period_of_the_sine(daemon: Fake) -> None:
     tops = [min(y for y, row in enumerate(rows) if row[i : i + 1] == "*") for i in range(80)]
     for a, b in itertools.pairwise(tops):
         crossings += (a < middle) != (b < middle)
-    assert crossings in (2, 3)
+    assert crossings in (1, 2, 3)
 
 
 def test_a_plot_of_two_channels_has_two_panels(daemon: Fake) -> None:
@@ -273,7 +275,8 @@ def test_events_can_be_followed_to_the_end(daemon: Fake) -> None:
 
 
 @pytest.mark.parametrize("name", ["wake", "round-trip", "phase", "work"])
-def test_histograms_agree_with_their_count(daemon: Fake, name: str) -> None:
+def test_histograms_agree_with_their_count(fake: Callable[..., Fake], name: str) -> None:
+    daemon = fake("SPEED=1")
     histogram = json_of(daemon("histogram", name, "--json"))
     # The writer goes on while the buckets are read.
     total = sum(bucket["count"] for bucket in histogram["bucket"])
@@ -322,14 +325,14 @@ def test_a_stopped_reader_learns_what_it_missed(fake: Callable[..., Fake]) -> No
     process.stdout.readline()
     process.send_signal(signal.SIGSTOP)
     before = json_of(daemon("status", "--json"))["cycles"]
-    wait_until(lambda: json_of(daemon("status", "--json"))["cycles"] > before + 3 * 16384)
+    wait_until(lambda: json_of(daemon("status", "--json"))["cycles"] > before + 3 * 65536)
     process.send_signal(signal.SIGCONT)
     missed = 0
     for line in process.stdout:
         missed = json.loads(line).get("missed", 0)
         if missed:
             break
-    assert missed > 16384
+    assert missed > 65536
     process.terminate()
     process.wait(20)
     process.stdout.close()

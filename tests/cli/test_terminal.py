@@ -13,7 +13,7 @@ import struct
 import subprocess
 import termios
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 
@@ -160,3 +160,18 @@ def test_without_ecdaqd_the_terminal_is_not_taken(daemon: Fake, terminal: Termin
     code, said = terminal.end()
     assert code == NO_DAEMON and said.startswith("ecdaq: top: ")
     assert ENTER not in terminal.text
+
+
+def test_top_waits_for_an_ecdaqd_that_is_starting(
+    fake: Callable[..., Fake], terminal: Terminal
+) -> None:
+    """What an ecdaqd of yesterday has left does not count."""
+    before = fake()
+    before.end()
+    terminal.start(before, "top", "--interval", "20ms")
+    terminal.wait_for("waiting for ecdaqd in")
+    fake()
+    terminal.wait_for("piccolo1")
+    assert "STOPPED" not in terminal.text
+    terminal.press("q")
+    assert terminal.end() == (OK, "")
