@@ -311,9 +311,10 @@ int virtual_master_run(struct virtual_master *vm, uint64_t cycles)
 	uint64_t end = *done + cycles;
 	int r = SESSION_GOES_ON;
 
-	for (unsigned i = 1; r == SESSION_GOES_ON && *done < end; i++) {
+	while (r == SESSION_GOES_ON && *done < end) {
 		step_cycle(vm);
-		if (i % SERVICE_CYCLES == 0) {
+		if (++vm->steps >= SERVICE_CYCLES) {
+			vm->steps = 0;
 			r = session_service(vm->session, &vm->failure);
 			take_samples(vm);
 		}
@@ -352,6 +353,26 @@ uint64_t virtual_master_value(const struct virtual_master *vm, const char *name)
 		test_fail(__FILE__, __LINE__, "no channel is named %s", name);
 	}
 	return image_get_raw(vm->newest + sizeof(struct sample_header), &channels[n]);
+}
+
+void virtual_master_print_events(const struct virtual_master *vm, uint64_t count)
+{
+	struct ring_reader *reader = NULL;
+	struct event ev;
+	char path[128];
+	char text[256];
+	uint64_t lost;
+
+	snprintf(path, sizeof(path), "%s/" CONFIG_RUN_EVENTS, vm->dir);
+	if (ring_reader_open(path, &reader) < 0) {
+		return;
+	}
+	ring_seek(reader, ring_newest(reader) > count ? ring_newest(reader) - count : 0);
+	while (ring_read(reader, &ev, &lost) == RING_OK) {
+		event_format(&ev, text, sizeof(text));
+		fprintf(stderr, "  %.6f s: %s\n", (double)ev.mono_ns * 1e-9, text);
+	}
+	ring_reader_destroy(reader);
 }
 
 /* --- admin --- */

@@ -44,6 +44,7 @@ struct virtual_master {
 	struct ring_reader *samples;
 	struct virtual_result result;
 	struct failure failure;                        /* of the newest call that failed */
+	unsigned steps;                                /* since the service loop ran */
 	int64_t op_ns;                                 /* virtual time that bring-up took */
 	void (*each_cycle)(struct virtual_master *vm); /* a checker, after every cycle; NULL: none
 							*/
@@ -72,6 +73,9 @@ void virtual_master_forget(struct virtual_master *vm);
 /** The newest sample's header; the value of the channel named @name in it. */
 const struct sample_header *virtual_master_sample(const struct virtual_master *vm);
 uint64_t virtual_master_value(const struct virtual_master *vm, const char *name);
+
+/** Print the newest @count events, for a test that is about to fail. */
+void virtual_master_print_events(const struct virtual_master *vm, uint64_t count);
 
 /** A request through the admin socket, cycles going on until the reply is there. */
 struct admin_reply virtual_master_ask(struct virtual_master *vm,
