@@ -181,7 +181,7 @@ enum cli_exit verb_top(struct cli *cli, int argc, char **argv)
 		  "time between looks (500ms)" },
 		{ "count", 'n', ARGS_COUNT, &top.count, "N", "end after N looks" },
 		{ "wait", 0, ARGS_DURATION, &top.wait_ns, "T",
-		  "how long to wait for an ecdaqd that is not there yet (10s on a terminal, else "
+		  "how long to wait for an ecdaqd that has yet to start (10s on a terminal, else "
 		  "0s)" },
 		{ "json", 0, ARGS_FLAG, &top.is_json, NULL,
 		  "a line of JSON each look, as of status" },

@@ -134,8 +134,8 @@ int config_check(const struct config *cfg, char *error, size_t error_bytes);
 enum { CONFIG_WHY_BYTES = 192 };
 
 /**
- * A duration as the file has it ("500us", "1.5s"; a plain number is in s), for the command lines of the
- * programs. 0, or -EINVAL or -ERANGE with the reason in @why (CONFIG_WHY_BYTES), ret untouched.
+ * A duration as the file has it ("500us", "1.5s"; a plain number is in s), for the command lines of
+ * the programs. 0, or -EINVAL or -ERANGE with the reason in @why (CONFIG_WHY_BYTES), ret untouched.
  */
 int config_parse_duration(const char *text, int64_t *ret_ns, char *why);
 
