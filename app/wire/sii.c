@@ -71,7 +71,7 @@ int sii_find_category(const uint8_t *image, size_t image_bytes, uint16_t wanted,
 	return r < 0 ? r : -ENOENT;
 }
 
-void sii_string(const uint8_t *image, size_t image_bytes, unsigned number,
+void sii_text(const uint8_t *image, size_t image_bytes, unsigned number,
 		char ret_text[SII_NAME_BYTES])
 {
 	size_t offset;

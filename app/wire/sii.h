@@ -112,7 +112,7 @@ int sii_parse(const uint8_t *image, size_t image_bytes, struct sii *ret, char *e
 	      size_t error_bytes);
 
 /** String @number (1-based) as text, unprintable bytes as '_'; "" for 0 or one that is not there. */
-void sii_string(const uint8_t *image, size_t image_bytes, unsigned number,
+void sii_text(const uint8_t *image, size_t image_bytes, unsigned number,
 		char ret_text[SII_NAME_BYTES]);
 
 /** CRC-8 over words 0 to 6, which stands in word 7 (ETG.2010). */

@@ -205,6 +205,6 @@ TEST(firmware, sii_is_what_the_master_reads_out_of_it)
 	CHECK_EQ(sii.pdo_count, 2);
 	check_entries(&sii, &sii.pdo[sii.pdo[0].is_tx ? 0 : 1], &d->tx);
 	check_entries(&sii, &sii.pdo[sii.pdo[0].is_tx ? 1 : 0], &d->rx);
-	sii_string(image, sizeof(image), sii.device_name, text);
+	sii_text(image, sizeof(image), sii.device_name, text);
 	CHECK_STR(text, d->name);
 }

@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: MIT */
+/* Capture files from anywhere: every byte that a packet promises must be there. */
+#include "wire/pcapng.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+	struct pcapng_packet packet;
+	struct pcapng file;
+	volatile unsigned sum = 0;
+
+	if (pcapng_open(&file, data, size) < 0) {
+		return 0;
+	}
+	while (pcapng_next(&file, &packet) == 1) {
+		if (packet.interface >= file.interface_count || packet.bytes < data ||
+		    packet.len > (size_t)(data + size - packet.bytes)) {
+			__builtin_trap();
+		}
+		for (size_t i = 0; i < packet.len; i++) {
+			sum += packet.bytes[i];
+		}
+	}
+	return 0;
+}
