@@ -26,39 +26,52 @@ def image_recipes(d):
         names.append("linux-" + d.getVar("KERNEL_NAME"))
     return names
 
-do_rootfs[depends] += "sdk-chroot:do_bootstrap ${@' '.join(n + ':do_deploy_deb' for n in image_recipes(d))}"
-do_rootfs[cleandirs] = "${WORKDIR}/tar ${WORKDIR}/repo"
-do_rootfs[network] = "1"
-do_rootfs[keep] = "${WORKDIR}/tar"
-python do_rootfs() {
-    import shutil
-    repo = os.path.join(d.getVar("WORKDIR"), "repo")
-    for name in image_recipes(d):
-        folder = os.path.join(d.getVar("REPO_DIR"), name)
-        for deb in sorted(os.listdir(folder)):
-            shutil.copy(os.path.join(folder, deb), repo)
-    bb.build.exec_func("rootfs_index", d)
+# First Debian's part, which changes rarely and takes minutes (maintainer scripts run emulated); then
+# our packages on top of it, which takes seconds.
+do_rootfs_base[cleandirs] = "${WORKDIR}/base"
+do_rootfs_base[network] = "1"
+do_rootfs_base[keep] = "${WORKDIR}/base"
+python do_rootfs_base() {
     suite = d.getVar("BASE_DISTRO_CODENAME")
     sources = apt_sources(d, suite, d.getVar("IMAGE_COMPONENTS"))
-    sources.append("deb [trusted=yes] copy:" + repo + " ./")
-    include = ",".join((d.getVar("IMAGE_PREINSTALL") + " " + d.getVar("IMAGE_INSTALL")).split())
     options = ["--dpkgopt=path-exclude=" + p for p in d.getVar("ROOTFS_EXCLUDE").split()]
     options += ["--dpkgopt=path-include=" + p for p in d.getVar("ROOTFS_INCLUDE").split()]
-    tar = os.path.join(d.getVar("WORKDIR"), "tar", "rootfs.tar")
     bb.process.run(
         ["mmdebstrap", "--mode=root", "--variant=essential", "--format=tar",
-         "--architectures=" + d.getVar("DISTRO_ARCH"), "--include=" + include, *options,
+         "--architectures=" + d.getVar("DISTRO_ARCH"),
+         "--include=" + ",".join(d.getVar("IMAGE_PREINSTALL").split()), *options,
          "--aptopt=APT::Install-Recommends \"false\"", "--aptopt=Acquire::Retries \"3\"",
-         "--hook-dir=" + os.path.join(d.getVar("LAYERDIR_core"), "lib", "rootfs-hooks"),
-         suite, tar, *sources],
+         suite, os.path.join(d.getVar("WORKDIR"), "base", "base.tar"), *sources],
         log=open(d.getVar("BB_LOGFILE"), "a"))
 }
-do_rootfs[file-checksums] += "${LAYERDIR_core}/lib/rootfs-hooks:True"
-addtask rootfs
+addtask rootfs_base
 
-rootfs_index() {
-	sdk_run sh -euc 'cd "$1/repo" && dpkg-scanpackages --multiversion . > Packages' index "${PP}"
+do_rootfs[depends] += "${@' '.join(n + ':do_deploy_deb' for n in image_recipes(d))}"
+do_rootfs[vardeps] += "IMAGE_INSTALL"
+do_rootfs[file-checksums] += "${LAYERDIR_core}/lib/clean-rootfs.sh:True"
+do_rootfs[cleandirs] = "${WORKDIR}/tar ${IMAGE_ROOTFS}"
+do_rootfs[keep] = "${WORKDIR}/tar"
+do_rootfs() {
+	tar -xpf "${WORKDIR}/base/base.tar" --numeric-owner --xattrs --xattrs-include='*' -C "${IMAGE_ROOTFS}"
+	mkdir "${IMAGE_ROOTFS}/tmp/debs"
+	for name in ${@' '.join(image_recipes(d))}; do
+		for package in ${IMAGE_INSTALL}; do
+			for deb in "${REPO_DIR}/$name/$package"_*.deb; do
+				[ ! -e "$deb" ] || cp "$deb" "${IMAGE_ROOTFS}/tmp/debs/"
+			done
+		done
+	done
+	unshare --mount --pid --fork --kill-child --propagation private sh -euc '
+		mount -t proc proc "$1/proc"
+		mount --bind /dev "$1/dev"
+		exec chroot "$1" sh -euc "dpkg --install /tmp/debs/*.deb"' rootfs "${IMAGE_ROOTFS}"
+	rm -rf "${IMAGE_ROOTFS}/tmp/debs"
+	sh "${LAYERDIR_core}/lib/clean-rootfs.sh" "${IMAGE_ROOTFS}"
+	tar -cf "${WORKDIR}/tar/rootfs.tar" --sort=name --numeric-owner --xattrs --xattrs-include='*' \
+		--format=posix --pax-option=exthdr.name=%d/PaxHeaders/%f,delete=atime,delete=ctime \
+		--mtime="@$SOURCE_DATE_EPOCH" --clamp-mtime -C "${IMAGE_ROOTFS}" .
 }
+addtask rootfs after do_rootfs_base
 
 addtask image after do_rootfs before do_build
 do_image[depends] += "sdk-chroot:do_bootstrap"

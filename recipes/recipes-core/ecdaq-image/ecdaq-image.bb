@@ -9,10 +9,11 @@ PV = "${DISTRO_VERSION}"
 
 inherit image
 
-# Our packages; a machine appends its own.
-IMAGE_INSTALL = "ecdaq ecdaq-config"
-# Debian's: to boot, to be reached, to keep time, to be looked at.
-IMAGE_PREINSTALL = "init systemd-sysv udev dbus kmod \
-                    openssh-server sudo chrony \
-                    iproute2 ethtool iputils-ping nftables \
-                    e2fsprogs fdisk dosfstools procps less gpiod"
+# Our packages; the class adds the kernel, a machine its own.
+IMAGE_INSTALL += "ecdaq ecdaq-config"
+# Debian's: to boot, to be reached, to keep time, to be looked at; and what our packages link.
+IMAGE_PREINSTALL += "init systemd-sysv udev dbus kmod \
+                     openssh-server sudo chrony \
+                     iproute2 ethtool iputils-ping nftables \
+                     e2fsprogs fdisk dosfstools procps less gpiod \
+                     libyaml-0-2 libzstd1 zlib1g"

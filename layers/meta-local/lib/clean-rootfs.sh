@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
 # Takes out of a new root file system what must not be the same on two machines, and what would
-# differ between two builds of the same inputs. mmdebstrap hands over its folder.
+# differ between two builds of the same inputs: clean-rootfs.sh ROOT
 set -eu
 root=$1
 
