@@ -6,6 +6,10 @@
 #include "sim/esc_inside.h"
 #include "wire/al.h"
 
+/* What receive time registers hold that no frame has ever set (captures of ET1100 and ET1200). */
+#define TEXT_HOFF 0x66666f68u
+#define TEXT_VERL 0x6c726556u
+
 const struct esc_features esc_et1100 = {
 	.type = 0x11,
 	.revision = 0x00,
@@ -18,43 +22,54 @@ const struct esc_features esc_et1100 = {
 	.dc = ESC_DC_64,
 	.has_sync_unit = 1,
 	.eeprom_bytes_a_read = 8,
+	.receive_time_at_power_on = { 0, TEXT_HOFF, 0, TEXT_VERL },
 };
 
-void esc_init(struct esc *esc, const struct esc_features *features, uint8_t *sii, size_t sii_bytes,
-	      int64_t t_ns)
+static void reset_registers(struct esc *esc)
 {
+	const struct esc_features *f = &esc->features;
 	uint8_t *r = esc->reg;
 
-	memset(esc, 0, sizeof(*esc));
-	esc->features = *features;
-	esc->sii = sii;
-	esc->sii_bytes = sii_bytes;
-	esc->watchdog_deadline_ns = INT64_MAX;
-	esc->sync.next_true_ns = INT64_MAX;
-	esc_register_layout(esc);
-	r[ESC_REG_TYPE] = features->type;
-	r[ESC_REG_REVISION] = features->revision;
-	put_le16(r + ESC_REG_BUILD, features->build);
-	r[ESC_REG_FMMU_COUNT] = features->fmmu_count;
-	r[ESC_REG_SM_COUNT] = features->sm_count;
-	r[ESC_REG_RAM_SIZE] = features->ram_kib;
-	r[ESC_REG_PORT_DESCRIPTOR] = features->port_descriptor;
-	put_le16(r + ESC_REG_FEATURES, features->features);
+	r[ESC_REG_TYPE] = f->type;
+	r[ESC_REG_REVISION] = f->revision;
+	put_le16(r + ESC_REG_BUILD, f->build);
+	r[ESC_REG_FMMU_COUNT] = f->fmmu_count;
+	r[ESC_REG_SM_COUNT] = f->sm_count;
+	r[ESC_REG_RAM_SIZE] = f->ram_kib;
+	r[ESC_REG_PORT_DESCRIPTOR] = f->port_descriptor;
+	put_le16(r + ESC_REG_FEATURES, f->features);
 	put_le32(r + ESC_REG_DL_CONTROL, 0x00070001);
 	put_le16(r + ESC_REG_AL_CONTROL, AL_INIT);
 	put_le16(r + ESC_REG_AL_STATUS, AL_INIT);
 	put_le16(r + ESC_REG_WATCHDOG_DIVIDER, 0x09c2);
 	put_le16(r + ESC_REG_WATCHDOG_TIME_PDI, 1000);
 	put_le16(r + ESC_REG_WATCHDOG_TIME_PD, 1000);
-	r[ESC_REG_WATCHDOG_STATUS_PD] = 1;
 	put_le32(r + ESC_REG_AL_EVENT_MASK, 0x00ffff0f);
 	put_le16(r + ESC_REG_DC_SPEED_COUNTER_START, 0x1000);
 	r[ESC_REG_DC_TIME_FILTER] = 4;
 	r[ESC_REG_DC_SPEED_FILTER] = 12;
+	for (unsigned port = 0; port < ESC_PORTS; port++) {
+		put_le32(r + ESC_REG_DC_RECEIVE_TIME_PORT + 4 * port,
+			 f->receive_time_at_power_on[port]);
+	}
+}
+
+void esc_init(struct esc *esc, const struct esc_features *features, uint8_t *sii, size_t sii_bytes,
+	      int64_t t_ns)
+{
+	memset(esc, 0, sizeof(*esc));
+	esc->features = *features;
+	esc->sii = sii;
+	esc->sii_bytes = sii_bytes;
+	esc->watchdog_deadline_ns = INT64_MAX;
+	esc->pdi_watchdog_deadline_ns = INT64_MAX;
+	esc->sync.next_true_ns = INT64_MAX;
+	esc->sync.next1_true_ns = INT64_MAX;
+	esc_register_layout(esc);
+	reset_registers(esc);
 	for (unsigned n = 0; n < features->sm_count; n++) {
 		esc_sm_configure(esc, n, ESC_PDI);
 	}
-	esc->al_event = 0;
 	esc_clock_start(esc, t_ns, 0, 0.0);
 	esc_eeprom_power_on(esc, t_ns);
 }
@@ -65,14 +80,11 @@ void esc_sync0_to(struct esc *esc, esc_sync0_sink sink, void *ctx)
 	esc->sink_ctx = ctx;
 }
 
-int esc_eeprom_loaded(const struct esc *esc)
-{
-	return esc->is_eeprom_loaded;
-}
+/* --- ports --- */
 
-int esc_irq(const struct esc *esc)
+int esc_is_port_closed(const struct esc *esc, unsigned port)
 {
-	return (esc->al_event & get_le32(esc->reg + ESC_REG_AL_EVENT_MASK)) != 0;
+	return (esc->reg[ESC_REG_DL_CONTROL + 1] >> (2 * port) & 3) == 3;
 }
 
 void esc_set_links(struct esc *esc, uint8_t ports)
@@ -80,20 +92,34 @@ void esc_set_links(struct esc *esc, uint8_t ports)
 	uint16_t status = get_le16(esc->reg + ESC_REG_DL_STATUS) & 0x000f;
 
 	for (unsigned port = 0; port < ESC_PORTS; port++) {
-		int has_link = ports >> port & 1;
+		unsigned has_link = ports >> port & 1u;
+		/* Bit 0 the loop is closed (without a link by itself), bit 1 there is communication. */
+		unsigned loop = has_link && !esc_is_port_closed(esc, port) ? 2 : 1;
 
 		status |= (uint16_t)(has_link << (4 + port));
-		/* Without a link the loop closes by itself; with one there is communication. */
-		status |= (uint16_t)((has_link ? 2u : 1u) << (8 + 2 * port));
+		status |= (uint16_t)(loop << (8 + 2 * port));
+	}
+	if (status != get_le16(esc->reg + ESC_REG_DL_STATUS)) {
+		esc->ecat_event |= ESC_ECAT_EVENT_DL_STATUS;
 	}
 	put_le16(esc->reg + ESC_REG_DL_STATUS, status);
+	esc->ports = ports;
 }
 
-void esc_count_error(struct esc *esc, unsigned port, unsigned kind)
+void esc_count_error(struct esc *esc, unsigned port, enum esc_error error)
 {
-	static const uint16_t first[] = { ESC_REG_RX_ERROR_COUNTER, ESC_REG_RX_ERROR_COUNTER + 1,
-					  ESC_REG_FORWARDED_RX_ERROR, ESC_REG_LOST_LINK_COUNTER };
-	uint8_t *counter = &esc->reg[first[kind & 3] + port * ((kind & 3) < 2 ? 2u : 1u)];
+	static const struct {
+		uint16_t first;
+		uint8_t a_port;
+	} counters[] = {
+		[ESC_ERROR_INVALID_FRAME] = { ESC_REG_RX_ERROR_COUNTER, 2 },
+		[ESC_ERROR_RX] = { ESC_REG_RX_ERROR_COUNTER + 1, 2 },
+		[ESC_ERROR_FORWARDED] = { ESC_REG_FORWARDED_RX_ERROR, 1 },
+		[ESC_ERROR_LOST_LINK] = { ESC_REG_LOST_LINK_COUNTER, 1 },
+		[ESC_ERROR_UNIT] = { ESC_REG_ECAT_PU_ERROR, 0 },
+	};
+	uint8_t *counter =
+		&esc->reg[counters[error].first + (port % ESC_PORTS) * counters[error].a_port];
 
 	/* They stop at 0xff (data sheet). */
 	if (*counter < 0xff) {
@@ -101,24 +127,49 @@ void esc_count_error(struct esc *esc, unsigned port, unsigned kind)
 	}
 }
 
+void esc_force_al_status(struct esc *esc, uint8_t status, uint16_t code)
+{
+	esc->reg[ESC_REG_AL_STATUS] = status;
+	put_le16(esc->reg + ESC_REG_AL_STATUS_CODE, code);
+	esc->ecat_event |= ESC_ECAT_EVENT_AL_STATUS;
+}
+
 /* --- the wire --- */
 
 static int read_memory(struct esc *esc, const struct esc_frame *frame, uint16_t addr, uint8_t *buf,
 		       size_t len)
 {
-	if (addr >= ESC_REG_PROCESS_RAM) {
-		return esc_ram_read(esc, ESC_ECAT, addr, buf, len);
+	size_t registers = 0;
+	int any = 0;
+
+	if (addr < ESC_REG_PROCESS_RAM) {
+		registers = (size_t)ESC_REG_PROCESS_RAM - addr;
+		registers = registers < len ? registers : len;
+		any = esc_register_read(esc, ESC_ECAT, frame->pu_ns, addr, buf, registers);
 	}
-	return esc_register_read(esc, frame, addr, buf, len);
+	if (registers < len) {
+		any |= esc_ram_read(esc, ESC_ECAT, (uint16_t)(addr + registers), buf + registers,
+				    len - registers);
+	}
+	return any;
 }
 
 static int write_memory(struct esc *esc, const struct esc_frame *frame, uint16_t addr,
 			const uint8_t *buf, size_t len)
 {
-	if (addr >= ESC_REG_PROCESS_RAM) {
-		return esc_ram_write(esc, ESC_ECAT, frame->pu_ns, addr, buf, len);
+	size_t registers = 0;
+	int any = 0;
+
+	if (addr < ESC_REG_PROCESS_RAM) {
+		registers = (size_t)ESC_REG_PROCESS_RAM - addr;
+		registers = registers < len ? registers : len;
+		any = esc_register_write(esc, frame, addr, buf, registers);
 	}
-	return esc_register_write(esc, frame, addr, buf, len);
+	if (registers < len) {
+		any |= esc_ram_write(esc, ESC_ECAT, frame->pu_ns, (uint16_t)(addr + registers),
+				     buf + registers, len - registers);
+	}
+	return any;
 }
 
 static void add_wkc(struct ecat_datagram *dg, int n)
@@ -131,6 +182,7 @@ static void do_read(struct esc *esc, const struct esc_frame *frame, struct ecat_
 {
 	uint8_t got[ECAT_DATAGRAM_MAX_BYTES];
 
+	memcpy(got, dg->data, dg->data_len);
 	if (!read_memory(esc, frame, dg->ado, got, dg->data_len)) {
 		return;
 	}
@@ -211,9 +263,23 @@ static void increment_address(struct ecat_datagram *dg)
 	}
 }
 
+/* Pending ECAT events that 0x0200 lets through, of all slaves, come back with each datagram. */
+static void add_irq(const struct esc *esc, struct ecat_datagram *dg)
+{
+	uint16_t mask = get_le16(esc->reg + ESC_REG_ECAT_EVENT_MASK);
+
+	dg->irq |= (uint16_t)(esc->ecat_event & mask);
+	put_le16(dg->data - 2, dg->irq);
+}
+
 void esc_datagram(struct esc *esc, const struct esc_frame *frame, struct ecat_datagram *dg)
 {
 	int addressed = is_addressed(esc, dg);
+
+	if (dg->data_len > ECAT_DATAGRAM_MAX_BYTES) {
+		return;
+	}
+	add_irq(esc, dg);
 
 	switch ((enum ecat_cmd)dg->cmd) {
 	case ECAT_CMD_NOP:
@@ -242,7 +308,7 @@ void esc_datagram(struct esc *esc, const struct esc_frame *frame, struct ecat_da
 	case ECAT_CMD_LRD:
 	case ECAT_CMD_LWR:
 	case ECAT_CMD_LRW:
-		esc_fmmu_access(esc, frame->pu_ns, dg);
+		esc_fmmu_access(esc, frame, dg);
 		break;
 	case ECAT_CMD_ARMW:
 	case ECAT_CMD_FRMW:
@@ -256,92 +322,20 @@ void esc_datagram(struct esc *esc, const struct esc_frame *frame, struct ecat_da
 	increment_address(dg);
 }
 
-/* --- the PDI --- */
-
-static void pdi_register_read(struct esc *esc, int64_t t_ns, uint16_t addr, size_t len)
-{
-	/* Reading is how the firmware acknowledges. */
-	if (addr <= ESC_REG_AL_CONTROL && addr + len > ESC_REG_AL_CONTROL) {
-		esc->al_event &= ~(uint32_t)ESC_AL_EVENT_CONTROL;
-	}
-	if (addr <= ESC_REG_WATCHDOG_STATUS_PD && addr + len > ESC_REG_WATCHDOG_STATUS_PD) {
-		esc->al_event &= ~(uint32_t)ESC_AL_EVENT_WATCHDOG;
-	}
-	if (addr <= ESC_REG_DC_SYNC0_STATUS && addr + len > ESC_REG_DC_SYNC0_STATUS) {
-		esc->al_event &= ~(uint32_t)ESC_AL_EVENT_SYNC0;
-	}
-	for (unsigned n = 0; n < esc->features.sm_count; n++) {
-		size_t activate = ESC_REG_SM + n * ESC_SM_BYTES + 6u;
-
-		if (addr <= activate && addr + len > activate) {
-			esc->al_event &= ~(uint32_t)ESC_AL_EVENT_SM_ACTIVATION;
-		}
-	}
-	(void)t_ns;
-}
-
-void esc_pdi_read(struct esc *esc, int64_t t_ns, uint16_t addr, void *buf, size_t len)
-{
-	struct esc_frame now = { .pu_ns = t_ns };
-
-	memset(buf, 0, len);
-	if (!esc->is_eeprom_loaded) {
-		return;
-	}
-	if (addr >= ESC_REG_PROCESS_RAM) {
-		esc_ram_read(esc, ESC_PDI, addr, buf, len);
-		return;
-	}
-	esc_register_read(esc, &now, addr, buf, len);
-	pdi_register_read(esc, t_ns, addr, len);
-}
-
-static void pdi_register_write(struct esc *esc, int64_t t_ns, uint16_t addr, uint8_t value)
-{
-	int is_sync = addr > ESC_REG_DC_CYCLIC_CONTROL && addr < ESC_REG_DC_SYNC1_CYCLE + 4;
-	unsigned sm = (unsigned)(addr - ESC_REG_SM) / ESC_SM_BYTES;
-
-	if (is_sync && esc->features.has_sync_unit) {
-		if (esc->reg[ESC_REG_DC_CYCLIC_CONTROL] & 1) {
-			esc->reg[addr] = value;
-		}
-	} else if ((addr >= ESC_REG_AL_STATUS && addr < ESC_REG_AL_STATUS_CODE + 2) ||
-		   (addr >= ESC_REG_AL_EVENT_MASK && addr < ESC_REG_AL_EVENT_MASK + 4) ||
-		   addr >= ESC_REG_USER_RAM) {
-		esc->reg[addr] = value;
-	} else if (addr >= ESC_REG_SM && sm < esc->features.sm_count && addr % ESC_SM_BYTES == 7) {
-		esc->reg[addr] = value;
-		esc_sm_configure(esc, sm, ESC_PDI);
-	}
-	if (addr == ESC_REG_DC_ACTIVATION && (esc->reg[ESC_REG_DC_CYCLIC_CONTROL] & 1)) {
-		esc_sync_activate(esc, t_ns);
-	}
-}
-
-void esc_pdi_write(struct esc *esc, int64_t t_ns, uint16_t addr, const void *buf, size_t len)
-{
-	const uint8_t *bytes = buf;
-
-	if (!esc->is_eeprom_loaded) {
-		return;
-	}
-	if (addr >= ESC_REG_PROCESS_RAM) {
-		esc_ram_write(esc, ESC_PDI, t_ns, addr, buf, len);
-		return;
-	}
-	for (size_t i = 0; i < len && addr + i < ESC_REGISTER_BYTES; i++) {
-		pdi_register_write(esc, t_ns, (uint16_t)(addr + i), bytes[i]);
-	}
-}
-
 /* --- its own events --- */
 
 int64_t esc_next_event_ns(const struct esc *esc)
 {
 	int64_t next = esc->sync.next_true_ns;
 
+	if (esc->sync.next1_true_ns < next) {
+		next = esc->sync.next1_true_ns;
+	}
 	if (esc->watchdog_deadline_ns < next) {
 		next = esc->watchdog_deadline_ns;
+	}
+	if (esc->pdi_watchdog_deadline_ns < next) {
+		next = esc->pdi_watchdog_deadline_ns;
 	}
 	if (esc->eeprom_busy_until_ns != 0 && esc->eeprom_busy_until_ns < next) {
 		next = esc->eeprom_busy_until_ns;
@@ -354,11 +348,14 @@ void esc_advance(struct esc *esc, int64_t t_ns)
 	for (int64_t next = esc_next_event_ns(esc); next <= t_ns; next = esc_next_event_ns(esc)) {
 		if (next == esc->sync.next_true_ns) {
 			esc_sync_edge(esc);
+		} else if (next == esc->sync.next1_true_ns) {
+			esc_sync1_edge(esc);
 		} else if (next == esc->watchdog_deadline_ns) {
 			esc_watchdog_expire(esc);
+		} else if (next == esc->pdi_watchdog_deadline_ns) {
+			esc_pdi_watchdog_expire(esc);
 		} else {
 			esc_eeprom_done(esc);
-			esc->reg[ESC_REG_DL_STATUS] |= (uint8_t)esc->is_eeprom_loaded;
 		}
 	}
 }

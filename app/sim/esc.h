@@ -151,6 +151,7 @@ struct esc {
 	uint16_t eeprom_command;
 	int64_t watchdog_deadline_ns;     /* process data; INT64_MAX: not running */
 	int64_t pdi_watchdog_deadline_ns; /* INT64_MAX: not running, or expired */
+	uint8_t is_pdi_expired;
 	int64_t mailbox_stuck_until_ns;   /* a fault: the PDI's mailbox writes are lost */
 	uint8_t ports;                    /* with a link */
 	uint8_t is_loop_changed;          /* 0x0101 was written: the segment looks */

@@ -35,6 +35,37 @@ uint64_t esc_system_time(const struct esc *esc, int64_t t_ns)
 	return esc->features.dc == ESC_DC_32 ? s & UINT32_MAX : s;
 }
 
+static uint64_t time_since(const struct esc *esc, int64_t t_ns, uint64_t start)
+{
+	uint64_t since = esc_system_time(esc, t_ns) - start;
+
+	return esc->features.dc == ESC_DC_32 ? (uint32_t)since : since;
+}
+
+int64_t esc_clock_when(const struct esc *esc, int64_t t_ns, uint64_t system_ns)
+{
+	uint64_t now = esc_system_time(esc, t_ns);
+	uint64_t left = system_ns - now;
+	int64_t guess;
+
+	/* With 32 bits a time that is past comes again; with 64 it never does. */
+	if (esc->features.dc == ESC_DC_32) {
+		left = (uint32_t)left;
+	}
+	if (left > INT64_MAX / 4) {
+		return INT64_MAX;
+	}
+	guess = t_ns + (int64_t)ceil((double)left / rate(&esc->clock));
+	/* The clock is in whole ns: step to the first instant at which it shows the time. */
+	while (guess > t_ns && time_since(esc, guess - 1, now) >= left) {
+		guess--;
+	}
+	while (time_since(esc, guess, now) < left) {
+		guess++;
+	}
+	return guess;
+}
+
 static void rebase(struct esc_clock *c, int64_t t_ns)
 {
 	int64_t dt = t_ns - c->base_true_ns;

@@ -18,178 +18,145 @@ void esc_fmmu_configure(struct esc *esc, unsigned n)
 	f->physical_start = get_le16(r + 8);
 	f->physical_start_bit = r[10] & 7;
 	f->type = r[11] & 3;
-	f->is_active = (r[12] & 1) && f->len > 0;
+	f->is_active = (r[12] & 1) && f->len > 0 &&
+		       (f->len > 1 || f->logical_end_bit >= f->logical_start_bit);
 	f->is_bytewise = f->logical_start_bit == 0 && f->logical_end_bit == 7 &&
 			 f->physical_start_bit == 0;
 }
 
-/* Registers can be mapped, too (mailbox status by FMMU). */
-static int read_physical(struct esc *esc, uint16_t addr, uint8_t *buf, size_t len)
+/* Registers can be mapped, too (mailbox status); so a read may do what reading a register does. */
+static int read_physical(struct esc *esc, int64_t t_ns, uint16_t addr, uint8_t *buf, size_t len)
 {
 	if (addr >= ESC_REG_PROCESS_RAM) {
 		return esc_ram_read(esc, ESC_ECAT, addr, buf, len);
 	}
-	if ((size_t)addr + len > ESC_REGISTER_BYTES) {
-		return 0;
-	}
-	memcpy(buf, esc->reg + addr, len);
-	return 1;
+	return esc_register_read(esc, ESC_ECAT, t_ns, addr, buf, len);
 }
 
-static int write_physical(struct esc *esc, int64_t t_ns, uint16_t addr, const uint8_t *buf,
-			  size_t len)
+/* Of the registers an FMMU reaches the outputs only (our reading of the data sheet). */
+static int write_physical(struct esc *esc, const struct esc_frame *frame, uint16_t addr,
+			  const uint8_t *buf, size_t len)
 {
-	return addr >= ESC_REG_PROCESS_RAM && esc_ram_write(esc, ESC_ECAT, t_ns, addr, buf, len);
+	if (addr >= ESC_REG_PROCESS_RAM) {
+		return esc_ram_write(esc, ESC_ECAT, frame->pu_ns, addr, buf, len);
+	}
+	return addr >= ESC_REG_DIGITAL_OUTPUTS && esc_register_write(esc, frame, addr, buf, len);
 }
 
-/* What of an FMMU and a datagram is the same: in bytes of the logical space. */
+/* What of an FMMU lies in a datagram, in bits; the slave's are counted from 8 * physical_start. */
 struct overlap {
-	size_t in_datagram;
-	size_t in_fmmu;
-	size_t len;
+	size_t datagram_bit;
+	size_t physical_bit;
+	size_t bits;
 };
 
 static int overlaps(const struct esc_fmmu *f, uint32_t start, size_t len, struct overlap *ret)
 {
-	uint64_t from = f->logical_start > start ? f->logical_start : start;
-	uint64_t f_end = (uint64_t)f->logical_start + f->len;
-	uint64_t d_end = (uint64_t)start + len;
+	uint64_t f_first = (uint64_t)f->logical_start * 8 + f->logical_start_bit;
+	uint64_t f_end = ((uint64_t)f->logical_start + f->len - 1) * 8 + f->logical_end_bit + 1u;
+	uint64_t d_first = (uint64_t)start * 8;
+	uint64_t d_end = d_first + len * 8;
+	uint64_t from = f_first > d_first ? f_first : d_first;
 	uint64_t to = f_end < d_end ? f_end : d_end;
 
 	if (from >= to) {
 		return 0;
 	}
-	*ret = (struct overlap){ .in_datagram = (size_t)(from - start),
-				 .in_fmmu = (size_t)(from - f->logical_start),
-				 .len = (size_t)(to - from) };
+	*ret = (struct overlap){ .datagram_bit = (size_t)(from - d_first),
+				 .physical_bit = (size_t)(from - f_first) + f->physical_start_bit,
+				 .bits = (size_t)(to - from) };
 	return 1;
 }
 
-/* The mapped bits of byte @i of the FMMU's logical range. */
-static uint8_t bit_mask(const struct esc_fmmu *f, size_t i)
+static uint16_t physical_address(const struct esc_fmmu *f, const struct overlap *o)
 {
-	uint8_t mask = 0xff;
+	return (uint16_t)(f->physical_start + o->physical_bit / 8);
+}
 
-	if (i == 0) {
-		mask = (uint8_t)(mask << f->logical_start_bit);
+static size_t physical_bytes(const struct overlap *o)
+{
+	return (o->physical_bit % 8 + o->bits + 7) / 8;
+}
+
+static void copy_bits(uint8_t *to, size_t to_bit, const uint8_t *from, size_t from_bit, size_t bits)
+{
+	for (; bits > 0; bits--, to_bit++, from_bit++) {
+		uint8_t mask = (uint8_t)(1u << (to_bit % 8));
+		int value = from[from_bit / 8] >> (from_bit % 8) & 1;
+
+		to[to_bit / 8] = (uint8_t)(value ? to[to_bit / 8] | mask : to[to_bit / 8] & ~mask);
 	}
-	if (i + 1 == f->len) {
-		mask &= (uint8_t)(0xff >> (7 - f->logical_end_bit));
+}
+
+static int read_mapped(struct esc *esc, int64_t t_ns, const struct esc_fmmu *f,
+		       const struct overlap *o, uint8_t *data)
+{
+	uint8_t physical[LOGICAL_BYTES_MAX + 2] = { 0 };
+
+	if (f->is_bytewise) {
+		return read_physical(esc, t_ns, physical_address(f, o), data + o->datagram_bit / 8,
+				     o->bits / 8);
 	}
-	return mask;
-}
-
-/* First mapped bit of the FMMU that lies in logical byte @i, and where it is in the slave. */
-static size_t physical_bit(const struct esc_fmmu *f, size_t i, unsigned bit)
-{
-	return i * 8 + bit - f->logical_start_bit + f->physical_start_bit;
-}
-
-static size_t physical_bytes(const struct esc_fmmu *f)
-{
-	size_t bits = ((size_t)f->len - 1) * 8 + f->logical_end_bit + 1u - f->logical_start_bit;
-
-	return (bits + f->physical_start_bit + 7) / 8;
-}
-
-static int read_bits(struct esc *esc, const struct esc_fmmu *f, const struct overlap *o, uint8_t *data)
-{
-	uint8_t physical[LOGICAL_BYTES_MAX + 2];
-	size_t bytes = physical_bytes(f);
-
-	if (bytes > sizeof(physical) || !read_physical(esc, f->physical_start, physical, bytes)) {
+	if (!read_physical(esc, t_ns, physical_address(f, o), physical, physical_bytes(o))) {
 		return 0;
 	}
-	for (size_t i = 0; i < o->len; i++) {
-		uint8_t mask = bit_mask(f, o->in_fmmu + i);
-
-		for (unsigned bit = 0; bit < 8; bit++) {
-			size_t p = physical_bit(f, o->in_fmmu + i, bit);
-
-			if (!(mask >> bit & 1)) {
-				continue;
-			}
-			data[i] = (uint8_t)((data[i] & ~(1u << bit)) |
-					    (unsigned)(physical[p / 8] >> (p % 8) & 1) << bit);
-		}
-	}
+	copy_bits(data, o->datagram_bit, physical, o->physical_bit % 8, o->bits);
 	return 1;
 }
 
-static int write_bits(struct esc *esc, int64_t t_ns, const struct esc_fmmu *f,
-		      const struct overlap *o, const uint8_t *data)
+/* Bits that are not mapped keep what was written last (our model). */
+static void fetch_last(struct esc *esc, uint16_t addr, uint8_t *buf, size_t len)
 {
-	uint8_t physical[LOGICAL_BYTES_MAX + 2];
-	size_t bytes = physical_bytes(f);
-	struct esc_sm *sm = esc_sm_at(esc, f->physical_start);
+	for (size_t i = 0; i < len; i++) {
+		size_t at = (size_t)addr + i;
 
-	if (bytes > sizeof(physical) ||
-	    (size_t)f->physical_start + bytes > ESC_REG_PROCESS_RAM + sizeof(esc->ram)) {
-		return 0;
-	}
-	/* Bits that are not mapped keep what was written last. */
-	if (f->physical_start < ESC_REG_PROCESS_RAM) {
-		return 0;
-	}
-	if (sm != NULL && !sm->is_mailbox) {
-		size_t at = (size_t)(f->physical_start - sm->start);
-
-		memcpy(physical,
-		       esc->ram + sm->start - ESC_REG_PROCESS_RAM + (size_t)sm->newest * sm->len + at,
-		       bytes);
-	} else {
-		memcpy(physical, esc->ram + f->physical_start - ESC_REG_PROCESS_RAM, bytes);
-	}
-	for (size_t i = 0; i < o->len; i++) {
-		uint8_t mask = bit_mask(f, o->in_fmmu + i);
-
-		for (unsigned bit = 0; bit < 8; bit++) {
-			size_t p = physical_bit(f, o->in_fmmu + i, bit);
-
-			if (!(mask >> bit & 1)) {
-				continue;
-			}
-			physical[p / 8] = (uint8_t)((physical[p / 8] & ~(1u << (p % 8))) |
-						    (unsigned)(data[i] >> bit & 1) << (p % 8));
+		if (at < ESC_REG_PROCESS_RAM) {
+			buf[i] = esc->reg[at];
+		} else if (at < ESC_REG_PROCESS_RAM + ESC_RAM_BYTES) {
+			buf[i] = *esc_ram_last_written(esc, (uint16_t)at);
+		} else {
+			buf[i] = 0;
 		}
 	}
-	return write_physical(esc, t_ns, f->physical_start, physical, bytes);
 }
 
-void esc_fmmu_access(struct esc *esc, int64_t t_ns, struct ecat_datagram *dg)
+static int write_mapped(struct esc *esc, const struct esc_frame *frame, const struct esc_fmmu *f,
+			const struct overlap *o, const uint8_t *data)
+{
+	uint8_t physical[LOGICAL_BYTES_MAX + 2];
+	uint16_t addr = physical_address(f, o);
+
+	if (f->is_bytewise) {
+		return write_physical(esc, frame, addr, data + o->datagram_bit / 8, o->bits / 8);
+	}
+	fetch_last(esc, addr, physical, physical_bytes(o));
+	copy_bits(physical, o->physical_bit % 8, data, o->datagram_bit, o->bits);
+	return write_physical(esc, frame, addr, physical, physical_bytes(o));
+}
+
+void esc_fmmu_access(struct esc *esc, const struct esc_frame *frame, struct ecat_datagram *dg)
 {
 	uint32_t start = ecat_logical_address(dg);
-	uint8_t before[LOGICAL_BYTES_MAX];
+	uint8_t came[LOGICAL_BYTES_MAX];
 	int is_read = dg->cmd == ECAT_CMD_LRD || dg->cmd == ECAT_CMD_LRW;
 	int is_write = dg->cmd == ECAT_CMD_LWR || dg->cmd == ECAT_CMD_LRW;
 	int did_read = 0;
 	int did_write = 0;
 
-	if (dg->data_len > sizeof(before)) {
-		return;
-	}
 	/* What is written is what came in, not what an FMMU before has put there. */
-	memcpy(before, dg->data, dg->data_len);
+	memcpy(came, dg->data, dg->data_len);
 	for (unsigned n = 0; n < esc->features.fmmu_count; n++) {
 		const struct esc_fmmu *f = &esc->fmmu[n];
 		struct overlap o;
-		uint16_t physical;
 
 		if (!f->is_active || !overlaps(f, start, dg->data_len, &o)) {
 			continue;
 		}
-		physical = (uint16_t)(f->physical_start + o.in_fmmu);
 		if (is_write && (f->type & FMMU_WRITE)) {
-			did_write |= f->is_bytewise
-					     ? write_physical(esc, t_ns, physical,
-							      before + o.in_datagram, o.len)
-					     : write_bits(esc, t_ns, f, &o, before + o.in_datagram);
+			did_write |= write_mapped(esc, frame, f, &o, came);
 		}
 		if (is_read && (f->type & FMMU_READ)) {
-			did_read |= f->is_bytewise
-					    ? read_physical(esc, physical, dg->data + o.in_datagram,
-							    o.len)
-					    : read_bits(esc, f, &o, dg->data + o.in_datagram);
+			did_read |= read_mapped(esc, frame->pu_ns, f, &o, dg->data);
 		}
 	}
 	put_le16(dg->wkc, (uint16_t)(get_le16(dg->wkc) + did_read +

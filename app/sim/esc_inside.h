@@ -24,7 +24,7 @@ void esc_sm_configure(struct esc *esc, unsigned n, enum esc_side side);
 /** The digital outputs at 0x0f00 were written up to before @end: what an SM over them does. */
 void esc_sm_outputs_written(struct esc *esc, int64_t t_ns, uint16_t addr, size_t len);
 /** The area of an active SM at @addr as it would be read back, for bits that a write leaves alone. */
-const uint8_t *esc_ram_last_written(const struct esc *esc, uint16_t addr);
+const uint8_t *esc_ram_last_written(struct esc *esc, uint16_t addr);
 
 /* --- esc_fmmu.c --- */
 

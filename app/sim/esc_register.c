@@ -1,152 +1,92 @@
 /* SPDX-License-Identifier: MIT */
-/* The register file 0x0000 to 0x0fff: which bytes exist, which the master may write, and what that does. */
+/* The register file 0x0000 to 0x0fff: what reading shows and what writing does. */
 #include "sim/esc_inside.h"
 
 #include <string.h>
 
-struct range {
-	uint16_t first;
-	uint16_t len;
+#include "wire/al.h"
+
+enum register_bits {
+	CONFIG_DEVICE_EMULATION = 0x01, /* 0x0141 */
+	CONFIG_ENHANCED_LINK = 0xf2,    /* all ports, or one */
+	DL_EEPROM_LOADED = 0x01,        /* 0x0110 */
+	DL_PDI_WATCHDOG = 0x02,
+	DL_ENHANCED_LINK = 0x04,
 };
 
-/* What every ESC has. A register that does not exist gives no working counter. */
-static const struct range always_readable[] = {
-	{ ESC_REG_TYPE, 10 },
-	{ ESC_REG_STATION_ADDRESS, 4 },
-	{ ESC_REG_WRITE_ENABLE, 2 },
-	{ 0x0030, 2 },
-	{ ESC_REG_RESET_ECAT, 2 },
-	{ ESC_REG_DL_CONTROL, 4 },
-	{ 0x0108, 2 },
-	{ ESC_REG_DL_STATUS, 2 },
-	{ ESC_REG_AL_CONTROL, 2 },
-	{ ESC_REG_AL_STATUS, 2 },
-	{ ESC_REG_AL_STATUS_CODE, 2 },
-	{ ESC_REG_PDI_CONTROL, 2 },
-	{ ESC_REG_PDI_CONFIG, 4 },
-	{ ESC_REG_ECAT_EVENT_MASK, 2 },
-	{ ESC_REG_AL_EVENT_MASK, 4 },
-	{ ESC_REG_ECAT_EVENT_REQUEST, 2 },
-	{ ESC_REG_AL_EVENT_REQUEST, 4 },
-	{ ESC_REG_RX_ERROR_COUNTER, 14 },
-	{ ESC_REG_LOST_LINK_COUNTER, 4 },
-	{ ESC_REG_WATCHDOG_DIVIDER, 2 },
-	{ ESC_REG_WATCHDOG_TIME_PDI, 2 },
-	{ ESC_REG_WATCHDOG_TIME_PD, 2 },
-	{ ESC_REG_WATCHDOG_STATUS_PD, 4 },
-	{ ESC_REG_EEPROM_CONFIG, 16 },
-	{ ESC_REG_MII_CONTROL, 6 },
-	{ ESC_REG_USER_RAM, 128 },
-};
+/* --- reading --- */
 
-static const struct range always_writable[] = {
-	{ ESC_REG_STATION_ADDRESS, 2 },
-	{ ESC_REG_WRITE_ENABLE, 2 },
-	{ 0x0030, 2 },
-	{ ESC_REG_RESET_ECAT, 1 },
-	{ ESC_REG_DL_CONTROL, 4 },
-	{ ESC_REG_AL_CONTROL, 2 },
-	{ ESC_REG_ECAT_EVENT_MASK, 2 },
-	{ ESC_REG_RX_ERROR_COUNTER, 14 },
-	{ ESC_REG_LOST_LINK_COUNTER, 4 },
-	{ ESC_REG_WATCHDOG_DIVIDER, 2 },
-	{ ESC_REG_WATCHDOG_TIME_PDI, 2 },
-	{ ESC_REG_WATCHDOG_TIME_PD, 2 },
-	{ ESC_REG_WATCHDOG_COUNTER_PD, 2 },
-	{ ESC_REG_EEPROM_CONFIG, 1 },
-	{ ESC_REG_EEPROM_CONTROL, 14 },
-	{ ESC_REG_MII_CONTROL, 6 },
-	{ ESC_REG_USER_RAM, 128 },
-};
-
-static const struct range system_time_readable[] = {
-	{ ESC_REG_DC_SYSTEM_TIME, 0x26 },
-};
-
-static const struct range system_time_writable[] = {
-	{ ESC_REG_DC_SYSTEM_TIME, 8 },        { ESC_REG_DC_SYSTEM_TIME_OFFSET, 8 },
-	{ ESC_REG_DC_SYSTEM_TIME_DELAY, 4 },  { ESC_REG_DC_SPEED_COUNTER_START, 2 },
-	{ ESC_REG_DC_TIME_FILTER, 3 },
-};
-
-static const struct range sync_readable[] = { { ESC_REG_DC_CYCLIC_CONTROL, 5 },
-					      { ESC_REG_DC_SYNC0_STATUS, 2 },
-					      { ESC_REG_DC_START_TIME, 24 } };
-static const struct range sync_writable[] = { { ESC_REG_DC_CYCLIC_CONTROL, 2 },
-					      { ESC_REG_DC_START_TIME, 8 },
-					      { ESC_REG_DC_SYNC0_CYCLE, 8 } };
-
-#define COUNT(a) (sizeof(a) / sizeof((a)[0]))
-
-static void mark(uint8_t *map, const struct range *ranges, size_t count)
+static void refresh_dl_status(struct esc *esc)
 {
-	for (size_t i = 0; i < count; i++) {
-		for (unsigned n = ranges[i].first; n < (unsigned)ranges[i].first + ranges[i].len; n++) {
-			map[n / 8] |= (uint8_t)(1u << (n % 8));
+	uint8_t config = esc->reg[ESC_REG_ESC_CONFIG];
+	uint8_t low = esc->is_eeprom_loaded ? DL_EEPROM_LOADED : 0;
+
+	low |= esc_pdi_watchdog_is_running(esc) ? DL_PDI_WATCHDOG : 0;
+	low |= config & CONFIG_ENHANCED_LINK ? DL_ENHANCED_LINK : 0;
+	esc->reg[ESC_REG_DL_STATUS] = (uint8_t)((esc->reg[ESC_REG_DL_STATUS] & 0xf0) | low);
+}
+
+static void refresh_times(struct esc *esc, enum esc_side side, int64_t t_ns, uint16_t addr,
+			  size_t len)
+{
+	if (esc_touches(addr, len, ESC_REG_DC_SYSTEM_TIME, 8)) {
+		uint64_t now = esc_system_time(esc, t_ns);
+
+		/* The master reads when the frame was at the reference clock (data sheet, 0x0910). */
+		if (side == ESC_ECAT) {
+			now -= get_le32(esc->reg + ESC_REG_DC_SYSTEM_TIME_DELAY);
 		}
+		put_le64(esc->reg + ESC_REG_DC_SYSTEM_TIME, now);
 	}
-}
-
-static void mark_units(struct esc *esc, uint16_t first, unsigned unit_bytes, unsigned count)
-{
-	for (unsigned n = 0; n < count; n++) {
-		struct range all = { (uint16_t)(first + n * unit_bytes), (uint16_t)unit_bytes };
-
-		mark(esc->readable, &all, 1);
-		mark(esc->ecat_writable, &all, 1);
-	}
-}
-
-void esc_register_layout(struct esc *esc)
-{
-	static const struct range ports = { ESC_REG_DC_RECEIVE_TIME_PORT, 16 };
-	static const struct range latch = { ESC_REG_DC_RECEIVE_TIME_PORT, 4 };
-	const struct esc_features *f = &esc->features;
-
-	memset(esc->readable, 0, sizeof(esc->readable));
-	memset(esc->ecat_writable, 0, sizeof(esc->ecat_writable));
-	mark(esc->readable, always_readable, COUNT(always_readable));
-	mark(esc->ecat_writable, always_writable, COUNT(always_writable));
-	mark_units(esc, ESC_REG_FMMU, ESC_FMMU_BYTES, f->fmmu_count);
-	mark_units(esc, ESC_REG_SM, ESC_SM_BYTES, f->sm_count);
-	if (f->dc != ESC_DC_NONE) {
-		mark(esc->readable, &ports, 1);
-		mark(esc->ecat_writable, &latch, 1);
-	}
-	if (f->dc == ESC_DC_32 || f->dc == ESC_DC_64) {
-		mark(esc->readable, system_time_readable, COUNT(system_time_readable));
-		mark(esc->ecat_writable, system_time_writable, COUNT(system_time_writable));
-	}
-	if (f->has_sync_unit) {
-		mark(esc->readable, sync_readable, COUNT(sync_readable));
-		mark(esc->ecat_writable, sync_writable, COUNT(sync_writable));
-	}
-}
-
-static int touches(uint16_t addr, size_t len, uint16_t reg, size_t reg_len)
-{
-	return addr < reg + reg_len && reg < addr + len;
-}
-
-static void refresh(struct esc *esc, int64_t t_ns, uint16_t addr, size_t len)
-{
-	if (touches(addr, len, ESC_REG_DC_SYSTEM_TIME, 8)) {
-		put_le64(esc->reg + ESC_REG_DC_SYSTEM_TIME, esc_system_time(esc, t_ns));
-	}
-	if (touches(addr, len, ESC_REG_DC_SYSTEM_TIME_DIFF, 8)) {
+	if (esc_touches(addr, len, ESC_REG_DC_SYSTEM_TIME_DIFF, 8)) {
 		esc_clock_to_registers(esc);
 	}
-	if (touches(addr, len, ESC_REG_AL_EVENT_REQUEST, 4)) {
-		put_le32(esc->reg + ESC_REG_AL_EVENT_REQUEST, esc->al_event);
+	if (esc_touches(addr, len, ESC_REG_DC_ACTIVATION_STATUS, 0x20)) {
+		esc_sync_to_registers(esc);
 	}
 }
 
-int esc_register_read(struct esc *esc, const struct esc_frame *frame, uint16_t addr, uint8_t *buf,
-		      size_t len)
+static void refresh(struct esc *esc, enum esc_side side, int64_t t_ns, uint16_t addr, size_t len)
+{
+	uint8_t *r = esc->reg;
+
+	if (addr + len > ESC_REG_DC_SYSTEM_TIME && addr < ESC_REG_USER_RAM) {
+		refresh_times(esc, side, t_ns, addr, len);
+	}
+	if (addr >= ESC_REG_EEPROM_CONFIG) {
+		return;
+	}
+	if (esc_touches(addr, len, ESC_REG_DL_STATUS, 2)) {
+		refresh_dl_status(esc);
+	}
+	if (esc_touches(addr, len, ESC_REG_ECAT_EVENT_REQUEST, 2)) {
+		put_le16(r + ESC_REG_ECAT_EVENT_REQUEST, (uint16_t)esc->ecat_event);
+	}
+	if (esc_touches(addr, len, ESC_REG_AL_EVENT_REQUEST, 4)) {
+		put_le32(r + ESC_REG_AL_EVENT_REQUEST, esc->al_event);
+	}
+	if (esc_touches(addr, len, ESC_REG_WATCHDOG_STATUS_PD, 1) &&
+	    get_le16(r + ESC_REG_WATCHDOG_TIME_PD) == 0) {
+		r[ESC_REG_WATCHDOG_STATUS_PD] |= 1; /* 1: active, or switched off */
+	}
+}
+
+static void acknowledge_ecat(struct esc *esc, uint16_t addr, size_t len)
+{
+	if (esc_touches(addr, len, ESC_REG_DL_STATUS, 2)) {
+		esc->ecat_event &= ~(uint32_t)ESC_ECAT_EVENT_DL_STATUS;
+	}
+	if (esc_touches(addr, len, ESC_REG_AL_STATUS, 2)) {
+		esc->ecat_event &= ~(uint32_t)ESC_ECAT_EVENT_AL_STATUS;
+	}
+}
+
+int esc_register_read(struct esc *esc, enum esc_side side, int64_t t_ns, uint16_t addr,
+		      uint8_t *buf, size_t len)
 {
 	int any = 0;
 
-	refresh(esc, frame->pu_ns, addr, len);
+	refresh(esc, side, t_ns, addr, len);
 	for (size_t i = 0; i < len; i++) {
 		size_t at = addr + i;
 		int is_there = at < ESC_REGISTER_BYTES && esc_bit(esc->readable, (unsigned)at);
@@ -154,78 +94,110 @@ int esc_register_read(struct esc *esc, const struct esc_frame *frame, uint16_t a
 		buf[i] = is_there ? esc->reg[at] : 0;
 		any |= is_there;
 	}
+	if (side == ESC_ECAT) {
+		acknowledge_ecat(esc, addr, len);
+	}
 	return any;
 }
+
+/* --- writing --- */
 
 static void latch_receive_times(struct esc *esc, const struct esc_frame *frame)
 {
 	for (unsigned port = 0; port < ESC_PORTS; port++) {
-		uint32_t local = frame->ports_used >> port & 1
-					 ? (uint32_t)esc_local_time(esc, frame->port_ns[port])
-					 : 0;
-
-		put_le32(esc->reg + ESC_REG_DC_RECEIVE_TIME_PORT + 4 * port, local);
+		/* A port that the frame does not come through keeps what it had (captures). */
+		if (frame->ports_used >> port & 1) {
+			put_le32(esc->reg + ESC_REG_DC_RECEIVE_TIME_PORT + 4 * port,
+				 (uint32_t)esc_local_time(esc, frame->port_ns[port]));
+		}
 	}
 	put_le64(esc->reg + ESC_REG_DC_RECEIVE_TIME_PU, esc_local_time(esc, frame->pu_ns));
 }
 
 static void al_control_written(struct esc *esc)
 {
-	if (esc->reg[ESC_REG_ESC_CONFIG] & 1) {
-		esc->reg[ESC_REG_AL_STATUS] = esc->reg[ESC_REG_AL_CONTROL] & 0x0f;
+	uint8_t *status = &esc->reg[ESC_REG_AL_STATUS];
+	uint8_t control = esc->reg[ESC_REG_AL_CONTROL] & (AL_STATE_MASK | AL_ERROR);
+
+	if (!(esc->reg[ESC_REG_ESC_CONFIG] & CONFIG_DEVICE_EMULATION)) {
+		esc->al_event |= ESC_AL_EVENT_CONTROL;
 		return;
 	}
-	esc->al_event |= ESC_AL_EVENT_CONTROL;
+	/* Captures: the acknowledge bit is copied, too, and so looks like an error. */
+	if (*status != control) {
+		esc->ecat_event |= ESC_ECAT_EVENT_AL_STATUS;
+	}
+	*status = control;
+}
+
+static void time_written(struct esc *esc, int64_t t_ns, const uint8_t *buf, size_t len)
+{
+	uint64_t now = esc_system_time(esc, t_ns);
+	/* Four bytes are enough for the comparison; the upper ones are taken as equal. */
+	uint64_t received =
+		len >= 8 ? get_le64(buf)
+			 : now + (uint64_t)(int64_t)(int32_t)(get_le32(buf) - (uint32_t)now);
+
+	esc_clock_compare(esc, t_ns, received);
 }
 
 static void dc_written(struct esc *esc, const struct esc_frame *frame, uint16_t addr, size_t len,
 		       const uint8_t *buf)
 {
-	uint8_t *r = esc->reg;
-
-	if (touches(addr, len, ESC_REG_DC_RECEIVE_TIME_PORT, 4)) {
+	if (esc_touches(addr, len, ESC_REG_DC_RECEIVE_TIME_PORT, 1)) {
 		latch_receive_times(esc, frame);
 	}
-	if (esc->features.dc != ESC_DC_32 && esc->features.dc != ESC_DC_64) {
+	if (!esc_bit(esc->ecat_writable, ESC_REG_DC_SYSTEM_TIME)) {
 		return;
 	}
-	if (addr == ESC_REG_DC_SYSTEM_TIME && len >= 4) {
-		uint64_t now = esc_system_time(esc, frame->pu_ns);
-		/* Four bytes are enough for the comparison; the upper ones are taken as equal. */
-		uint64_t received = len >= 8 ? get_le64(buf)
-					     : now + (uint64_t)(int64_t)(int32_t)(get_le32(buf) -
-										  (uint32_t)now);
+	if (addr <= ESC_REG_DC_SYSTEM_TIME && addr + len >= ESC_REG_DC_SYSTEM_TIME + 4u) {
+		size_t skip = (size_t)(ESC_REG_DC_SYSTEM_TIME - addr);
 
-		esc_clock_compare(esc, frame->pu_ns, received);
+		time_written(esc, frame->pu_ns, buf + skip, len - skip);
 	}
-	if (touches(addr, len, ESC_REG_DC_SYSTEM_TIME_OFFSET, 8)) {
-		esc->clock.offset_ns = get_le64(r + ESC_REG_DC_SYSTEM_TIME_OFFSET);
+	if (esc_touches(addr, len, ESC_REG_DC_SYSTEM_TIME_OFFSET, 8)) {
+		esc->clock.offset_ns = get_le64(esc->reg + ESC_REG_DC_SYSTEM_TIME_OFFSET);
 		esc_sync_replan(esc, frame->pu_ns);
 	}
-	if (touches(addr, len, ESC_REG_DC_SPEED_COUNTER_START, 2)) {
+	if (esc_touches(addr, len, ESC_REG_DC_SPEED_COUNTER_START, 2)) {
 		esc_clock_reset_filter(esc);
 	}
-	if (touches(addr, len, ESC_REG_DC_ACTIVATION, 1)) {
+	if (esc_touches(addr, len, ESC_REG_DC_ACTIVATION, 1) &&
+	    !(esc->reg[ESC_REG_DC_CYCLIC_CONTROL] & 1)) {
 		esc_sync_activate(esc, frame->pu_ns);
 	}
 }
 
 static void clear_counters(struct esc *esc, uint16_t addr, size_t len)
 {
-	if (touches(addr, len, ESC_REG_RX_ERROR_COUNTER, 12)) {
-		memset(esc->reg + ESC_REG_RX_ERROR_COUNTER, 0, 12);
+	static const struct {
+		uint16_t first;
+		uint16_t len;
+	} groups[] = {
+		{ ESC_REG_RX_ERROR_COUNTER, 12 }, { ESC_REG_ECAT_PU_ERROR, 1 },
+		{ ESC_REG_PDI_ERROR, 1 },         { ESC_REG_LOST_LINK_COUNTER, 4 },
+		{ ESC_REG_WATCHDOG_COUNTER_PD, 2 },
+	};
+
+	/* Writing one, whatever value, clears its group. */
+	for (size_t i = 0; i < sizeof(groups) / sizeof(groups[0]); i++) {
+		if (esc_touches(addr, len, groups[i].first, groups[i].len)) {
+			memset(esc->reg + groups[i].first, 0, groups[i].len);
+		}
 	}
-	if (touches(addr, len, ESC_REG_ECAT_PU_ERROR, 1)) {
-		esc->reg[ESC_REG_ECAT_PU_ERROR] = 0;
+}
+
+static void units_written(struct esc *esc, uint16_t addr, size_t len)
+{
+	for (unsigned n = 0; n < esc->features.fmmu_count; n++) {
+		if (esc_touches(addr, len, ESC_REG_FMMU + n * ESC_FMMU_BYTES, ESC_FMMU_BYTES)) {
+			esc_fmmu_configure(esc, n);
+		}
 	}
-	if (touches(addr, len, ESC_REG_PDI_ERROR, 1)) {
-		esc->reg[ESC_REG_PDI_ERROR] = 0;
-	}
-	if (touches(addr, len, ESC_REG_LOST_LINK_COUNTER, 4)) {
-		memset(esc->reg + ESC_REG_LOST_LINK_COUNTER, 0, 4);
-	}
-	if (touches(addr, len, ESC_REG_WATCHDOG_COUNTER_PD, 2)) {
-		memset(esc->reg + ESC_REG_WATCHDOG_COUNTER_PD, 0, 2);
+	for (unsigned n = 0; n < esc->features.sm_count; n++) {
+		if (esc_touches(addr, len, ESC_REG_SM + n * ESC_SM_BYTES, ESC_SM_BYTES)) {
+			esc_sm_configure(esc, n, ESC_ECAT);
+		}
 	}
 }
 
@@ -233,71 +205,94 @@ static void written(struct esc *esc, const struct esc_frame *frame, uint16_t add
 		    const uint8_t *buf, size_t len)
 {
 	clear_counters(esc, addr, len);
-	if (touches(addr, len, ESC_REG_AL_CONTROL, 2)) {
+	if (esc_touches(addr, len, ESC_REG_AL_CONTROL, 1)) {
 		al_control_written(esc);
 	}
-	if (touches(addr, len, ESC_REG_EEPROM_CONTROL, 2)) {
+	if (esc_touches(addr, len, ESC_REG_DL_CONTROL + 1, 1)) {
+		esc->is_loop_changed = 1;
+	}
+	if (esc_touches(addr, len, ESC_REG_EEPROM_CONFIG, 1)) {
+		esc_eeprom_owner(esc, ESC_ECAT);
+	}
+	if (esc_touches(addr, len, ESC_REG_EEPROM_CONTROL + 1, 1)) {
 		esc_eeprom_command(esc, frame->pu_ns, get_le16(esc->reg + ESC_REG_EEPROM_CONTROL));
 	}
-	for (unsigned n = 0; n < esc->features.fmmu_count; n++) {
-		if (touches(addr, len, (uint16_t)(ESC_REG_FMMU + n * ESC_FMMU_BYTES), ESC_FMMU_BYTES)) {
-			esc_fmmu_configure(esc, n);
-		}
+	if (esc_touches(addr, len, ESC_REG_FMMU, 0x0280)) {
+		units_written(esc, addr, len);
 	}
-	for (unsigned n = 0; n < esc->features.sm_count; n++) {
-		if (touches(addr, len, (uint16_t)(ESC_REG_SM + n * ESC_SM_BYTES), ESC_SM_BYTES)) {
-			esc_sm_configure(esc, n, ESC_ECAT);
-		}
+	if (esc_touches(addr, len, ESC_REG_DIGITAL_OUTPUTS, 4)) {
+		esc_sm_outputs_written(esc, frame->pu_ns, addr, len);
 	}
 	dc_written(esc, frame, addr, len, buf);
 }
 
-static int is_pdi_owned(const struct esc *esc, size_t at)
+/* Is the byte, which the master may write in general, closed to it just now? */
+static int is_locked(const struct esc *esc, unsigned at)
 {
+	if (at == ESC_REG_AL_CONTROL || at == ESC_REG_AL_CONTROL + 1) {
+		/* A mailbox of one: the PDI must read it before it can be written again. */
+		return (esc->al_event & ESC_AL_EVENT_CONTROL) != 0;
+	}
+	if (at >= ESC_REG_EEPROM_CONTROL && at < ESC_REG_MII_CONTROL) {
+		return !esc_eeprom_is_free(esc, ESC_ECAT);
+	}
 	return at > ESC_REG_DC_CYCLIC_CONTROL && at < ESC_REG_DC_SYNC1_CYCLE + 4 &&
 	       (esc->reg[ESC_REG_DC_CYCLIC_CONTROL] & 1);
 }
 
-/* Bits that the chip itself keeps in a register the master writes. */
-static uint8_t kept_bits(size_t at)
+/* Bits that the chip keeps in a register the master writes. */
+static uint8_t kept_bits(const struct esc *esc, unsigned at)
 {
-	switch (at) {
-	case ESC_REG_EEPROM_CONTROL:
+	if (at == ESC_REG_EEPROM_CONTROL) {
 		return 0xfe;
-	case ESC_REG_EEPROM_CONTROL + 1:
-		return 0xf8;
-	default:
-		break;
 	}
-	if (at >= ESC_REG_SM && at < ESC_REG_SM + ESC_LIMIT_SM * ESC_SM_BYTES) {
-		/* SM status and PDI control are the slave's own. */
-		return at % ESC_SM_BYTES == 5 || at % ESC_SM_BYTES == 7 ? 0xff : 0;
+	if (at == ESC_REG_EEPROM_CONTROL + 1) {
+		return 0xf8;
+	}
+	if (at >= ESC_REG_SM && at < ESC_REG_DC_RECEIVE_TIME_PORT) {
+		unsigned n = (at - ESC_REG_SM) / ESC_SM_BYTES;
+
+		/* Status and PDI control are the slave's own; the set-up is fixed while it is active. */
+		if (at % ESC_SM_BYTES == 5 || at % ESC_SM_BYTES == 7) {
+			return 0xff;
+		}
+		return at % ESC_SM_BYTES < 5 && (esc->sm[n].activate & 1) ? 0xff : 0;
+	}
+	if (at >= ESC_REG_DC_RECEIVE_TIME_PORT && at < ESC_REG_DC_SYSTEM_TIME + 8u) {
+		return 0xff; /* latch and compare: nothing is stored */
+	}
+	if (at >= ESC_REG_DC_START_TIME && at < ESC_REG_DC_START_TIME + 8u) {
+		return esc->sync.is_running ? 0xff : 0;
 	}
 	return 0;
+}
+
+static int store(struct esc *esc, unsigned at, uint8_t value)
+{
+	uint8_t kept;
+
+	if (at >= ESC_REGISTER_BYTES || !esc_bit(esc->ecat_writable, at) || is_locked(esc, at)) {
+		return 0;
+	}
+	kept = kept_bits(esc, at);
+	esc->reg[at] = (uint8_t)((esc->reg[at] & kept) | (value & ~kept));
+	return 1;
 }
 
 int esc_register_write(struct esc *esc, const struct esc_frame *frame, uint16_t addr,
 		       const uint8_t *buf, size_t len)
 {
+	size_t run = 0; /* bytes stored without a hole, just before @i */
 	int any = 0;
 
-	for (size_t i = 0; i < len; i++) {
-		size_t at = addr + i;
-		uint8_t kept;
-
-		if (at >= ESC_REGISTER_BYTES || !esc_bit(esc->ecat_writable, (unsigned)at) ||
-		    is_pdi_owned(esc, at)) {
-			continue;
+	for (size_t i = 0; i <= len; i++) {
+		if (i < len && store(esc, (unsigned)(addr + i), buf[i])) {
+			run++;
+			any = 1;
+		} else if (run > 0) {
+			written(esc, frame, (uint16_t)(addr + i - run), buf + i - run, run);
+			run = 0;
 		}
-		any = 1;
-		if (at >= ESC_REG_DC_RECEIVE_TIME_PORT && at < ESC_REG_DC_SYSTEM_TIME + 8u) {
-			continue; /* latch and compare: nothing is stored */
-		}
-		kept = kept_bits(at);
-		esc->reg[at] = (uint8_t)((esc->reg[at] & kept) | (buf[i] & ~kept));
-	}
-	if (any) {
-		written(esc, frame, addr, buf, len);
 	}
 	return any;
 }

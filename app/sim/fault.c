@@ -7,7 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/bytes.h"
 #include "base/clock.h"
 #include "base/prng.h"
 #include "wire/al.h"
@@ -311,12 +310,10 @@ static int is_due(struct fault_plan *plan, struct fault *f, int64_t t_ns)
 
 static void al_error(struct esc *esc, uint16_t code)
 {
-	uint8_t *status = esc->reg + ESC_REG_AL_STATUS;
-	uint8_t state = *status & AL_STATE_MASK;
+	uint8_t state = esc->reg[ESC_REG_AL_STATUS] & AL_STATE_MASK;
 
 	/* The slave falls one state back, as on a synchronisation error. */
-	*status = (uint8_t)((state == AL_OP ? AL_SAFEOP : state) | AL_ERROR);
-	put_le16(esc->reg + ESC_REG_AL_STATUS_CODE, code);
+	esc_force_al_status(esc, (uint8_t)((state == AL_OP ? AL_SAFEOP : state) | AL_ERROR), code);
 }
 
 static void apply(struct fault_plan *plan, const struct fault *f, struct segment *segment, int64_t t_ns,
@@ -361,7 +358,7 @@ static void apply(struct fault_plan *plan, const struct fault *f, struct segment
 		al_error(segment_esc(segment, f->slave), f->code);
 		break;
 	case FAULT_PORT_ERROR:
-		esc_count_error(segment_esc(segment, f->slave), f->port, 1);
+		esc_count_error(segment_esc(segment, f->slave), f->port, ESC_ERROR_RX);
 		break;
 	}
 }

@@ -55,9 +55,13 @@ int64_t in_process_true_ns(const struct in_process *ip, mono_t now)
 
 static mono_t host_time(const struct in_process *ip, int64_t true_ns)
 {
-	mono_t guess = { true_ns - (int64_t)((double)true_ns * ip->spec.host_ppm * 1e-6) };
+	double rate = ip->spec.host_ppm * 1e-6;
+	mono_t guess = { true_ns - (int64_t)((double)true_ns * (rate / (1.0 + rate))) };
 
 	/* The inverse, to the ns: the host sees a thing when its clock is past it. */
+	while (in_process_true_ns(ip, (mono_t){ guess.ns - 1 }) >= true_ns) {
+		guess.ns--;
+	}
 	while (in_process_true_ns(ip, guess) < true_ns) {
 		guess.ns++;
 	}

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "wire/datagram.h"
+#include "wire/esc_reg.h"
 
 enum { DATAGRAMS_MAX = 128, NO_CHILD = -1 };
 
@@ -44,28 +45,39 @@ struct segment {
 
 /* --- the way of a frame --- */
 
+static int has_link(const struct segment *seg, int child)
+{
+	return child != NO_CHILD && seg->node[child].has_power && !seg->node[child].is_cut;
+}
+
 /* Depth first in the chip's port order 0, 3, 1, 2 (data sheet, frame processing order). */
 static int64_t visit(struct segment *seg, unsigned i, int64_t at_ns)
 {
 	static const unsigned port_order[] = { 3, 1, 2 };
 	struct node *n = &seg->node[i];
 	int64_t t = at_ns + n->processing_ns;
+	uint8_t links = 1;
 
 	n->way = (struct esc_frame){ .pu_ns = at_ns, .port_ns = { at_ns }, .ports_used = 1 };
 	seg->order[seg->reached++] = i;
 	for (unsigned k = 0; k < 3; k++) {
-		int child = n->child[port_order[k]];
-		struct node *c = child == NO_CHILD ? NULL : &seg->node[child];
+		unsigned port = port_order[k];
 
-		if (c == NULL || !c->has_power || c->is_cut) {
+		if (!has_link(seg, n->child[port])) {
 			continue;
 		}
-		t = visit(seg, (unsigned)child, t + c->wire_ns) + c->wire_ns;
-		n->way.port_ns[port_order[k]] = t;
-		n->way.ports_used |= (uint8_t)(1u << port_order[k]);
+		links |= (uint8_t)(1u << port);
+		if (esc_is_port_closed(&n->esc, port)) {
+			continue;
+		}
+		t += seg->node[n->child[port]].wire_ns;
+		t = visit(seg, (unsigned)n->child[port], t) + seg->node[n->child[port]].wire_ns;
+		n->way.port_ns[port] = t;
+		n->way.ports_used |= (uint8_t)(1u << port);
 		t += n->forwarding_ns;
 	}
-	esc_set_links(&n->esc, n->way.ports_used);
+	esc_set_links(&n->esc, links);
+	n->esc.is_loop_changed = 0;
 	return t;
 }
 
@@ -106,6 +118,19 @@ static void sync0_edge(void *ctx, int64_t t_ns, uint64_t system_time_ns)
 	}
 }
 
+static void run_node(struct node *n, int64_t until_ns)
+{
+	while (n->next_ns <= until_ns) {
+		int64_t at = n->next_ns;
+
+		esc_advance(&n->esc, at);
+		if (n->device != NULL && n->device->ops->next_wake_ns(n->device) <= at) {
+			n->device->ops->run(n->device, at);
+		}
+		plan(n);
+	}
+}
+
 static struct node *earliest(const struct segment *seg)
 {
 	struct node *best = &seg->node[0];
@@ -126,13 +151,7 @@ int64_t segment_next_event_ns(const struct segment *segment)
 void segment_advance(struct segment *segment, int64_t t_ns)
 {
 	for (struct node *n = earliest(segment); n->next_ns <= t_ns; n = earliest(segment)) {
-		int64_t at = n->next_ns;
-
-		esc_advance(&n->esc, at);
-		if (n->device != NULL && n->device->ops->next_wake_ns(n->device) <= at) {
-			n->device->ops->run(n->device, at);
-		}
-		plan(n);
+		run_node(n, n->next_ns);
 	}
 	if (t_ns > segment->now_ns) {
 		segment->now_ns = t_ns;
@@ -140,6 +159,12 @@ void segment_advance(struct segment *segment, int64_t t_ns)
 }
 
 /* --- frames --- */
+
+static int is_ethercat(const uint8_t *frame, size_t frame_len)
+{
+	return frame_len >= ECAT_ETHERNET_BYTES && frame[12] == ECAT_ETHERTYPE >> 8 &&
+	       frame[13] == (ECAT_ETHERTYPE & 0xff);
+}
 
 static int find_datagrams(uint8_t *frame, size_t frame_len, struct ecat_datagram *dg)
 {
@@ -158,50 +183,68 @@ static int find_datagrams(uint8_t *frame, size_t frame_len, struct ecat_datagram
 	return r < 0 ? -1 : count;
 }
 
+/* The first slave finds it and spoils the check sum, by which the others know that it was found. */
+static void count_damaged(struct segment *seg)
+{
+	for (size_t k = 0; k < seg->reached; k++) {
+		esc_count_error(&seg->node[seg->order[k]].esc, 0,
+				k == 0 ? ESC_ERROR_UNIT : ESC_ERROR_FORWARDED);
+	}
+}
+
+static int pass(struct node *n, int64_t t_ns, struct ecat_datagram *dg, int count)
+{
+	struct esc_frame way = n->way;
+
+	way.pu_ns += t_ns;
+	for (unsigned port = 0; port < ESC_PORTS; port++) {
+		way.port_ns[port] += t_ns;
+	}
+	run_node(n, way.pu_ns);
+	for (int i = 0; i < count; i++) {
+		esc_datagram(&n->esc, &way, &dg[i]);
+	}
+	if (n->device != NULL && n->device->ops->frame_passed != NULL) {
+		n->device->ops->frame_passed(n->device, way.pu_ns);
+	}
+	plan(n);
+	return n->esc.is_loop_changed;
+}
+
 int segment_frame(struct segment *segment, int64_t t_ns, uint8_t *frame, size_t frame_len,
 		  int64_t *ret_back_ns)
 {
 	struct ecat_datagram dg[DATAGRAMS_MAX];
+	int is_loop_changed = 0;
 	int count;
 
 	segment_advance(segment, t_ns);
 	if (segment->reached == 0) {
 		return -ENOLINK;
 	}
+	if (!is_ethercat(frame, frame_len)) {
+		return -EBADMSG; /* not theirs: slaves take it off the wire (0x0100 bit 0) */
+	}
 	count = find_datagrams(frame, frame_len, dg);
 	if (count < 0) {
-		for (size_t k = 0; k < segment->reached; k++) {
-			esc_count_error(&segment->node[segment->order[k]].esc, 0, k == 0 ? 0 : 2);
-		}
+		count_damaged(segment);
 		return -EBADMSG;
 	}
 	for (size_t k = 0; k < segment->reached; k++) {
-		struct node *n = &segment->node[segment->order[k]];
-		struct esc_frame way = n->way;
-
-		way.pu_ns += t_ns;
-		for (unsigned port = 0; port < 4; port++) {
-			way.port_ns[port] += t_ns;
-		}
-		esc_advance(&n->esc, way.pu_ns);
-		for (int i = 0; i < count; i++) {
-			esc_datagram(&n->esc, &way, &dg[i]);
-		}
-		if (n->device != NULL && n->device->ops->frame_passed != NULL) {
-			n->device->ops->frame_passed(n->device, way.pu_ns);
-		}
-		plan(n);
+		is_loop_changed |= pass(&segment->node[segment->order[k]], t_ns, dg, count);
 	}
 	frame[6] |= 0x02; /* every ESC marks the source address of what it has processed */
 	*ret_back_ns = t_ns + segment->round_trip_ns;
+	if (is_loop_changed) {
+		lay_way(segment);
+	}
 	return 0;
 }
 
 /* --- making and breaking --- */
 
-static void power_on(struct segment *seg, struct node *n, int64_t t_ns, uint64_t clock_start_ns)
+static void power_on(struct node *n, int64_t t_ns, uint64_t clock_start_ns)
 {
-	(void)seg;
 	n->has_power = 1;
 	esc_init(&n->esc, &n->features, n->sii, n->sii_bytes, t_ns);
 	esc_clock_start(&n->esc, t_ns, clock_start_ns, n->ppm);
@@ -274,7 +317,7 @@ int segment_create(const struct segment_slave_spec *slaves, size_t count, int64_
 		}
 	}
 	for (size_t i = 0; i < count; i++) {
-		power_on(seg, &seg->node[i], t_ns, seg->node[i].clock_start_ns);
+		power_on(&seg->node[i], t_ns, seg->node[i].clock_start_ns);
 	}
 	lay_way(seg);
 	*ret_segment = seg;
@@ -301,7 +344,7 @@ void segment_destroy(struct segment *segment)
 static void lose_link(struct segment *seg, const struct node *n)
 {
 	if (n->parent >= 0) {
-		esc_count_error(&seg->node[n->parent].esc, n->parent_port, 3);
+		esc_count_error(&seg->node[n->parent].esc, n->parent_port, ESC_ERROR_LOST_LINK);
 	}
 }
 
@@ -313,7 +356,7 @@ void segment_cut(struct segment *segment, size_t slave, int64_t t_ns)
 	if (!n->is_cut) {
 		n->is_cut = 1;
 		lose_link(segment, n);
-		esc_count_error(&n->esc, 0, 3);
+		esc_count_error(&n->esc, 0, ESC_ERROR_LOST_LINK);
 		lay_way(segment);
 	}
 }
@@ -342,7 +385,7 @@ void segment_power_on(struct segment *segment, size_t slave, int64_t t_ns)
 {
 	segment_advance(segment, t_ns);
 	if (!segment->node[slave].has_power) {
-		power_on(segment, &segment->node[slave], t_ns, 0);
+		power_on(&segment->node[slave], t_ns, 0);
 		lay_way(segment);
 	}
 }
