@@ -47,17 +47,17 @@ sdk_run[vardepsexclude] = "SDK_DIR WORKDIR CCACHE_DIR"
 
 # The machine's own Debian mirror: $ECDAQ_APT_MIRROR, else what apt is set up with.
 def apt_sources(d, suite, components):
+    import re
     import subprocess
     mirror = d.getVar("ECDAQ_APT_MIRROR")
     security = None
     if not mirror:
-        listed = subprocess.run(
-            ["apt-get", "indextargets", "--format", "$(CODENAME) $(SITE)", "Created-By: Packages"],
-            check=True, capture_output=True, text=True).stdout.split("\n")
-        sites = [line.split(" ", 1) for line in listed if " " in line]
-        codenames = ("bookworm", "trixie", "forky", "sid")
-        mirror = next((site for name, site in sites if name in codenames), None)
-        security = next((s for n, s in sites if n.endswith("-security")), None)
+        # What apt would ask for; it needs no package lists for that.
+        uris = subprocess.run(["apt-get", "update", "--print-uris"], check=True,
+                              capture_output=True, text=True).stdout
+        sites = {name: site for site, name in re.findall(r"'(\S+?)/dists/(\S+?)/InRelease'", uris)}
+        mirror = next((sites[n] for n in ("bookworm", "trixie", "forky", "sid") if n in sites), None)
+        security = next((site for name, site in sites.items() if name.endswith("-security")), None)
     if not mirror:
         bb.fatal("no Debian mirror in this machine's apt sources: give one in ECDAQ_APT_MIRROR")
     lines = [f"deb {mirror} {suite} {components}", f"deb {mirror} {suite}-updates {components}"]
