@@ -106,9 +106,9 @@ static void name_device(struct bus *bus, size_t pos)
 {
 	struct bus_slave *sl = &bus->slave[pos];
 
-	sii_string(sl->sii, sl->sii_len, bus->parsed.device_name, sl->info.device);
+	sii_text(sl->sii, sl->sii_len, bus->parsed.device_name, sl->info.device);
 	if (sl->info.device[0] == '\0') {
-		sii_string(sl->sii, sl->sii_len, bus->parsed.order_name, sl->info.device);
+		sii_text(sl->sii, sl->sii_len, bus->parsed.order_name, sl->info.device);
 	}
 }
 

@@ -73,7 +73,7 @@ static void copy_string(const struct bus_slave *sl, uint8_t number, char ret_nam
 {
 	char text[SII_NAME_BYTES];
 
-	sii_string(sl->sii, sl->sii_len, number, text);
+	sii_text(sl->sii, sl->sii_len, number, text);
 	snprintf(ret_name, PDO_NAME_BYTES, "%.31s", text);
 }
 
