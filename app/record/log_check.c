@@ -117,8 +117,8 @@ static int by_sequence(const void *a, const void *b)
 	const struct checked *x = *(struct checked *const *)a;
 	const struct checked *y = *(struct checked *const *)b;
 
-	if (x->track.sequence != y->track.sequence) {
-		return x->track.sequence < y->track.sequence ? -1 : 1;
+	if (x->track.before.sequence != y->track.before.sequence) {
+		return x->track.before.sequence < y->track.before.sequence ? -1 : 1;
 	}
 	return strcmp(x->path, y->path);
 }
@@ -136,7 +136,7 @@ static int is_damaged(const struct checked *c)
 static uint64_t missing_between(const struct checked *a, const struct checked *b)
 {
 	if (a == NULL || a->track.cycles == 0 || b->track.cycles == 0 ||
-	    a->track.session != b->track.session) {
+	    a->track.before.session != b->track.before.session) {
 		return 0;
 	}
 	return b->track.first_cycle <= a->track.last_cycle ?
@@ -203,7 +203,7 @@ static void put_json(FILE *out, const struct checked *c, uint64_t between)
 		"\",\"cycles\":%" PRIu64 ",\"first_cycle\":%" PRIu64 ",\"last_cycle\":%" PRIu64
 		",\"chunks\":%" PRIu64 ",\"damaged_records\":%" PRIu64 ",\"missing_before\":",
 		c->error < 0 ? "false" : "true", is_damaged(c) ? "true" : "false",
-		c->is_recording ? "being recorded" : log_ending_to_str(c->found.ending), t->session,
+		c->is_recording ? "being recorded" : log_ending_to_str(c->found.ending), t->before.session,
 		t->cycles, t->first_cycle, t->last_cycle, c->found.chunks, c->found.damaged);
 	if (between == UINT64_MAX) {
 		fprintf(out, "null");

@@ -17,6 +17,7 @@ struct mcap_reader {
 	struct mcap_source source;
 	uint64_t offset;         /* of the next top-level record */
 	int has_ended;
+	int is_summary;          /* reading the summary, not the data section */
 	struct mcap_buf record;  /* the newest top-level record, whole */
 	struct mcap_buf content; /* of the newest chunk, uncompressed, if it was compressed */
 	ZSTD_DCtx *zstd;
@@ -81,6 +82,7 @@ int mcap_reader_create_summary(const struct mcap_source *source, struct mcap_rea
 		mcap_reader_destroy(r);
 		return err;
 	}
+	r->is_summary = 1;
 	*ret_reader = r;
 	return 0;
 }
@@ -248,6 +250,13 @@ static int load_record(struct mcap_reader *r, struct mcap_item *ret_item)
 	return 1;
 }
 
+static int belongs_to_summary(uint8_t opcode)
+{
+	return opcode == MCAP_OP_FOOTER || opcode == MCAP_OP_CHUNK_INDEX ||
+	       opcode == MCAP_OP_ATTACHMENT_INDEX || opcode == MCAP_OP_STATISTICS ||
+	       opcode == MCAP_OP_METADATA_INDEX || opcode == MCAP_OP_SUMMARY_OFFSET;
+}
+
 int mcap_reader_next(struct mcap_reader *r, struct mcap_item *ret_item)
 {
 	struct mcap_item item = { .record = NULL };
@@ -266,6 +275,9 @@ int mcap_reader_next(struct mcap_reader *r, struct mcap_item *ret_item)
 	}
 	if (got == 1 && mcap_parse_record(&item) < 0) {
 		damage(r, item.offset, "record is malformed", GOES_ON, &item);
+	}
+	if (item.record != NULL && !r->is_summary && belongs_to_summary(item.record[0])) {
+		damage(r, item.offset, "record of the summary in the data", GOES_ON, &item);
 	}
 	if (item.kind == MCAP_ITEM_CHUNK) {
 		take_chunk(r, &item);

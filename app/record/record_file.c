@@ -21,8 +21,6 @@ struct record_file {
 	size_t cycle_cost;     /* room that one cycle takes in a chunk */
 	uint8_t *buf;          /* one message */
 	size_t buf_len;
-	uint64_t event_next;
-	int64_t event_mono_ns;
 	uint64_t cycles;
 	uint64_t open_cycles;  /* of those: in the open chunk */
 	uint64_t first_cycle;
@@ -72,8 +70,6 @@ int record_file_create(const struct record_file_spec *spec, struct record_file *
 	f->layout = spec->layout;
 	f->topic = layout_topics(spec->layout, &f->topic_count);
 	f->last_utc_ns = spec->start_utc_ns;
-	f->event_next = spec->event_next;
-	f->event_mono_ns = spec->event_mono_ns;
 	f->buf_len = layout_largest_bytes(spec->layout);
 	f->buf_len = f->buf_len > MESSAGES_LARGEST_BYTES ? f->buf_len : MESSAGES_LARGEST_BYTES;
 	f->buf = malloc(f->buf_len);
@@ -170,10 +166,6 @@ int record_file_event(struct record_file *f, const struct messages_event *ev)
 	if (r == 0) {
 		f->event_count++;
 	}
-	if (r == 0 && ev->sequence != UINT64_MAX) {
-		f->event_next = ev->sequence + 1;
-		f->event_mono_ns = ev->event.mono_ns;
-	}
 	return r;
 }
 
@@ -208,9 +200,7 @@ int record_file_finish(struct record_file *f, const struct record_file_end *end)
 {
 	const struct record_head_counts counts = { .first_cycle = f->first_cycle,
 						   .last_cycle = f->last_cycle,
-						   .cycles = f->cycles,
-						   .event_next = f->event_next,
-						   .event_mono_ns = f->event_mono_ns };
+						   .cycles = f->cycles };
 	int r = record_file_close_chunk(f);
 
 	if (r == 0 && !f->has_end) { /* a second try does not note it twice */

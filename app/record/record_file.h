@@ -14,6 +14,7 @@
 #include "record/layout.h"
 #include "record/mcap.h"
 #include "record/messages.h"
+#include "record/store.h"
 
 struct record_file;
 
@@ -31,10 +32,8 @@ struct record_file_spec {
 	const char *name;            /* without suffix */
 	const struct layout *layout; /* kept */
 	int zstd_level;
+	const struct store_state *before; /* what was recorded of the session so far */
 	uint64_t file_sequence;
-	uint64_t first_cycle;        /* that it is to start with */
-	uint64_t event_next;
-	int64_t event_mono_ns;
 	uint64_t start_utc_ns;       /* log times start here */
 	const struct timemap_state *timemap;
 	const char *config_path;     /* "" where there is none */
@@ -64,9 +63,8 @@ int record_file_sync(struct record_file *f);
 
 struct record_file_end {
 	const char *reason;      /* "rotated", "producer ended", ... */
-	uint64_t gaps;           /* in this session so far */
-	uint64_t cycles_missing;
 	uint64_t events_lost;
+	const struct store_state *after; /* what was recorded of the session with this file */
 	const struct timemap_state *timemap;
 };
 

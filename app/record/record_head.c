@@ -9,12 +9,12 @@
 
 #include "record/json.h"
 
-enum { PAIRS_PER_FIELD = 4, NUMBER_BYTES = 24 };
+enum { PAIRS_PER_FIELD = 4, NUMBERS = 20, NUMBER_BYTES = 24 };
 
 /* A small list of pairs whose values are numbers, made on the spot. */
 struct numbers {
-	struct mcap_pair pair[16];
-	char text[16][NUMBER_BYTES];
+	struct mcap_pair pair[NUMBERS];
+	char text[NUMBERS][NUMBER_BYTES];
 	size_t count;
 };
 
@@ -170,15 +170,20 @@ static int put_channels(struct mcap_writer *w, const struct layout *layout)
 static int put_session(struct mcap_writer *w, const struct record_file_spec *spec)
 {
 	const struct sample_meta *meta = layout_meta(spec->layout);
+	const struct store_state *before = spec->before;
 	struct numbers n = { .count = 0 };
 
 	add_text(&n, "program", "ecdaq-record " ECDAQ_VERSION);
 	add_unsigned(&n, "session", meta->session);
 	add_unsigned(&n, "file_sequence", spec->file_sequence);
 	add_unsigned(&n, "period_ns", meta->period_ns);
-	add_unsigned(&n, "first_cycle", spec->first_cycle);
-	add_unsigned(&n, "event_next", spec->event_next);
-	add_signed(&n, "event_mono_ns", spec->event_mono_ns);
+	add_unsigned(&n, "next_cycle", before->next_cycle);
+	add_unsigned(&n, "first_cycle", before->first_cycle);
+	add_unsigned(&n, "cycles_before", before->cycles);
+	add_unsigned(&n, "gaps_before", before->gaps);
+	add_unsigned(&n, "cycles_missing_before", before->missing);
+	add_unsigned(&n, "event_next", before->event_next);
+	add_signed(&n, "event_mono_ns", before->event_mono_ns);
 	add_unsigned(&n, "image_bytes", meta->image_bytes);
 	add_unsigned(&n, "slaves", meta->slave_count);
 	add_unsigned(&n, "channels", meta->channel_count);
@@ -257,10 +262,9 @@ int record_head_put_end(struct mcap_writer *w, const struct record_head_counts *
 	add_unsigned(&n, "cycles", counts->cycles);
 	add_unsigned(&n, "first_cycle", counts->first_cycle);
 	add_unsigned(&n, "last_cycle", counts->last_cycle);
-	add_unsigned(&n, "event_next", counts->event_next);
-	add_signed(&n, "event_mono_ns", counts->event_mono_ns);
-	add_unsigned(&n, "session_gaps", end->gaps);
-	add_unsigned(&n, "session_cycles_missing", end->cycles_missing);
+	add_unsigned(&n, "session_cycles", end->after->cycles);
+	add_unsigned(&n, "session_gaps", end->after->gaps);
+	add_unsigned(&n, "session_cycles_missing", end->after->missing);
 	add_unsigned(&n, "session_events_lost", end->events_lost);
 	return r < 0 ? r : mcap_writer_metadata(w, "ecdaq.end", n.pair, n.count);
 }

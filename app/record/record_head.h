@@ -16,8 +16,6 @@ struct record_head_counts {
 	uint64_t first_cycle;
 	uint64_t last_cycle;
 	uint64_t cycles;
-	uint64_t event_next;
-	int64_t event_mono_ns;
 };
 
 /** The closing notes: counts, time map. 0 or -errno. */

@@ -193,16 +193,9 @@ static void say_outcome(const struct recover_report *report, const char *name,
 
 static void set_state(struct store_state *state, const struct track *t)
 {
-	if (!t->has_session || t->sequence < state->sequence) {
-		return;
+	if (t->has_session && t->before.sequence >= state->sequence) {
+		*state = track_state(t);
 	}
-	*state = (struct store_state){
-		.session = t->session,
-		.next_cycle = t->cycles > 0 ? t->last_cycle + 1 : t->next_at_start,
-		.event_next = t->event_next,
-		.event_mono_ns = t->event_mono_ns,
-		.sequence = t->sequence,
-	};
 }
 
 /* "DIR/NAME.part" to "DIR/NAME<suffix>". */

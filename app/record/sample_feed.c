@@ -95,7 +95,7 @@ int sample_feed_create(struct ring_reader *ring, struct sink *sink, struct sampl
 	s->has_next = resume_is_believable(s, resume);
 	s->next_cycle = s->has_next ? resume->next_cycle : 0;
 	go_to_start(s);
-	sink_begin_session(sink, s->layout, s->next_cycle);
+	sink_begin_session(sink, s->layout, s->has_next ? SINK_KNOWN_SESSION : SINK_NEW_SESSION);
 	*ret_session = s;
 	return 0;
 

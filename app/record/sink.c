@@ -125,7 +125,7 @@ int sink_trouble(struct sink *s, int error, const char *what)
 			sink_say(s, "recording stopped, disk full: %s: %" PRIu64 " bytes free, reserve %" PRIu64,
 			    s->opt.dir, s->bytes_free, s->opt.reserve_bytes);
 			s->full_event = (struct event){ .id = EVENT_RECORD_DISK_FULL,
-							.cycle = s->last_cycle,
+							.cycle = s->resume.next_cycle,
 							.value = (int64_t)s->bytes_free,
 							.slave_pos = EVENT_NO_SLAVE };
 			s->full_utc_ns = s->last_utc_ns;
@@ -144,25 +144,26 @@ int sink_trouble(struct sink *s, int error, const char *what)
 	return error;
 }
 
-void sink_begin_session(struct sink *s, const struct layout *layout, uint64_t next_cycle)
+void sink_begin_session(struct sink *s, const struct layout *layout, enum sink_news news)
 {
 	s->layout = layout;
 	s->timemap = (struct timemap_state){ .tai_offset_s = layout_meta(layout)->tai_offset_s };
-	s->resume.session = layout_meta(layout)->session;
-	s->resume.next_cycle = next_cycle;
-	s->cycles = 0;
-	s->gaps = 0;
-	s->missing = 0;
+	if (news == SINK_NEW_SESSION) {
+		s->resume.session = layout_meta(layout)->session;
+		s->resume.next_cycle = 0;
+		s->resume.first_cycle = 0;
+		s->resume.cycles = 0;
+		s->resume.gaps = 0;
+		s->resume.missing = 0;
+	}
 	s->events_lost = 0;
-	s->first_cycle = next_cycle;
-	s->last_cycle = 0;
-	s->synced_cycle = 0;
+	s->synced_cycle = sink_last_cycle(s);
 }
 
 void sink_count_gap(struct sink *s, uint64_t cycles)
 {
-	s->gaps++;
-	s->missing += cycles;
+	s->resume.gaps++;
+	s->resume.missing += cycles;
 }
 
 void sink_count_lost_events(struct sink *s, uint64_t events)
@@ -232,13 +233,6 @@ static void tick_failed(struct sink *s)
 	if (recover(s) < 0) {
 		return;
 	}
-	if (s->cycles > 0 && s->last_cycle >= s->resume.next_cycle) {
-		/* These are read from the ring again. */
-		uint64_t lost = s->last_cycle + 1 - s->resume.next_cycle;
-
-		s->cycles -= lost < s->cycles ? lost : s->cycles;
-		s->last_cycle = s->resume.next_cycle > 0 ? s->resume.next_cycle - 1 : 0;
-	}
 	s->state = SINK_READY;
 	s->has_rewind = 1;
 	sink_say(s, "recording again behind cycle %" PRIu64, s->resume.next_cycle);
@@ -259,6 +253,11 @@ void sink_tick(struct sink *s, int64_t now_ns)
 	}
 }
 
+uint64_t sink_last_cycle(const struct sink *s)
+{
+	return s->resume.next_cycle > 0 ? s->resume.next_cycle - 1 : 0;
+}
+
 void sink_get_status(struct sink *s, struct record_status *page)
 {
 	uint64_t open_bytes = s->file != NULL ? record_file_bytes(s->file) : 0;
@@ -271,11 +270,11 @@ void sink_get_status(struct sink *s, struct record_status *page)
 				s->message);
 	}
 	atomic_store_explicit(&page->session, s->resume.session, memory_order_relaxed);
-	atomic_store_explicit(&page->recorded_cycles, s->cycles, memory_order_relaxed);
-	atomic_store_explicit(&page->recorded_gaps, s->gaps, memory_order_relaxed);
-	atomic_store_explicit(&page->cycles_missing, s->missing, memory_order_relaxed);
-	atomic_store_explicit(&page->first_cycle, s->first_cycle, memory_order_relaxed);
-	atomic_store_explicit(&page->last_cycle, s->last_cycle, memory_order_relaxed);
+	atomic_store_explicit(&page->recorded_cycles, s->resume.cycles, memory_order_relaxed);
+	atomic_store_explicit(&page->recorded_gaps, s->resume.gaps, memory_order_relaxed);
+	atomic_store_explicit(&page->cycles_missing, s->resume.missing, memory_order_relaxed);
+	atomic_store_explicit(&page->first_cycle, s->resume.first_cycle, memory_order_relaxed);
+	atomic_store_explicit(&page->last_cycle, sink_last_cycle(s), memory_order_relaxed);
 	atomic_store_explicit(&page->synced_cycle, s->synced_cycle, memory_order_relaxed);
 	atomic_store_explicit(&page->bytes_written, s->bytes_done + open_bytes,
 			      memory_order_relaxed);

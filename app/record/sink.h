@@ -29,8 +29,13 @@ void sink_destroy(struct sink *s);
 /** Where recording is to go on, as the store knows it. */
 const struct store_state *sink_resume_point(const struct sink *s);
 
-/** A session begins: its layout (kept until sink_end_session()) and where it goes on. */
-void sink_begin_session(struct sink *s, const struct layout *layout, uint64_t next_cycle);
+enum sink_news {
+	SINK_NEW_SESSION,   /* nothing of it was recorded yet */
+	SINK_KNOWN_SESSION, /* it goes on at sink_resume_point() */
+};
+
+/** A session begins: its layout (kept until sink_end_session()). */
+void sink_begin_session(struct sink *s, const struct layout *layout, enum sink_news news);
 /** Finish the file of the session. 0, or -errno: not ready now; call again when it is. */
 int sink_end_session(struct sink *s, const char *reason);
 

@@ -46,10 +46,8 @@ int sink_open_file(struct sink *s, uint64_t first_cycle, int64_t utc_ns)
 					 .name = name,
 					 .layout = s->layout,
 					 .zstd_level = s->opt.zstd_level,
+					 .before = &s->resume,
 					 .file_sequence = s->resume.sequence + 1,
-					 .first_cycle = first_cycle,
-					 .event_next = s->resume.event_next,
-					 .event_mono_ns = s->resume.event_mono_ns,
 					 .start_utc_ns = utc_ns > 0 ? (uint64_t)utc_ns : 0,
 					 .timemap = &s->timemap,
 					 .config_path = s->opt.config_path,
@@ -82,9 +80,8 @@ int sink_open_file(struct sink *s, uint64_t first_cycle, int64_t utc_ns)
 int sink_finish_file(struct sink *s, const char *reason)
 {
 	const struct record_file_end end = { .reason = reason,
-					     .gaps = s->gaps,
-					     .cycles_missing = s->missing,
 					     .events_lost = s->events_lost,
+					     .after = &s->resume,
 					     .timemap = &s->timemap };
 	int r = record_file_finish(s->file, &end);
 
@@ -101,7 +98,7 @@ int sink_finish_file(struct sink *s, const char *reason)
 		return sink_trouble(s, r, record_file_path(s->file));
 	}
 	snprintf(s->path, sizeof(s->path), "%s", record_file_path(s->file));
-	s->synced_cycle = s->last_cycle;
+	s->synced_cycle = sink_last_cycle(s);
 	s->is_dirty = 0;
 	s->chunk_opened_ns = 0;
 	s->bytes_done += record_file_bytes(s->file);
@@ -163,10 +160,9 @@ int sink_sample(struct sink *s, const struct sample_header *header, const uint8_
 		return sink_trouble(s, r, record_file_path(s->file));
 	}
 	note_open(s);
-	if (s->cycles++ == 0) {
-		s->first_cycle = header->cycle;
+	if (s->resume.cycles++ == 0) {
+		s->resume.first_cycle = header->cycle;
 	}
-	s->last_cycle = header->cycle;
 	s->last_utc_ns = utc_ns;
 	s->resume.next_cycle = header->cycle + 1;
 	/* By bus time, too: a backlog is read much faster than it came. */

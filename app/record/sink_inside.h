@@ -24,12 +24,7 @@ struct sink {
 	int64_t checked_ns;          /* free space was asked; trouble was looked at */
 	int is_dirty;                /* written since the last sync */
 	uint64_t synced_cycle;
-	uint64_t first_cycle;
-	uint64_t last_cycle;
-	uint64_t cycles;             /* in this session */
-	uint64_t gaps;
-	uint64_t missing;
-	uint64_t events_lost;
+	uint64_t events_lost;        /* in this session, by this process */
 	uint64_t files;
 	uint64_t bytes_done;         /* in finished files */
 	uint64_t bytes_free;
@@ -45,6 +40,8 @@ __attribute__((format(printf, 2, 3))) void sink_say(struct sink *s, const char *
 /** Something failed with @error: leave the ready state. Returns @error. */
 int sink_trouble(struct sink *s, int error, const char *what);
 int sink_ask_free_bytes(struct sink *s);
+/** The newest cycle recorded; 0 before the first. */
+uint64_t sink_last_cycle(const struct sink *s);
 
 /** Close, sync, finish the open file. 0, or -errno after sink_trouble(). */
 int sink_close_chunk(struct sink *s);

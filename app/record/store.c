@@ -20,6 +20,7 @@
 
 #define LOCK_NAME ".ecdaq-record.lock"
 #define STATE_NAME ".ecdaq-record.state"
+#define STATE_HEAD "ecdaq-record-state 1\n"
 
 struct store {
 	char dir[PATH_MAX];
@@ -237,12 +238,50 @@ int store_list(const char *dir, struct store_entry **ret_entries, size_t *ret_co
 	return 0;
 }
 
+/* The state file's lines, and where each goes. */
+static const struct {
+	const char *key;
+	size_t offset;
+} state_fields[] = {
+	{ "session", offsetof(struct store_state, session) },
+	{ "next_cycle", offsetof(struct store_state, next_cycle) },
+	{ "first_cycle", offsetof(struct store_state, first_cycle) },
+	{ "cycles", offsetof(struct store_state, cycles) },
+	{ "gaps", offsetof(struct store_state, gaps) },
+	{ "missing", offsetof(struct store_state, missing) },
+	{ "event_next", offsetof(struct store_state, event_next) },
+	{ "event_mono_ns", offsetof(struct store_state, event_mono_ns) },
+	{ "sequence", offsetof(struct store_state, sequence) },
+};
+
+enum { STATE_FIELDS = sizeof(state_fields) / sizeof(state_fields[0]) };
+
+/* "key=number"; each field must come in its place. */
+static int parse_state_line(const char *line, size_t field, struct store_state *state)
+{
+	size_t len = strlen(state_fields[field].key);
+	uint64_t value;
+	char *end;
+
+	if (strncmp(line, state_fields[field].key, len) != 0 || line[len] != '=') {
+		return -EBADMSG;
+	}
+	errno = 0;
+	value = strtoull(line + len + 1, &end, 10);
+	if (end == line + len + 1 || *end != '\n' || errno != 0) {
+		return -EBADMSG;
+	}
+	memcpy((char *)state + state_fields[field].offset, &value, sizeof(value));
+	return 0;
+}
+
 int store_load_state(const struct store *s, struct store_state *ret_state)
 {
-	struct store_state state;
+	struct store_state state = { .session = 0 };
 	char path[PATH_MAX];
+	char line[80];
 	FILE *in;
-	int n;
+	int r = 0;
 
 	if (store_path(s->dir, STATE_NAME, path, sizeof(path)) < 0) {
 		return -ENAMETOOLONG;
@@ -251,17 +290,18 @@ int store_load_state(const struct store *s, struct store_state *ret_state)
 	if (in == NULL) {
 		return -errno;
 	}
-	n = fscanf(in,
-		   "ecdaq-record-state 1 session=%" SCNu64 " next_cycle=%" SCNu64
-		   " event_next=%" SCNu64 " event_mono_ns=%" SCNd64 " sequence=%" SCNu64,
-		   &state.session, &state.next_cycle, &state.event_next, &state.event_mono_ns,
-		   &state.sequence);
-	fclose(in);
-	if (n != 5) {
-		return -EBADMSG;
+	if (fgets(line, sizeof(line), in) == NULL || strcmp(line, STATE_HEAD) != 0) {
+		r = -EBADMSG;
 	}
-	*ret_state = state;
-	return 0;
+	for (size_t i = 0; i < STATE_FIELDS && r == 0; i++) {
+		r = fgets(line, sizeof(line), in) == NULL ? -EBADMSG :
+							    parse_state_line(line, i, &state);
+	}
+	fclose(in);
+	if (r == 0) {
+		*ret_state = state;
+	}
+	return r;
 }
 
 int store_save_state(const struct store *s, const struct store_state *state)
@@ -279,11 +319,13 @@ int store_save_state(const struct store *s, const struct store_state *state)
 	if (out == NULL) {
 		return -errno;
 	}
-	fprintf(out,
-		"ecdaq-record-state 1\nsession=%" PRIu64 "\nnext_cycle=%" PRIu64
-		"\nevent_next=%" PRIu64 "\nevent_mono_ns=%" PRId64 "\nsequence=%" PRIu64 "\n",
-		state->session, state->next_cycle, state->event_next, state->event_mono_ns,
-		state->sequence);
+	fputs(STATE_HEAD, out);
+	for (size_t i = 0; i < STATE_FIELDS; i++) {
+		uint64_t value;
+
+		memcpy(&value, (const char *)state + state_fields[i].offset, sizeof(value));
+		fprintf(out, "%s=%" PRIu64 "\n", state_fields[i].key, value);
+	}
 	errno = 0;
 	r = ferror(out) || fflush(out) != 0 ? -(errno != 0 ? errno : EIO) : 0;
 	if (fclose(out) != 0 && r == 0) {

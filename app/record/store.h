@@ -22,10 +22,14 @@ struct store_entry {
 	int is_part;
 };
 
-/* Where to go on. All zero: nothing was recorded yet. */
+/* Where to go on, and what was recorded of that session. All zero: nothing was recorded yet. */
 struct store_state {
 	uint64_t session;
 	uint64_t next_cycle;
+	uint64_t first_cycle;
+	uint64_t cycles;       /* samples recorded */
+	uint64_t gaps;
+	uint64_t missing;      /* cycles in the gaps */
 	uint64_t event_next;
 	int64_t event_mono_ns; /* of the event before that */
 	uint64_t sequence; /* of the newest file */

@@ -23,12 +23,19 @@ static void take_metadata(struct track *t, const struct mcap_item *item)
 		return;
 	}
 	t->has_session = 1;
-	t->session = number_of(item, "session");
-	t->sequence = number_of(item, "file_sequence");
-	t->period_ns = number_of(item, "period_ns");
-	t->next_at_start = number_of(item, "first_cycle");
-	t->event_next = number_of(item, "event_next");
-	t->event_mono_ns = (int64_t)number_of(item, "event_mono_ns");
+	t->before = (struct store_state){
+		.session = number_of(item, "session"),
+		.next_cycle = number_of(item, "next_cycle"),
+		.first_cycle = number_of(item, "first_cycle"),
+		.cycles = number_of(item, "cycles_before"),
+		.gaps = number_of(item, "gaps_before"),
+		.missing = number_of(item, "cycles_missing_before"),
+		.event_next = number_of(item, "event_next"),
+		.event_mono_ns = (int64_t)number_of(item, "event_mono_ns"),
+		.sequence = number_of(item, "file_sequence"),
+	};
+	t->event_next = t->before.event_next;
+	t->event_mono_ns = t->before.event_mono_ns;
 }
 
 static void take_channel(struct track *t, const struct mcap_item *item)
@@ -99,4 +106,26 @@ void track_item(struct track *t, const struct mcap_item *item)
 void track_visit(void *track, const struct mcap_item *item)
 {
 	track_item(track, item);
+}
+
+struct store_state track_state(const struct track *t)
+{
+	struct store_state s = t->before;
+
+	s.event_next = t->event_next;
+	s.event_mono_ns = t->event_mono_ns;
+	if (t->cycles == 0) {
+		return s;
+	}
+	if (s.cycles == 0) {
+		s.first_cycle = t->first_cycle;
+	} else if (t->first_cycle > s.next_cycle) { /* a gap right at the start of the file */
+		s.gaps++;
+		s.missing += t->first_cycle - s.next_cycle;
+	}
+	s.cycles += t->cycles;
+	s.gaps += t->gaps;
+	s.missing += t->missing;
+	s.next_cycle = t->last_cycle + 1;
+	return s;
 }

@@ -9,16 +9,14 @@
 #include <stdint.h>
 
 #include "record/mcap_recover.h"
+#include "record/store.h"
 
 struct track {
-	/* From the metadata "ecdaq.session" at the start of each file. */
-	uint64_t session;
-	uint64_t sequence;      /* of the file */
-	uint64_t period_ns;
-	uint64_t next_at_start; /* the cycle that the file was to start with */
+	/* From the metadata "ecdaq.session" at the start of each file: what was recorded before it. */
+	struct store_state before;
+	int has_session;
 	uint64_t event_next;    /* the event to record next, from metadata and messages */
 	int64_t event_mono_ns;  /* of the event before that */
-	int has_session;
 	/* From the messages of "/ecdaq/cycle". */
 	int cycle_channel;      /* -1: none yet */
 	int event_channel;
@@ -40,5 +38,8 @@ void track_init(struct track *t);
 void track_item(struct track *t, const struct mcap_item *item);
 /** The same as a visitor's function; @track is a struct track. */
 void track_visit(void *track, const struct mcap_item *item);
+
+/** Where to go on behind the (one) recording that was read, and what was recorded of its session so far. */
+struct store_state track_state(const struct track *t);
 
 #endif
