@@ -87,6 +87,7 @@ struct status_page {
 	_Atomic uint64_t text_sequence;   /* [service] odd: message is being written */
 	char message[256];                /* [service] newest trouble, one line; "" for none */
 	_Atomic uint32_t bus_state;       /* [service] enum bus_state */
+	_Atomic uint32_t bus_state_at_stop; /* [service] what it was when the orderly stop began */
 	_Atomic uint32_t slave_count;     /* [service] */
 	_Atomic uint32_t slaves_expected; /* [service] 0: whatever is there */
 	_Atomic uint32_t exit_code;       /* [service] valid in STOPPED and FAILED */

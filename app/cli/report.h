@@ -17,6 +17,7 @@ struct report {
 	uint16_t wkc;
 	uint16_t wkc_expected;
 	uint32_t flags; /* of the newest sample */
+	int is_summary; /* of a run that has ended, "state" is what it was when it was stopped */
 };
 
 struct cli;

@@ -171,9 +171,14 @@ void report_slave_json(const struct status_page *page, uint32_t index, struct js
 static void write_process(struct json *js, const struct report *report)
 {
 	const struct status_page *page = report->page;
+	uint32_t state = GET(page->bus_state);
 	char text[64];
 
-	json_text(js, "state", bus_state_to_str(GET(page->bus_state)));
+	/* The summary of a run tells how the run was, not that it has ended: "running" does. */
+	if (report->is_summary && GET(page->bus_state) == BUS_STOPPED) {
+		state = GET(page->bus_state_at_stop);
+	}
+	json_text(js, "state", bus_state_to_str(state));
 	json_truth(js, "running", report->is_running);
 	json_u64(js, "exit_code", GET(page->exit_code));
 	write_guarded(js, "message", &page->text_sequence, page->message, sizeof(page->message));

@@ -30,6 +30,7 @@ enum cli_exit verb_status(struct cli *cli, int argc, char **argv)
 	}
 	record = source_record(cli);
 	report_gather(cli, page, record, &report);
+	report.is_summary = is_summary;
 	if (is_json) {
 		json_init(&js, stdout);
 		report_write_json(&report, &js);

@@ -125,6 +125,10 @@ void session_state_set(struct session *s, enum bus_state state)
 		return;
 	}
 	session_emit(s, &ev);
+	if (state == BUS_STOPPED) {
+		atomic_store_explicit(&s->home.page->bus_state_at_stop, s->state,
+				      memory_order_relaxed);
+	}
 	s->state = state;
 	atomic_store_explicit(&s->home.page->bus_state, state, memory_order_relaxed);
 }

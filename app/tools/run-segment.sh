@@ -195,6 +195,8 @@ run_inside()
 	local segment_options=(--interface ecsim0 --slaves "$slaves")
 
 	bin=${ECDAQ_BIN_DIR:-$root/build/stage/bin}
+	# As root the segment gets a real-time priority below the master's: it stands for hardware.
+	! chrt -f 1 true 2> /dev/null || segment_options+=(--priority 50)
 	[ -z "$sii" ] || segment_options+=(--sii "$sii")
 	[ -z "$seconds" ] || daemon_options+=(--seconds "$seconds")
 	[ -z "$config" ] || set_options=(--config "$config" "${set_options[@]}")

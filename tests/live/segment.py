@@ -98,8 +98,11 @@ class Segment:
         return process
 
     def start_sim(self, *more: str) -> None:
+        priority = ["--priority", "50"] if os.geteuid() == 0 else []
         self.start(
-            "sim", str(BIN / "ecdaq-sim"), "--interface", "ecsim0", "--slaves", self.slaves, *more
+            "sim",
+            str(BIN / "ecdaq-sim"),
+            *["--interface", "ecsim0", "--slaves", self.slaves, *priority, *more],
         )
 
     def start_daemon(self, *more: str) -> None:
@@ -145,7 +148,7 @@ class Segment:
 
         return wait_for(f"{count} cycles more", passed, seconds)
 
-    def signal(self, name: str, number: int) -> None:
+    def send(self, name: str, number: int) -> None:
         self.processes[name].send_signal(number)
 
     def stop(self, name: str, number: int = signal.SIGTERM) -> int:
@@ -180,4 +183,4 @@ def recorded(folder: Path, topic: str) -> Iterator[Any]:
             reader = make_reader(file, decoder_factories=[DecoderFactory()])
             for _, channel, _, message in reader.iter_decoded_messages(topics=[topic]):
                 assert channel.topic == topic
-                yield message
+                yield message  # of the class that mcap-ros2-support makes from the schema

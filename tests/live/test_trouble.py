@@ -92,9 +92,9 @@ def test_an_sdo_the_slave_refuses_is_an_error_with_its_abort_code(make_segment: 
     segment.start_sim()
     file = segment.folder / "ecdaq.yaml"
     file.write_text(
-        "slaves:\n  - name: a\n    sdo:\n      - { index: 0x9999, subindex: 1, bytes: 1, value: 1 }\n"
+        "slaves:\n  - name: a\n    sdo:\n      - { index: 0x9999, subindex: 1, type: USINT, value: 1 }\n"
     )
-    line = only_line(run_daemon(segment, "--config", str(file)))
+    line = only_line(run_daemon(segment, "--config", str(file), "--set", "bus.presence=any"))
     assert "0x9999" in line and "06020000" in line
 
 
@@ -108,4 +108,3 @@ def test_a_full_disk_stops_the_recording_and_never_the_cycle(make_segment: Calla
     after = segment.wait_for_cycles(2000, 30)
     assert after["state"] == "OP"
     assert after["samples_bad_unexplained"] == 0
-    segment.space.run("umount", str(segment.record_dir))
