@@ -16,7 +16,7 @@
 #define DMA_LATENCY_PATH "/dev/cpu_dma_latency"
 #define ISOLATED_PATH "/sys/devices/system/cpu/isolated"
 
-enum { STACK_BYTES = 512 * 1024, GUARD_BYTES = 64 * 1024, TEXT_BYTES = 320, PROBE_BYTES = 4096 };
+enum { STACK_BYTES = 1024 * 1024, GUARD_BYTES = 64 * 1024, TEXT_BYTES = 320, PROBE_BYTES = 4096 };
 
 static void report(struct realtime *rt, enum event_rt which, int err, const char *format, ...)
 	__attribute__((format(printf, 4, 5)));
