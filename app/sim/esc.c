@@ -18,7 +18,7 @@ const struct esc_features esc_et1100 = {
 	.sm_count = 8,
 	.ram_kib = 8,
 	.port_descriptor = 0x0f,
-	.features = 0x01fc,
+	.features = 0x00fc,
 	.dc = ESC_DC_64,
 	.has_sync_unit = 1,
 	.eeprom_bytes_a_read = 8,
@@ -92,7 +92,7 @@ void esc_set_links(struct esc *esc, uint8_t ports)
 	uint16_t status = get_le16(esc->reg + ESC_REG_DL_STATUS) & 0x000f;
 
 	for (unsigned port = 0; port < ESC_PORTS; port++) {
-		unsigned has_link = ports >> port & 1u;
+		unsigned has_link = (unsigned)ports >> port & 1u;
 		/* Bit 0 the loop is closed (without a link by itself), bit 1 there is communication. */
 		unsigned loop = has_link && !esc_is_port_closed(esc, port) ? 2 : 1;
 
