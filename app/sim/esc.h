@@ -36,6 +36,7 @@ struct esc_features {
 	int has_open_bits;            /* SyncManager status bits 6 and 7: a buffer is open */
 	unsigned eeprom_bytes_a_read; /* 4 or 8 */
 	int has_long_eeprom;          /* two address bytes: 0x0502 bit 7 */
+	uint16_t eeprom_status;       /* bits of 0x0502 that read 1 and no data sheet names */
 	/* What 0x0900 to 0x090f hold before a port has seen a frame. */
 	uint32_t receive_time_at_power_on[4];
 };

@@ -79,6 +79,7 @@ void esc_eeprom_power_on(struct esc *esc, int64_t t_ns)
 	put_le16(esc->reg + ESC_REG_EEPROM_CONTROL,
 		 (uint16_t)((esc->features.eeprom_bytes_a_read == 8 ? EEPROM_READS_8_BYTES : 0) |
 			    (esc->features.has_long_eeprom ? EEPROM_TWO_BYTE_ADDRESS : 0) |
+			    esc->features.eeprom_status |
 			    EEPROM_NOT_LOADED | EEPROM_BUSY));
 	esc->eeprom_command = EEPROM_RELOAD;
 	esc->eeprom_busy_until_ns = t_ns + RELOAD_NS;
