@@ -1,0 +1,137 @@
+/* SPDX-License-Identifier: MIT */
+/* On the loopback interface, where raw sockets are allowed; what needs no privilege always. */
+#include "link/packet_socket.h"
+
+#include <errno.h>
+
+#include "base/bytes.h"
+#include "harness/test.h"
+#include "wire/datagram.h"
+
+TEST(packet_socket, unknown_interface_is_told_with_those_there_are)
+{
+	struct transport transport = { 0 };
+	char error[PACKET_ERROR_BYTES];
+
+	CHECK_EQ(packet_socket_open("nosuchnic0", PACKET_WAIT_AUTO, &transport, error, sizeof(error)), -ENODEV);
+	CHECK(strstr(error, "nosuchnic0") != NULL);
+	CHECK(strstr(error, "lo") != NULL);
+	CHECK(strchr(error, '\n') == NULL);
+	CHECK(transport.send == NULL);
+}
+
+TEST(packet_socket, name_that_is_none_is_refused)
+{
+	struct transport transport = { 0 };
+	char error[PACKET_ERROR_BYTES];
+
+	CHECK_EQ(packet_socket_open("", PACKET_WAIT_AUTO, &transport, error, sizeof(error)), -ENODEV);
+	CHECK_EQ(packet_socket_open("an-interface-name-too-long", PACKET_WAIT_AUTO, &transport, error,
+				    sizeof(error)),
+		 -ENODEV);
+	CHECK(transport.send == NULL);
+}
+
+static struct transport open_loopback(enum packet_wait wait)
+{
+	struct transport transport;
+	char error[PACKET_ERROR_BYTES];
+	int r = packet_socket_open("lo", wait, &transport, error, sizeof(error));
+
+	if (r == -EPERM) {
+		CHECK(strstr(error, "CAP_NET_RAW") != NULL);
+		SKIP("raw sockets are not allowed");
+	}
+	CHECK_EQ(r, 0);
+	if (transport.is_up(transport.ctx) != 1) {
+		transport.destroy(transport.ctx);
+		SKIP("the loopback interface is down");
+	}
+	return transport;
+}
+
+static size_t make_frame(uint8_t *frame, uint8_t idx)
+{
+	static const uint8_t source[6] = { 0x10, 0x10, 0x10, 0x10, 0x10, 0x10 };
+	struct ecat_frame_builder fb;
+
+	ecat_frame_begin(&fb, frame, source);
+	ecat_frame_add(&fb, ECAT_CMD_NOP, idx, 0, 0, 4);
+	return ecat_frame_end(&fb);
+}
+
+/* Every frame sent comes back once: the copy on its way out is not taken for a received one. */
+static void check_echo(enum packet_wait wait)
+{
+	struct platform platform = platform_posix();
+	struct transport transport = open_loopback(wait);
+
+	for (uint8_t i = 0; i < 20; i++) {
+		uint8_t frame[ECAT_FRAME_MAX_BYTES];
+		uint8_t got[ECAT_FRAME_MAX_BYTES];
+		size_t len = make_frame(frame, i);
+		mono_t before = platform.now(NULL);
+		mono_t at = { 0 };
+
+		CHECK_EQ(transport.send(transport.ctx, frame, len), 0);
+		CHECK_EQ(transport.receive(transport.ctx, got, sizeof(got), mono_add(before, (span_t){ NS_PER_S }),
+					   &at),
+			 len);
+		CHECK_MEM(got, frame, len);
+		CHECK(at.ns >= before.ns && at.ns <= platform.now(NULL).ns);
+		CHECK_EQ(transport.receive(transport.ctx, got, sizeof(got), before, NULL), -EAGAIN);
+	}
+	transport.destroy(transport.ctx);
+}
+
+TEST(packet_socket, frame_comes_back_once_when_spinning)
+{
+	check_echo(PACKET_WAIT_SPIN);
+}
+
+TEST(packet_socket, frame_comes_back_once_when_sleeping)
+{
+	check_echo(PACKET_WAIT_SLEEP);
+}
+
+/* Not before the deadline, and not ticks behind it as a socket's own time-out (T01); generous for a loaded machine. */
+static void check_deadline(enum packet_wait wait)
+{
+	struct platform platform = platform_posix();
+	struct transport transport = open_loopback(wait);
+	int64_t least_ns = INT64_MAX;
+
+	for (int i = 0; i < 10; i++) {
+		uint8_t got[ECAT_FRAME_MAX_BYTES];
+		mono_t deadline = mono_add(platform.now(NULL), (span_t){ 300 * NS_PER_US });
+		int64_t late_ns;
+
+		CHECK_EQ(transport.receive(transport.ctx, got, sizeof(got), deadline, NULL), -EAGAIN);
+		late_ns = mono_sub(platform.now(NULL), deadline).ns;
+		CHECK(late_ns >= 0);
+		least_ns = late_ns < least_ns ? late_ns : least_ns;
+	}
+	CHECK(least_ns < 2 * NS_PER_MS);
+	transport.destroy(transport.ctx);
+}
+
+TEST(packet_socket, receive_returns_at_its_deadline)
+{
+	check_deadline(PACKET_WAIT_SPIN);
+	check_deadline(PACKET_WAIT_SLEEP);
+}
+
+TEST(packet_socket, frame_longer_than_the_buffer_is_passed_over)
+{
+	struct transport transport = open_loopback(PACKET_WAIT_SLEEP);
+	struct platform platform = platform_posix();
+	uint8_t frame[ECAT_FRAME_MAX_BYTES];
+	uint8_t got[32];
+	size_t len = make_frame(frame, 1);
+
+	CHECK_EQ(transport.send(transport.ctx, frame, len), 0);
+	CHECK_EQ(transport.receive(transport.ctx, got, sizeof(got),
+				   mono_add(platform.now(NULL), (span_t){ 5 * NS_PER_MS }), NULL),
+		 -EAGAIN);
+	transport.destroy(transport.ctx);
+}
