@@ -29,6 +29,13 @@ void board_put(struct board *board, unsigned output, uint64_t raw)
 	}
 }
 
+void board_unset(struct board *board, unsigned output)
+{
+	if (output < BOARD_OUTPUTS) {
+		atomic_store_explicit(&board->output[output].is_set, 0, RELAXED);
+	}
+}
+
 uint64_t board_commit(struct board *board)
 {
 	uint64_t s = atomic_load_explicit(&board->sequence, RELAXED) + 1;

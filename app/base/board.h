@@ -42,6 +42,9 @@ struct board_set {
 void board_init(struct board *board);
 /** Put one value into the next set; board_commit() makes it visible. Context: the writer. */
 void board_put(struct board *board, unsigned output, uint64_t raw);
+/** Take the value of one output back in the next set: fail-safe from then on. Context: the writer.
+ */
+void board_unset(struct board *board, unsigned output);
 /** Begin (makes the page odd) and commit a set. Returns its sequence. Context: the writer. */
 void board_begin(struct board *board);
 uint64_t board_commit(struct board *board);

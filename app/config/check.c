@@ -7,6 +7,11 @@
 #include "config/option.h"
 #include "config/sdo_value.h"
 
+#define HOST_CHARS                                                                                 \
+	"abcdefghijklmnopqrstuvwxyz"                                                               \
+	"ABCDEFGHIJKLMNOPQRSTUVWXYZ"                                                               \
+	"0123456789._-:"
+
 struct relation {
 	const char *subject;
 	const char *other;
@@ -67,6 +72,38 @@ static int check_relations(const struct config *cfg, const struct option_lines *
 		}
 	}
 	return 0;
+}
+
+static int is_made_of(const char *text, const char *chars)
+{
+	return text[strspn(text, chars)] == '\0';
+}
+
+static int check_dds(const struct config *cfg, const struct option_lines *lines,
+		     const char **ret_key, int *ret_line, char *why)
+{
+	const char *fault = NULL;
+
+	*ret_key = "dds.interface";
+	if (!cfg->dds_enable) {
+		return 0;
+	}
+	if (cfg->dds_interface[0] == '\0') {
+		fault = "must be given while dds.enable is on";
+	} else if (strcmp(cfg->dds_interface, cfg->interface) == 0) {
+		fault = "is bus.interface, which is for EtherCAT alone";
+	} else if (!is_made_of(cfg->dds_interface, HOST_CHARS)) {
+		fault = "is no name of a network interface";
+	} else if (!is_made_of(cfg->dds_peers, HOST_CHARS ",")) {
+		*ret_key = "dds.peers";
+		fault = "must be addresses or host names with commas between";
+	}
+	if (fault == NULL) {
+		return 0;
+	}
+	*ret_line = line_of(lines, *ret_key);
+	snprintf(why, OPTION_WHY_BYTES, "%s", fault);
+	return -EINVAL;
 }
 
 static int check_slaves(const struct config *cfg, const char **ret_key, int *ret_line, char *why)
@@ -141,6 +178,9 @@ int option_cross_check(const struct config *cfg, const struct option_lines *line
 {
 	int r = check_relations(cfg, lines, ret_key, ret_line, why);
 
+	if (r == 0) {
+		r = check_dds(cfg, lines, ret_key, ret_line, why);
+	}
 	if (r == 0) {
 		r = check_slaves(cfg, ret_key, ret_line, why);
 	}

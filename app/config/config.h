@@ -100,6 +100,16 @@ struct config {
 	uint64_t record_budget_bytes;  /* oldest files go above this; 0 = none */
 	uint64_t record_reserve_bytes; /* stop with less than this free */
 	int32_t record_compression;    /* zstd level, 0 = none */
+	/* dds */
+	uint32_t dds_enable;
+	char dds_interface[32];
+	uint32_t dds_domain;
+	char dds_tag[64]; /* "" = none */
+	uint32_t dds_multicast;
+	char dds_peers[CONFIG_PATH_BYTES]; /* addresses, comma between; "" = none */
+	uint32_t dds_block_cycles;         /* 0 = no blocks */
+	uint32_t dds_allow_insecure_commands;
+	uint32_t dds_command_rate; /* commands a second and commander */
 	/* lists */
 	struct config_slave slave[LIMIT_SLAVES];
 	size_t slave_count;
@@ -140,11 +150,12 @@ enum { CONFIG_WHY_BYTES = 192 };
 int config_parse_duration(const char *text, int64_t *ret_ns, char *why);
 
 /* What stands in the run directory. */
-#define CONFIG_RUN_SAMPLES "samples"             /* ring of samples */
-#define CONFIG_RUN_EVENTS "events"               /* ring of events */
-#define CONFIG_RUN_STATUS "status"               /* struct status_page */
-#define CONFIG_RUN_RECORD_STATUS "record-status" /* struct record_status */
-#define CONFIG_RUN_ADMIN "admin"                 /* socket, admin/protocol.h */
+#define CONFIG_RUN_SAMPLES "samples"                 /* ring of samples */
+#define CONFIG_RUN_EVENTS "events"                   /* ring of events */
+#define CONFIG_RUN_STATUS "status"                   /* struct status_page */
+#define CONFIG_RUN_RECORD_STATUS "record-status"     /* struct record_status */
+#define CONFIG_RUN_COMMANDS_REMOTE "commands-remote" /* struct board, for ecdaq-dds */
+#define CONFIG_RUN_ADMIN "admin"                     /* socket, admin/protocol.h */
 
 /** Where the run directory is: @cfg->run_dir, else $ECDAQ_RUN_DIR, else /run/ecdaq (root) or
  * /dev/shm/ecdaq-UID. */

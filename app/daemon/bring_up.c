@@ -163,7 +163,8 @@ static int make_cycle(struct session *s, struct failure *failure)
 		.samples = s->samples,
 		.events = s->home.events,
 		.stats = &s->home.page->cycle,
-		.boards = { [CYCLE_WRITER_LOCAL] = &s->board },
+		.boards = { [CYCLE_WRITER_LOCAL] = &s->board,
+			    [CYCLE_WRITER_REMOTE] = s->home.remote },
 	};
 	int r = exchange_create(spec.plan, s->line, &s->exchange);
 
@@ -175,6 +176,7 @@ static int make_cycle(struct session *s, struct failure *failure)
 	spec.slaves = bus_slaves(s->bus, &spec.slave_count);
 	spec.channels = bus_channels(s->bus, &spec.channel_count);
 	board_init(&s->board);
+	board_init(s->home.remote);
 	memset(&s->home.page->cycle, 0, sizeof(s->home.page->cycle));
 	r = cycle_create(&spec, &s->cycle, error, sizeof(error));
 	if (r < 0) {

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The run directory: made, locked against a second instance, with the status page and the event
- * ring in it. It lives as long as the program; sessions on the bus come and go inside it.
+ * The run directory: made, locked against a second instance, with the status page, the event ring
+ * and the remote command board in it. It lives as long as the program; sessions on the bus come and
+ * go inside it.
  */
 #ifndef DAEMON_HOME_H
 #define DAEMON_HOME_H
@@ -9,6 +10,7 @@
 #include <stddef.h>
 #include <sys/types.h>
 
+#include "base/board.h"
 #include "base/platform.h"
 #include "base/ring.h"
 #include "base/status.h"
@@ -22,6 +24,7 @@ struct home {
 	int is_tmpfs;
 	struct status_page *page;
 	struct ring *events;
+	struct board *remote; /* outputs as ecdaq-dds wants them */
 };
 
 enum home_segment { HOME_REAL, HOME_SIMULATED };
