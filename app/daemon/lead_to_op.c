@@ -21,11 +21,10 @@ static int look_again(struct session *s, mono_t give_up, struct failure *failure
 		return r;
 	}
 	if (s->spec.hooks.cycle_has_ended(s->spec.hooks.ctx)) {
-		return failure_set(failure, EXIT_CODE_OVERRUN, -EIO,
-				   "cycle: ended by itself during bring-up (overrun?)");
+		return session_report_ended(s, failure);
 	}
 	if (session_now(s).ns >= give_up.ns) {
-		return -ETIME;
+		return -ETIMEDOUT;
 	}
 	session_wait(s, LOOK_SPAN);
 	return 0;
@@ -45,9 +44,9 @@ static int wait_for_lock(struct session *s, struct failure *failure)
 	while (atomic_load_explicit(&st->dc_state, memory_order_relaxed) != DC_LOCKED) {
 		int r = look_again(s, give_up, failure);
 
-		if (r == -ETIME) {
+		if (r == -ETIMEDOUT) {
 			return failure_set(
-				failure, EXIT_CODE_CLOCKS, r,
+				failure, EXIT_CODE_CLOCKS, -ETIME,
 				"dc: no lock to the reference clock within %" PRId64
 				" ms (dc.lock_timeout): correction %" PRId64 " ppb, %" PRIu64
 				" of %" PRIu64 " frames lost, wake latency up to %" PRId64 " us",
@@ -88,9 +87,9 @@ static int wait_for_agreement(struct session *s, struct ring_reader *reader,
 
 		looks = diff_ns >= 0 && diff_ns <= limit_ns ? looks + 1 : 0;
 		r = look_again(s, give_up, failure);
-		if (r == -ETIME) {
+		if (r == -ETIMEDOUT) {
 			return failure_set(
-				failure, EXIT_CODE_CLOCKS, r,
+				failure, EXIT_CODE_CLOCKS, -ETIME,
 				"dc: the slaves' clocks are up to %" PRId64
 				" ns off the reference (0x092C; dc.diff_limit is %" PRId64 " ns)",
 				diff_ns, limit_ns);
@@ -139,8 +138,8 @@ static int wait_for_flow(struct session *s, struct failure *failure)
 	while (load(&st->cycles) < enough) {
 		int r = look_again(s, give_up, failure);
 
-		if (r == -ETIME) {
-			return failure_set(failure, EXIT_CODE_WIRE, r,
+		if (r == -ETIMEDOUT) {
+			return failure_set(failure, EXIT_CODE_WIRE, -ETIME,
 					   "bus: frames do not come back steadily: %" PRIu64
 					   " of %" PRIu64 " lost",
 					   load(&st->frames_lost), load(&st->frames_sent));

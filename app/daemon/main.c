@@ -139,7 +139,7 @@ static int bring_up(struct program *pg, struct failure *failure)
 			return r;
 		}
 		if (pg->waiting_for != failure->code) {
-			fprintf(stderr, "ecdaqd: %s; waiting\n", failure->text);
+			fprintf(stderr, "ecdaqd: waiting: %s\n", failure->text);
 			pg->waiting_for = failure->code;
 		}
 		say_ready(pg);

@@ -63,6 +63,8 @@ int session_lead_to_op(struct session *s, struct failure *failure);
 /** Stop the cycle and give the transport back; its result. */
 int session_cycle_end(struct session *s);
 
+/** The cycle has ended by itself: take it down and say why. */
+int session_report_ended(struct session *s, struct failure *failure);
 /** Does anything come back at all? The cycle's counters say so, also while the bus is being asked.
  */
 void session_listen(struct session *s);

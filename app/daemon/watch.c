@@ -193,7 +193,7 @@ static int is_wkc_alarming(struct session *s)
 	return s->state == BUS_OP && more >= s->spec.cfg->bus_wkc_miss_limit_cycles;
 }
 
-static int report_ended_cycle(struct session *s, struct failure *failure)
+int session_report_ended(struct session *s, struct failure *failure)
 {
 	int r = session_cycle_end(s);
 
@@ -218,7 +218,7 @@ int session_service(struct session *session, struct failure *failure)
 		s->spec.hooks.alive(s->spec.hooks.ctx);
 	}
 	if (s->is_riding && s->spec.hooks.cycle_has_ended(s->spec.hooks.ctx)) {
-		return report_ended_cycle(s, failure);
+		return session_report_ended(s, failure);
 	}
 	serve_admin(s);
 	if (s->is_riding) {

@@ -278,6 +278,21 @@ TEST(session, a_cycle_that_overran_ends_it_with_its_code)
 	bench_close(&b);
 }
 
+TEST(session, a_cycle_that_overruns_on_the_way_up_ends_bring_up_with_its_code)
+{
+	static struct bench b;
+	struct failure failure;
+
+	bench_open(&b);
+	b.ends_after = 20;
+	b.result = -ETIME;
+	CHECK_EQ(session_bring_up(b.session, &failure), -ETIME);
+	CHECK_EQ(failure.code, EXIT_CODE_OVERRUN);
+	CHECK_STR(fake_bus.steps, "scan compare map dc_setup stop ");
+	CHECK_EQ(fake_bus.transports, 0);
+	bench_close(&b);
+}
+
 TEST(session, a_slave_that_falls_is_shown_and_its_return_too)
 {
 	static struct bench b;
