@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Plain CDR (XCDR1), little-endian, as a flat final type has it: a 4-byte encapsulation header, then each
- * value aligned to its own size, counted from behind the header. Context: any, RT-safe.
+ * Plain CDR (XCDR1), little-endian, as a flat final type has it: a 4-byte encapsulation header,
+ * then each value aligned to its own size, counted from behind the header. Context: any, RT-safe.
  */
 #ifndef RECORD_CDR_H
 #define RECORD_CDR_H

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A recording as a table: a row a cycle, a column a channel. Learns the columns from schemas and channels, then
- * gathers the messages of one cycle. Context: blocking.
+ * A recording as a table: a row a cycle, a column a channel. Learns the columns from schemas and
+ * channels, then gathers the messages of one cycle. Context: blocking.
  */
 #ifndef RECORD_COLUMNS_H
 #define RECORD_COLUMNS_H
@@ -17,11 +17,12 @@ struct columns;
 struct columns *columns_create(const char *channels, int is_raw, enum log_format format);
 void columns_destroy(struct columns *c);
 
-/** Take a schema or channel of the recording. 0, -ENOMEM. Topics that are not a slave's are left out. */
+/** Take a schema or channel of the recording. 0, -ENOMEM. Topics that are not a slave's are left
+ * out. */
 int columns_learn(struct columns *c, const struct mcap_item *item);
 /**
- * All is learnt: check that every channel asked for is there. 0; -ENOENT with its name in @ret_missing; -ENODATA:
- * there is no "/ecdaq/cycle".
+ * All is learnt: check that every channel asked for is there. 0; -ENOENT with its name in
+ * @ret_missing; -ENODATA: there is no "/ecdaq/cycle".
  */
 int columns_freeze(struct columns *c, char *ret_missing, size_t missing_bytes);
 int columns_is_frozen(const struct columns *c);

@@ -20,14 +20,15 @@ struct event_mark {
 };
 
 /**
- * Open the ring at the path if there is one: at @mark if the mark was made in it, else at its oldest event.
- * An open ring that was replaced is drained first. Call before reading.
+ * Open the ring at the path if there is one: at @mark if the mark was made in it, else at its
+ * oldest event. An open ring that was replaced is drained first. Call before reading.
  */
 void event_feed_open(struct event_feed *f, const struct event_mark *mark);
 /** Go (back) to @mark in the same way. */
 void event_feed_seek(struct event_feed *f, const struct event_mark *mark);
 
-/** The oldest event not read, and its sequence. 1, 0 none; *@ret_lost counts events overwritten before. */
+/** The oldest event not read, and its sequence. 1, 0 none; *@ret_lost counts events overwritten
+ * before. */
 int event_feed_read(struct event_feed *f, struct event *ret_event, uint64_t *ret_sequence,
 		    uint64_t *ret_lost);
 /** Take the event just read back: it is read again. */

@@ -43,8 +43,9 @@ static int io_truncate(void *ctx, uint64_t bytes)
 
 struct mcap_io file_io(int *fd)
 {
-	return (struct mcap_io){ .write = io_write, .sync = io_sync, .truncate = io_truncate,
-				 .ctx = fd };
+	return (struct mcap_io){
+		.write = io_write, .sync = io_sync, .truncate = io_truncate, .ctx = fd
+	};
 }
 
 static int source_read_at(void *ctx, uint64_t offset, void *buf, size_t len)
@@ -80,9 +81,9 @@ int file_source(int *fd, struct mcap_source *ret_source)
 	if (!S_ISREG(st.st_mode)) {
 		return -EINVAL;
 	}
-	*ret_source = (struct mcap_source){ .read_at = source_read_at,
-					    .bytes = (uint64_t)st.st_size,
-					    .ctx = fd };
+	ret_source->read_at = source_read_at;
+	ret_source->bytes = (uint64_t)st.st_size;
+	ret_source->ctx = fd;
 	return 0;
 }
 

@@ -6,7 +6,8 @@
 #include <stddef.h>
 #include <stdio.h>
 
-/** @text (@len bytes, up to a zero) as a JSON string with its quotes; what is not UTF-8 becomes U+FFFD. */
+/** @text (@len bytes, up to a zero) as a JSON string with its quotes; what is not UTF-8 becomes
+ * U+FFFD. */
 void json_string_n(FILE *out, const char *text, size_t len);
 void json_string(FILE *out, const char *text);
 /** The shortest text that reads back as @value; null for what JSON cannot say. */

@@ -16,7 +16,7 @@ struct layout {
 	struct sample_meta meta;
 	struct slave_info *slave;
 	struct channel *channel;
-	struct layout_topic *topic; /* at most one a slave */
+	struct layout_topic topic[LIMIT_SLAVES];
 	size_t topic_count;
 	struct layout_field *field; /* one a channel, grouped by topic */
 };
@@ -28,10 +28,9 @@ static const struct {
 		   { "uint16", "unsigned short" },
 		   { "uint32", "unsigned long" },
 		   { "uint64", "unsigned long long" } },
-  int_types[] = { { "int8", "int8" },
-		  { "int16", "short" },
-		  { "int32", "long" },
-		  { "int64", "long long" } };
+  int_types[] = {
+	  { "int8", "int8" }, { "int16", "short" }, { "int32", "long" }, { "int64", "long long" }
+  };
 
 static int is_sound(const struct sample_meta *meta, size_t meta_bytes)
 {
@@ -49,9 +48,8 @@ static int copy_tables(struct layout *l, const uint8_t *tables)
 
 	l->slave = calloc(l->meta.slave_count + 1u, sizeof(l->slave[0]));
 	l->channel = calloc(l->meta.channel_count + 1u, sizeof(l->channel[0]));
-	l->topic = calloc(l->meta.slave_count + 1u, sizeof(l->topic[0]));
 	l->field = calloc(l->meta.channel_count + 1u, sizeof(l->field[0]));
-	if (l->slave == NULL || l->channel == NULL || l->topic == NULL || l->field == NULL) {
+	if (l->slave == NULL || l->channel == NULL || l->field == NULL) {
 		return -ENOMEM;
 	}
 	memcpy(l->slave, tables, slaves_len);
@@ -101,9 +99,8 @@ static const char *entry_name(const struct channel *ch, const struct slave_info 
 {
 	size_t len = strlen(slave->name);
 
-	return strncmp(ch->name, slave->name, len) == 0 && ch->name[len] == '.' ?
-		       ch->name + len + 1 :
-		       ch->name;
+	return strncmp(ch->name, slave->name, len) == 0 && ch->name[len] == '.' ? ch->name + len + 1
+										: ch->name;
 }
 
 static int field_exists(const struct layout_topic *t, const char *name)
@@ -213,9 +210,8 @@ int layout_create(const void *meta, size_t meta_bytes, struct layout **ret_layou
 		return -ENOMEM;
 	}
 	memcpy(&l->meta, meta, sizeof(l->meta));
-	r = is_sound(&l->meta, meta_bytes) ?
-		    copy_tables(l, (const uint8_t *)meta + sizeof(l->meta)) :
-		    -EPROTO;
+	r = is_sound(&l->meta, meta_bytes) ? copy_tables(l, (const uint8_t *)meta + sizeof(l->meta))
+					   : -EPROTO;
 	if (r == 0 && !positions_are_unique(l)) {
 		r = -EPROTO;
 	}
@@ -241,7 +237,6 @@ void layout_destroy(struct layout *l)
 	}
 	free(l->slave);
 	free(l->channel);
-	free(l->topic);
 	free(l->field);
 	free(l);
 }

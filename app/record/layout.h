@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * How a sample becomes messages: from the channel table in the ring's meta area, one topic a slave with its
- * fields, and the texts that describe them (ROS 2 message definition, IDL, JSON).
+ * How a sample becomes messages: from the channel table in the ring's meta area, one topic a slave
+ * with its fields, and the texts that describe them (ROS 2 message definition, IDL, JSON).
  */
 #ifndef RECORD_LAYOUT_H
 #define RECORD_LAYOUT_H
@@ -15,7 +15,8 @@ struct layout;
 
 enum layout_limits {
 	LAYOUT_NAME_BYTES = 80,
-	LAYOUT_HEAD_FIELDS = 4, /* cycle, dc_time_ns, flags, good: in each slave's message before its channels */
+	LAYOUT_HEAD_FIELDS = 4, /* cycle, dc_time_ns, flags, good: in each slave's message before
+				   its channels */
 };
 
 /* One field of a slave's message. */
@@ -28,17 +29,17 @@ struct layout_field {
 };
 
 struct layout_topic {
-	char topic[LAYOUT_NAME_BYTES];  /* "/ecdaq/piccolo0" */
-	char type[LAYOUT_NAME_BYTES];   /* "Piccolo0" */
+	char topic[LAYOUT_NAME_BYTES]; /* "/ecdaq/piccolo0" */
+	char type[LAYOUT_NAME_BYTES];  /* "Piccolo0" */
 	const struct slave_info *slave;
 	const struct layout_field *field;
 	size_t field_count;
-	size_t message_bytes;           /* of its CDR */
+	size_t message_bytes; /* of its CDR */
 };
 
 /**
- * From the ring's meta area. 0; -EPROTO: not a meta area of this version, or one that does not hold together;
- * -ENOMEM. Everything is copied. Free with layout_destroy(). Context: blocking.
+ * From the ring's meta area. 0; -EPROTO: not a meta area of this version, or one that does not hold
+ * together; -ENOMEM. Everything is copied. Free with layout_destroy(). Context: blocking.
  */
 int layout_create(const void *meta, size_t meta_bytes, struct layout **ret_layout);
 void layout_destroy(struct layout *l);
@@ -52,7 +53,8 @@ const struct layout_topic *layout_topics(const struct layout *l, size_t *ret_cou
 size_t layout_largest_bytes(const struct layout *l);
 size_t layout_cycle_bytes(const struct layout *l);
 
-/** The slave's message of the sample @header with @image to @buf. Returns its length. Context: any, RT-safe. */
+/** The slave's message of the sample @header with @image to @buf. Returns its length. Context: any,
+ * RT-safe. */
 size_t layout_encode(const struct layout_topic *topic, const struct sample_header *header,
 		     const uint8_t *image, uint8_t *buf, size_t buf_len);
 

@@ -50,7 +50,8 @@ static void put_slave_comment(FILE *out, const struct slave_info *s)
 
 	name_make_comment(s->name, name, sizeof(name));
 	name_make_comment(s->device, device, sizeof(device));
-	fprintf(out, "Slave %s at position %u: %s, vendor 0x%08" PRIx32 ", product 0x%08" PRIx32
+	fprintf(out,
+		"Slave %s at position %u: %s, vendor 0x%08" PRIx32 ", product 0x%08" PRIx32
 		", revision 0x%08" PRIx32 ". Values are raw.",
 		name, s->slave_pos, device, s->vendor, s->product, s->revision);
 }
@@ -141,7 +142,8 @@ static void put_json_channel(FILE *out, const struct layout_topic *topic,
 	json_string(out, topic->topic);
 	fprintf(out, ",\"field\":");
 	json_string(out, f->name);
-	fprintf(out, ",\"slave\":%u,\"index\":%u,\"subindex\":%u,\"type\":\"%s\","
+	fprintf(out,
+		",\"slave\":%u,\"index\":%u,\"subindex\":%u,\"type\":\"%s\","
 		"\"direction\":\"%s\",\"bit_len\":%u,\"bit_offset\":%" PRIu32 ",\"unit\":",
 		ch->slave_pos, ch->index, ch->subindex, type_to_str(ch->type),
 		ch->direction == CHANNEL_OUTPUT ? "output" : "input", ch->bit_len, ch->bit_offset);

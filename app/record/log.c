@@ -3,7 +3,7 @@
 #include "record/log.h"
 
 #include <errno.h>
-#include <getopt.h>
+#include <getopt.h> /* IWYU pragma: keep */
 #include <inttypes.h>
 #include <limits.h>
 #include <stdlib.h>
@@ -29,11 +29,11 @@ enum {
 };
 
 static const struct option known[] = {
-	{ "dir", required_argument, NULL, 'd' },      { "config", required_argument, NULL, 'c' },
-	{ "output", required_argument, NULL, 'o' },   { "channels", required_argument, NULL, 'n' },
-	{ "from", required_argument, NULL, 'f' },     { "to", required_argument, NULL, 't' },
-	{ "raw", no_argument, NULL, 'r' },	      { "json", no_argument, NULL, 'j' },
-	{ "help", no_argument, NULL, 'h' },	      { NULL, 0, NULL, 0 },
+	{ "dir", required_argument, NULL, 'd' },    { "config", required_argument, NULL, 'c' },
+	{ "output", required_argument, NULL, 'o' }, { "channels", required_argument, NULL, 'n' },
+	{ "from", required_argument, NULL, 'f' },   { "to", required_argument, NULL, 't' },
+	{ "raw", no_argument, NULL, 'r' },          { "json", no_argument, NULL, 'j' },
+	{ "help", no_argument, NULL, 'h' },         { NULL, 0, NULL, 0 },
 };
 
 static void help(FILE *out)
@@ -42,12 +42,14 @@ static void help(FILE *out)
 	      "       ecdaq log info FILE [--json]\n"
 	      "       ecdaq log check [--dir DIR | FILE-OR-DIR...] [--json]\n"
 	      "       ecdaq log recover FILE [--output FILE] [--json]\n"
-	      "       ecdaq log export [--dir DIR | FILE-OR-DIR...] [--channels NAME,...] [--from CYCLE]\n"
+	      "       ecdaq log export [--dir DIR | FILE-OR-DIR...] [--channels NAME,...] [--from "
+	      "CYCLE]\n"
 	      "                        [--to CYCLE] [--raw] [--output FILE] [--json]\n"
 	      "\n"
 	      "  list     the recordings: start, duration, cycles, size, state\n"
 	      "  info     topics with their fields, counts, metadata of one recording\n"
-	      "  check    read all: CRC of each chunk, cycle numbers without a gap in and between files\n"
+	      "  check    read all: CRC of each chunk, cycle numbers without a gap in and between "
+	      "files\n"
 	      "  recover  mend a recording that was not finished; --output copies what is whole\n"
 	      "  export   a table with a row a cycle, as CSV (pandas.read_csv takes it as it is)\n"
 	      "\n"
@@ -59,7 +61,8 @@ static void help(FILE *out)
 	      "  --output FILE    where to (export: default is standard output)\n"
 	      "  --json           JSON (export: an object a line)\n"
 	      "\n"
-	      "Exit codes: 0 done, check: clean; 1 failed, check: gaps or damage; 2 command line.\n",
+	      "Exit codes: 0 done, check: clean; 1 failed, check: gaps or damage; 2 command "
+	      "line.\n",
 	      out);
 }
 
@@ -117,10 +120,10 @@ static int take_option(struct arguments *a, int c)
 
 static unsigned needs(int c)
 {
-	return c == 'd' || c == 'c'			      ? TAKES_DIR :
-	       c == 'o'					      ? TAKES_OUTPUT :
-	       c == 'n' || c == 'f' || c == 't' || c == 'r' ? TAKES_EXPORT :
-								0;
+	return c == 'd' || c == 'c'                           ? TAKES_DIR
+	       : c == 'o'                                     ? TAKES_OUTPUT
+	       : c == 'n' || c == 'f' || c == 't' || c == 'r' ? TAKES_EXPORT
+							      : 0;
 }
 
 /* Leaves optind at the first operand. */
@@ -181,8 +184,8 @@ static int run_list(const struct arguments *a, char **operands, int count)
 
 static int run_info(const struct arguments *a, char **operands, int count)
 {
-	return count != 1 ? usage("info", "takes one file") :
-			    log_info(operands[0], a->format, stdout, stderr);
+	return count != 1 ? usage("info", "takes one file")
+			  : log_info(operands[0], a->format, stdout, stderr);
 }
 
 static int run_check(const struct arguments *a, char **operands, int count)
@@ -201,8 +204,8 @@ static int run_check(const struct arguments *a, char **operands, int count)
 
 static int run_recover(const struct arguments *a, char **operands, int count)
 {
-	return count != 1 ? usage("recover", "takes one file") :
-			    log_recover(operands[0], a->output, a->format, stdout, stderr);
+	return count != 1 ? usage("recover", "takes one file")
+			  : log_recover(operands[0], a->output, a->format, stdout, stderr);
 }
 
 static int run_export(const struct arguments *a, char **operands, int count)

@@ -18,7 +18,8 @@ enum log_exit {
 
 enum log_format { LOG_TEXT, LOG_JSON };
 
-/** `ecdaq log ...`: @argv[0] is "log". Output goes to stdout, failures as one line each to stderr. */
+/** `ecdaq log ...`: @argv[0] is "log". Output goes to stdout, failures as one line each to stderr.
+ */
 int log_main(int argc, char **argv);
 
 /* The same as calls; failures are one line "ecdaq: log: what: why" to @err. */
@@ -28,8 +29,8 @@ int log_list(const char *dir, enum log_format format, FILE *out, FILE *err);
 /** Topics with their fields and counts, metadata, attachments of one file. */
 int log_info(const char *path, enum log_format format, FILE *out, FILE *err);
 /**
- * Read all of the files (or of the directories) at @paths: CRC of every chunk, and cycle numbers without a gap
- * inside of files and from one to the next. LOG_OK: clean.
+ * Read all of the files (or of the directories) at @paths: CRC of every chunk, and cycle numbers
+ * without a gap inside of files and from one to the next. LOG_OK: clean.
  */
 int log_check(const char *const *paths, size_t count, enum log_format format, FILE *out, FILE *err);
 /** Mend @path in place, or copy what is whole to @output where that is not NULL. */
@@ -41,7 +42,7 @@ struct log_export_options {
 	const char *channels; /* names, separated by commas; NULL: all */
 	uint64_t from;        /* cycles, both included */
 	uint64_t to;
-	int is_raw;           /* values as on the wire; else physical */
+	int is_raw;             /* values as on the wire; else physical */
 	enum log_format format; /* CSV, or a JSON object a line */
 };
 

@@ -132,16 +132,17 @@ static int is_damaged(const struct checked *c)
 	return c->is_recording ? c->found.needs_copy : !c->is_whole;
 }
 
-/* From the last cycle of @a to the first of @b, of the same session: cycles between; UINT64_MAX: goes back. */
+/* From the last cycle of @a to the first of @b, of the same session: cycles between; UINT64_MAX:
+ * goes back. */
 static uint64_t missing_between(const struct checked *a, const struct checked *b)
 {
 	if (a == NULL || a->track.cycles == 0 || b->track.cycles == 0 ||
 	    a->track.before.session != b->track.before.session) {
 		return 0;
 	}
-	return b->track.first_cycle <= a->track.last_cycle ?
-		       UINT64_MAX :
-		       b->track.first_cycle - a->track.last_cycle - 1;
+	return b->track.first_cycle <= a->track.last_cycle
+		       ? UINT64_MAX
+		       : b->track.first_cycle - a->track.last_cycle - 1;
 }
 
 static void put_gap(FILE *out, const struct gap *g, enum log_format format)
@@ -170,8 +171,10 @@ static void put_text(FILE *out, const struct checked *c, uint64_t between)
 		fprintf(out, "%s: unreadable\n", c->path);
 		return;
 	}
-	fprintf(out, "%s: %s", c->path, is_damaged(c) ? "DAMAGED" : t->gaps + t->backward > 0 ?
-								"GAPS" : "ok");
+	fprintf(out, "%s: %s", c->path,
+		is_damaged(c)               ? "DAMAGED"
+		: t->gaps + t->backward > 0 ? "GAPS"
+					    : "ok");
 	if (t->cycles > 0) {
 		fprintf(out, ", %" PRIu64 " cycles, %" PRIu64 " to %" PRIu64, t->cycles,
 			t->first_cycle, t->last_cycle);
@@ -203,8 +206,9 @@ static void put_json(FILE *out, const struct checked *c, uint64_t between)
 		"\",\"cycles\":%" PRIu64 ",\"first_cycle\":%" PRIu64 ",\"last_cycle\":%" PRIu64
 		",\"chunks\":%" PRIu64 ",\"damaged_records\":%" PRIu64 ",\"missing_before\":",
 		c->error < 0 ? "false" : "true", is_damaged(c) ? "true" : "false",
-		c->is_recording ? "being recorded" : log_ending_to_str(c->found.ending), t->before.session,
-		t->cycles, t->first_cycle, t->last_cycle, c->found.chunks, c->found.damaged);
+		c->is_recording ? "being recorded" : log_ending_to_str(c->found.ending),
+		t->before.session, t->cycles, t->first_cycle, t->last_cycle, c->found.chunks,
+		c->found.damaged);
 	if (between == UINT64_MAX) {
 		fprintf(out, "null");
 	} else {
@@ -291,9 +295,9 @@ int log_check(const char *const *paths, size_t count, enum log_format format, FI
 
 	for (size_t i = 0; i < count && result == LOG_OK; i++) {
 		struct stat st;
-		int r = stat(paths[i], &st) < 0 ? -errno :
-			S_ISDIR(st.st_mode)	? add_directory(&ck, paths[i]) :
-						  add_file(&ck, paths[i], log_is_recording(paths[i]));
+		int r = stat(paths[i], &st) < 0 ? -errno
+			: S_ISDIR(st.st_mode) ? add_directory(&ck, paths[i])
+					      : add_file(&ck, paths[i], log_is_recording(paths[i]));
 
 		if (r < 0) {
 			result = log_fail_errno(err, paths[i], r);

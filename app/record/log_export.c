@@ -17,7 +17,7 @@ struct export {
 	FILE *out;
 	FILE *err;
 	uint64_t rows;
-	int is_hopeless;       /* the table cannot be made: no more files */
+	int is_hopeless; /* the table cannot be made: no more files */
 };
 
 static int is_asked_for(const struct export *ex, uint64_t cycle)
@@ -79,8 +79,7 @@ static int take_message(struct export *ex, struct columns *c, const struct mcap_
 	} else {
 		r = columns_take(c, item);
 	}
-	return r < 0 ? log_fail(ex->err, path, "a message does not fit to its definition") :
-		       LOG_OK;
+	return r < 0 ? log_fail(ex->err, path, "a message does not fit to its definition") : LOG_OK;
 }
 
 static int read_items(struct export *ex, struct columns *c, struct mcap_reader *reader,
@@ -128,8 +127,8 @@ static int export_file(struct export *ex, const char *path)
 		return log_fail_errno(ex->err, path, r);
 	}
 	c = columns_create(op->channels, op->is_raw, op->format);
-	result = c == NULL ? log_fail_errno(ex->err, path, -ENOMEM) :
-			     read_items(ex, c, reader, path);
+	result = c == NULL ? log_fail_errno(ex->err, path, -ENOMEM)
+			   : read_items(ex, c, reader, path);
 	mcap_reader_destroy(reader);
 	log_file_close(&file);
 	if (c != ex->first) {
@@ -150,9 +149,9 @@ static int export_directory(struct export *ex, const char *dir)
 	}
 	for (size_t i = 0; i < count && !ex->is_hopeless; i++) {
 		char path[PATH_MAX];
-		int one = store_path(dir, entries[i].name, path, sizeof(path)) < 0 ?
-				  LOG_FAILED :
-				  export_file(ex, path);
+		int one = store_path(dir, entries[i].name, path, sizeof(path)) < 0
+				  ? LOG_FAILED
+				  : export_file(ex, path);
 
 		result = result != LOG_OK ? result : one;
 	}
@@ -168,9 +167,9 @@ int log_export(const struct log_export_options *options, FILE *out, FILE *err)
 	for (size_t i = 0; i < options->path_count && !ex.is_hopeless; i++) {
 		const char *path = options->paths[i];
 		struct stat st;
-		int one = stat(path, &st) < 0 ? log_fail_errno(err, path, -errno) :
-			  S_ISDIR(st.st_mode) ? export_directory(&ex, path) :
-						export_file(&ex, path);
+		int one = stat(path, &st) < 0   ? log_fail_errno(err, path, -errno)
+			  : S_ISDIR(st.st_mode) ? export_directory(&ex, path)
+						: export_file(&ex, path);
 
 		result = result != LOG_OK ? result : one;
 	}

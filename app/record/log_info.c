@@ -7,7 +7,6 @@
 
 #include "record/json.h"
 #include "record/log_common.h"
-#include "record/messages.h"
 
 struct topic {
 	char *name;
@@ -229,7 +228,8 @@ static void put_counts(const struct info *in, const struct mcap_findings *found)
 	}
 	log_format_time(t->start_ns, start);
 	log_format_time(t->end_ns, end);
-	fprintf(in->out, "%s; %" PRIu64 " chunks, %" PRIu64 " messages, %" PRIu64 " damaged records\n",
+	fprintf(in->out,
+		"%s; %" PRIu64 " chunks, %" PRIu64 " messages, %" PRIu64 " damaged records\n",
 		log_ending_to_str(found->ending), found->chunks, found->messages, found->damaged);
 	if (t->cycles > 0) {
 		fprintf(in->out,

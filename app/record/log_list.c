@@ -6,7 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/clock.h"
 #include "record/json.h"
 #include "record/log_common.h"
 #include "record/mcap_reader.h"
@@ -40,9 +39,10 @@ static int ask_summary(const struct mcap_source *source, struct row *row)
 		} else if (item.kind == MCAP_ITEM_STATISTICS) {
 			row->start_ns = item.log_time_ns;
 			row->end_ns = item.publish_time_ns;
-			row->cycles = cycle_channel < 0 ?
-					      0 :
-					      mcap_statistics_count(&item, (uint16_t)cycle_channel);
+			row->cycles =
+				cycle_channel < 0
+					? 0
+					: mcap_statistics_count(&item, (uint16_t)cycle_channel);
 		}
 	}
 	mcap_reader_destroy(reader);
@@ -84,10 +84,10 @@ static void fill_row(const char *dir, const struct store_entry *e, int is_locked
 		row->state = e->is_part ? "unfinished" : "finished";
 	} else {
 		r = ask_data(&file.source, row);
-		row->state = !e->is_part  ? "damaged" :
-			     is_locked	  ? "recording" :
-			     r == -EPROTO ? "unreadable" :
-					    "unfinished";
+		row->state = !e->is_part    ? "damaged"
+			     : is_locked    ? "recording"
+			     : r == -EPROTO ? "unreadable"
+					    : "unfinished";
 	}
 	log_file_close(&file);
 }
@@ -101,8 +101,8 @@ static void put_row(FILE *out, const struct row *row)
 		log_format_time(row->start_ns, start);
 	}
 	fprintf(out, "%-48s %-25s %10.3f s %10" PRIu64 " %9.3f MB  %s\n", row->name, start,
-		row->end_ns >= row->start_ns ? seconds : 0.0, row->cycles,
-		(double)row->bytes / 1e6, row->state);
+		row->end_ns >= row->start_ns ? seconds : 0.0, row->cycles, (double)row->bytes / 1e6,
+		row->state);
 }
 
 static void put_json_row(FILE *out, const struct row *row)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* ecdaq-record: follows the sample ring of ecdaqd and records it, until it is told to stop. */
 #include <errno.h>
-#include <getopt.h>
+#include <getopt.h> /* IWYU pragma: keep */
 #include <inttypes.h>
 #include <poll.h>
 #include <signal.h>
@@ -56,7 +56,8 @@ static void help(FILE *out)
 {
 	fputs("usage: ecdaq-record [OPTION...]\n"
 	      "\n"
-	      "Records every cycle of ecdaqd to MCAP files. Waits for the master, follows it through "
+	      "Records every cycle of ecdaqd to MCAP files. Waits for the master, follows it "
+	      "through "
 	      "restarts,\n"
 	      "and goes on behind the last recorded cycle after it was killed itself.\n"
 	      "\n"
@@ -69,7 +70,8 @@ static void help(FILE *out)
 	      "  --version            print the version\n"
 	      "  --help               this\n"
 	      "\n"
-	      "Exit codes: 0 stopped in order; 1 recording failed; 2 command line; 3 configuration;\n"
+	      "Exit codes: 0 stopped in order; 1 recording failed; 2 command line; 3 "
+	      "configuration;\n"
 	      "4 a right is missing; 6 another ecdaq-record works in the directory.\n",
 	      out);
 }
@@ -77,10 +79,14 @@ static void help(FILE *out)
 static int parse_arguments(int argc, char **argv, struct arguments *a)
 {
 	static const struct option known[] = {
-		{ "config", required_argument, NULL, 'c' }, { "set", required_argument, NULL, 's' },
-		{ "run-dir", required_argument, NULL, 'r' }, { "dir", required_argument, NULL, 'd' },
-		{ "once", no_argument, NULL, 'o' },	     { "version", no_argument, NULL, 'v' },
-		{ "help", no_argument, NULL, 'h' },	     { NULL, 0, NULL, 0 },
+		{ "config", required_argument, NULL, 'c' },
+		{ "set", required_argument, NULL, 's' },
+		{ "run-dir", required_argument, NULL, 'r' },
+		{ "dir", required_argument, NULL, 'd' },
+		{ "once", no_argument, NULL, 'o' },
+		{ "version", no_argument, NULL, 'v' },
+		{ "help", no_argument, NULL, 'h' },
+		{ NULL, 0, NULL, 0 },
 	};
 	int c;
 
@@ -92,7 +98,8 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
 			break;
 		case 's':
 			if (a->set_count == SETS) {
-				fprintf(stderr, "ecdaq-record: --set: more than %d of them\n", SETS);
+				fprintf(stderr, "ecdaq-record: --set: more than %d of them\n",
+					SETS);
 				return -EINVAL;
 			}
 			a->set[a->set_count++] = optarg;
@@ -182,11 +189,11 @@ static int find_paths(struct program *pg)
 {
 	int r = config_run_path(&pg->cfg, CONFIG_RUN_SAMPLES, pg->ring_path, sizeof(pg->ring_path));
 
-	r = r < 0 ? r :
-		    config_run_path(&pg->cfg, CONFIG_RUN_EVENTS, pg->events_path,
+	r = r < 0 ? r
+		  : config_run_path(&pg->cfg, CONFIG_RUN_EVENTS, pg->events_path,
 				    sizeof(pg->events_path));
-	r = r < 0 ? r :
-		    config_run_path(&pg->cfg, CONFIG_RUN_RECORD_STATUS, pg->status_path,
+	r = r < 0 ? r
+		  : config_run_path(&pg->cfg, CONFIG_RUN_RECORD_STATUS, pg->status_path,
 				    sizeof(pg->status_path));
 	if (r < 0) {
 		fprintf(stderr, "ecdaq-record: run directory: %s\n", strerror(-r));
@@ -231,7 +238,8 @@ static int run(struct recorder *rec, int is_once)
 	sigset_t others;
 	int r;
 
-	/* Blocked but for the wait below, so that none is missed between the question and the wait. */
+	/* Blocked but for the wait below, so that none is missed between the question and the wait.
+	 */
 	sigemptyset(&stops);
 	sigaddset(&stops, SIGTERM);
 	sigaddset(&stops, SIGINT);
@@ -240,7 +248,8 @@ static int run(struct recorder *rec, int is_once)
 	sigaction(SIGINT, &action, NULL);
 	while (!has_stopped) {
 		enum recorder_result result = recorder_step(rec);
-		struct timespec wait = { .tv_nsec = result == RECORDER_IDLE ? IDLE_MS * 1000000L : 0 };
+		struct timespec wait = { .tv_nsec =
+						 result == RECORDER_IDLE ? IDLE_MS * 1000000L : 0 };
 
 		if (result == RECORDER_ENDED && is_once) {
 			break;
@@ -249,8 +258,7 @@ static int run(struct recorder *rec, int is_once)
 	}
 	r = recorder_finish(rec);
 	if (r < 0) {
-		fprintf(stderr,
-			"ecdaq-record: %s: not finished: %s; the next start mends it\n",
+		fprintf(stderr, "ecdaq-record: %s: not finished: %s; the next start mends it\n",
 			recorder_status(rec)->path, strerror(-r));
 	}
 	return r;
@@ -258,9 +266,9 @@ static int run(struct recorder *rec, int is_once)
 
 static int exit_status(int error)
 {
-	return error == -EBUSY ? STATUS_BUSY :
-	       error == -EACCES || error == -EPERM || error == -EROFS ? STATUS_PERMISSION :
-									STATUS_FAILED;
+	return error == -EBUSY                                          ? STATUS_BUSY
+	       : error == -EACCES || error == -EPERM || error == -EROFS ? STATUS_PERMISSION
+									: STATUS_FAILED;
 }
 
 int main(int argc, char **argv)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * MCAP as its specification (mcap.dev/spec, version 0) has it: a magic, records of opcode, length and
- * content, a magic. All numbers are little-endian.
+ * MCAP as its specification (mcap.dev/spec, version 0) has it: a magic, records of opcode, length
+ * and content, a magic. All numbers are little-endian.
  */
 #ifndef RECORD_MCAP_H
 #define RECORD_MCAP_H
@@ -32,13 +32,14 @@ enum mcap_opcode {
 
 enum mcap_limits {
 	MCAP_MAGIC_BYTES = 8,
-	MCAP_HEAD_BYTES = 9,                    /* opcode and length of a record */
-	MCAP_MESSAGE_HEAD_BYTES = 22,           /* of a message, before its data */
-	MCAP_FOOTER_BYTES = 9 + 20,             /* the whole record */
-	MCAP_DATA_END_BYTES = 9 + 4,            /* the whole record */
-	MCAP_LIMIT_CHUNK_BYTES = 4 << 20,       /* that we write: closed early at this size */
-	MCAP_LIMIT_RECORD_BYTES = 32 << 20,     /* that we read, and a chunk's content: beyond is damage */
-	MCAP_LIMIT_INDEX_BYTES = 16 << 20,      /* summary kept in memory while writing; then rotate */
+	MCAP_HEAD_BYTES = 9,                /* opcode and length of a record */
+	MCAP_MESSAGE_HEAD_BYTES = 22,       /* of a message, before its data */
+	MCAP_FOOTER_BYTES = 9 + 20,         /* the whole record */
+	MCAP_DATA_END_BYTES = 9 + 4,        /* the whole record */
+	MCAP_LIMIT_CHUNK_BYTES = 4 << 20,   /* that we write: closed early at this size */
+	MCAP_LIMIT_RECORD_BYTES = 32 << 20, /* that we read, and a chunk's content: beyond is damage
+					     */
+	MCAP_LIMIT_INDEX_BYTES = 16 << 20,  /* summary kept in memory while writing; then rotate */
 	MCAP_CHANNEL_IDS = 1 << 16,
 };
 

@@ -27,7 +27,8 @@ uint8_t *mcap_buf_grow(struct mcap_buf *b, size_t len)
 		return NULL;
 	}
 	if (len > b->capacity - b->len) {
-		size_t capacity = b->capacity * 2 > b->len + len ? b->capacity * 2 : b->len + len + 64;
+		size_t capacity =
+			b->capacity * 2 > b->len + len ? b->capacity * 2 : b->len + len + 64;
 		uint8_t *data = realloc(b->data, capacity);
 
 		if (data == NULL) {

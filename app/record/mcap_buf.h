@@ -31,7 +31,8 @@ void mcap_buf_u64(struct mcap_buf *b, uint64_t v);
 void mcap_buf_string(struct mcap_buf *b, const char *text);
 void mcap_buf_pairs(struct mcap_buf *b, const struct mcap_pair *pairs, size_t count);
 
-/** Start a record of @opcode; its length is filled in by mcap_buf_end(), which takes what this returned. */
+/** Start a record of @opcode; its length is filled in by mcap_buf_end(), which takes what this
+ * returned. */
 size_t mcap_buf_begin(struct mcap_buf *b, enum mcap_opcode opcode);
 void mcap_buf_end(struct mcap_buf *b, size_t start);
 

@@ -19,8 +19,8 @@ struct mcap_chunk_index {
 	struct mcap_chunk_channel *channel; /* those seen, ascending once built */
 	size_t channel_count;
 	size_t channel_capacity;
-	uint32_t *slot;                     /* by channel id: 1 + its place in channel[]; 0: not seen */
-	uint32_t *fill;                     /* by place: next free byte in bytes */
+	uint32_t *slot; /* by channel id: 1 + its place in channel[]; 0: not seen */
+	uint32_t *fill; /* by place: next free byte in bytes */
 	struct mcap_buf bytes;
 	uint64_t start_ns;
 	uint64_t end_ns;
@@ -56,7 +56,8 @@ int mcap_chunk_next(const uint8_t *records, size_t records_len, size_t *offset,
 
 size_t mcap_chunk_content_len(size_t record_len, size_t compression_len)
 {
-	/* Head; start, end, size, CRC; length and name of the compression; length of the content. */
+	/* Head; start, end, size, CRC; length and name of the compression; length of the content.
+	 */
 	return record_len - MCAP_HEAD_BYTES - 28 - 4 - compression_len - 8;
 }
 

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The content of a chunk, uncompressed: walking its records, and making the message index that follows the
- * chunk in the file. The writer and the recovery make it by the same code, so it can be compared byte by byte.
+ * The content of a chunk, uncompressed: walking its records, and making the message index that
+ * follows the chunk in the file. The writer and the recovery make it by the same code, so it can be
+ * compared byte by byte.
  */
 #ifndef RECORD_MCAP_CHUNK_H
 #define RECORD_MCAP_CHUNK_H
@@ -46,13 +47,14 @@ struct mcap_chunk_channel {
 
 const struct mcap_chunk_channel *mcap_chunk_index_channels(const struct mcap_chunk_index *ix,
 							   size_t *ret_count);
-uint64_t mcap_chunk_index_start_ns(const struct mcap_chunk_index *ix); /* smallest log time, 0 if none */
+uint64_t mcap_chunk_index_start_ns(const struct mcap_chunk_index *ix); /* smallest log time, 0 if
+									  none */
 uint64_t mcap_chunk_index_end_ns(const struct mcap_chunk_index *ix);   /* largest log time */
 uint64_t mcap_chunk_index_messages(const struct mcap_chunk_index *ix);
 
 /**
- * Append the chunk record of @records, which @messages was built from, to @out; compressed if @zstd is not NULL.
- * Returns the length of the content in the record, or -errno.
+ * Append the chunk record of @records, which @messages was built from, to @out; compressed if @zstd
+ * is not NULL. Returns the length of the content in the record, or -errno.
  */
 int64_t mcap_chunk_put(struct mcap_buf *out, const struct mcap_chunk_index *messages,
 		       const uint8_t *records, size_t records_len, ZSTD_CCtx *zstd);

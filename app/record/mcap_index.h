@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What the summary section at the end of an MCAP file will say, collected while the file is written (or
- * scanned for recovery). Index records are kept ready-made; MCAP_LIMIT_INDEX_BYTES bounds them.
+ * What the summary section at the end of an MCAP file will say, collected while the file is written
+ * (or scanned for recovery). Index records are kept ready-made; MCAP_LIMIT_INDEX_BYTES bounds them.
  */
 #ifndef RECORD_MCAP_INDEX_H
 #define RECORD_MCAP_INDEX_H
@@ -10,14 +10,14 @@
 #include "record/mcap_chunk.h"
 
 struct mcap_index {
-	struct mcap_buf schemas;     /* repeated as they were */
+	struct mcap_buf schemas; /* repeated as they were */
 	struct mcap_buf channels;
 	struct mcap_buf chunks;      /* chunk index records */
 	struct mcap_buf attachments; /* attachment index records */
 	struct mcap_buf metadata;    /* metadata index records */
 	uint8_t *has_schema;         /* by id */
 	uint8_t *has_channel;
-	uint64_t *channel_messages;  /* by id */
+	uint64_t *channel_messages; /* by id */
 	uint64_t messages;
 	uint64_t start_ns;
 	uint64_t end_ns;
@@ -30,7 +30,7 @@ struct mcap_index {
 
 /* A chunk as it stands in the file. */
 struct mcap_chunk_place {
-	uint64_t offset;             /* of its record */
+	uint64_t offset; /* of its record */
 	uint64_t record_len;
 	const char *compression;
 	uint64_t compressed_len;
@@ -41,7 +41,8 @@ struct mcap_chunk_place {
 int mcap_index_init(struct mcap_index *ix);
 void mcap_index_done(struct mcap_index *ix);
 
-/** Note a schema or channel record (whole, head included); a repeated id is noted once. 0, -EBADMSG, -ENOMEM. */
+/** Note a schema or channel record (whole, head included); a repeated id is noted once. 0,
+ * -EBADMSG, -ENOMEM. */
 int mcap_index_schema(struct mcap_index *ix, const uint8_t *record, size_t record_len);
 int mcap_index_channel(struct mcap_index *ix, const uint8_t *record, size_t record_len);
 /** Note the chunk at @place whose messages @messages was built from. */

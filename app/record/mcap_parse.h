@@ -13,7 +13,8 @@ struct mcap_chunk_fields {
 	size_t data_len;
 };
 
-/** Fill the fields of @item from its record. 0 or -EBADMSG. A chunk's are left to mcap_parse_chunk(). */
+/** Fill the fields of @item from its record. 0 or -EBADMSG. A chunk's are left to
+ * mcap_parse_chunk(). */
 int mcap_parse_record(struct mcap_item *item);
 
 int mcap_parse_chunk(const uint8_t *content, size_t content_len,

@@ -15,13 +15,13 @@
 
 struct mcap_reader {
 	struct mcap_source source;
-	uint64_t offset;         /* of the next top-level record */
+	uint64_t offset; /* of the next top-level record */
 	int has_ended;
 	int is_summary;          /* reading the summary, not the data section */
 	struct mcap_buf record;  /* the newest top-level record, whole */
 	struct mcap_buf content; /* of the newest chunk, uncompressed, if it was compressed */
 	ZSTD_DCtx *zstd;
-	const uint8_t *inner;    /* content of the chunk being handed out; NULL: none */
+	const uint8_t *inner; /* content of the chunk being handed out; NULL: none */
 	size_t inner_len;
 	size_t inner_offset;
 	uint64_t chunk_offset;
@@ -72,8 +72,8 @@ int mcap_reader_create_summary(const struct mcap_source *source, struct mcap_rea
 	if (err < 0) {
 		return err;
 	}
-	err = source->read_at(source->ctx, source->bytes - MCAP_MAGIC_BYTES - sizeof(footer), footer,
-			      sizeof(footer));
+	err = source->read_at(source->ctx, source->bytes - MCAP_MAGIC_BYTES - sizeof(footer),
+			      footer, sizeof(footer));
 	r->offset = get_le64(footer + MCAP_HEAD_BYTES);
 	if (err == 0 && (r->offset == 0 || r->offset > source->bytes)) {
 		err = -ENODATA;
@@ -100,8 +100,8 @@ void mcap_reader_destroy(struct mcap_reader *r)
 
 enum is_final { GOES_ON, FINAL };
 
-static int damage(struct mcap_reader *r, uint64_t offset, const char *reason, enum is_final is_final,
-		  struct mcap_item *ret_item)
+static int damage(struct mcap_reader *r, uint64_t offset, const char *reason,
+		  enum is_final is_final, struct mcap_item *ret_item)
 {
 	*ret_item = (struct mcap_item){ .kind = MCAP_ITEM_DAMAGE,
 					.offset = offset,
@@ -279,7 +279,7 @@ int mcap_reader_next(struct mcap_reader *r, struct mcap_item *ret_item)
 	if (item.record != NULL && !r->is_summary && belongs_to_summary(item.record[0])) {
 		damage(r, item.offset, "record of the summary in the data", GOES_ON, &item);
 	}
-	if (item.kind == MCAP_ITEM_CHUNK) {
+	if (item.kind == MCAP_ITEM_CHUNK && item.record != NULL) {
 		take_chunk(r, &item);
 	}
 	if (item.kind == MCAP_ITEM_DATA_END ||
@@ -327,7 +327,8 @@ int mcap_ending_check(const struct mcap_source *source, enum mcap_ending *ret_en
 		return err;
 	}
 	if (memcmp(tail + MCAP_FOOTER_BYTES, MCAP_MAGIC, MCAP_MAGIC_BYTES) != 0 ||
-	    tail[0] != MCAP_OP_FOOTER || get_le64(tail + 1) != MCAP_FOOTER_BYTES - MCAP_HEAD_BYTES) {
+	    tail[0] != MCAP_OP_FOOTER ||
+	    get_le64(tail + 1) != MCAP_FOOTER_BYTES - MCAP_HEAD_BYTES) {
 		*ret_ending = MCAP_ENDING_MISSING;
 		return 0;
 	}

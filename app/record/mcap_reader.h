@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Reads the data section of an MCAP file from front to back, in bounded memory, whatever the bytes are. A chunk
- * is handed out only after its CRC was checked, then what is inside it, record by record.
- * Context of all functions: blocking.
+ * Reads the data section of an MCAP file from front to back, in bounded memory, whatever the bytes
+ * are. A chunk is handed out only after its CRC was checked, then what is inside it, record by
+ * record. Context of all functions: blocking.
  */
 #ifndef RECORD_MCAP_READER_H
 #define RECORD_MCAP_READER_H
@@ -15,15 +15,16 @@
 struct mcap_reader;
 
 enum mcap_item_kind {
-	MCAP_ITEM_HEADER,        /* name: profile; encoding: library */
-	MCAP_ITEM_SCHEMA,        /* id, name, encoding, data: its text */
-	MCAP_ITEM_CHANNEL,       /* id, schema_id, name: topic, encoding, data: pairs */
-	MCAP_ITEM_MESSAGE,       /* id: channel, sequence, times, data */
-	MCAP_ITEM_CHUNK,         /* encoding: compression; data: its records, uncompressed. They follow */
+	MCAP_ITEM_HEADER,  /* name: profile; encoding: library */
+	MCAP_ITEM_SCHEMA,  /* id, name, encoding, data: its text */
+	MCAP_ITEM_CHANNEL, /* id, schema_id, name: topic, encoding, data: pairs */
+	MCAP_ITEM_MESSAGE, /* id: channel, sequence, times, data */
+	MCAP_ITEM_CHUNK,   /* encoding: compression; data: its records, uncompressed. They follow */
 	MCAP_ITEM_MESSAGE_INDEX, /* id: channel */
 	MCAP_ITEM_ATTACHMENT,    /* name, encoding: media type, data */
 	MCAP_ITEM_METADATA,      /* name, data: pairs */
-	MCAP_ITEM_STATISTICS,    /* log_time_ns, publish_time_ns: of first and last message; data: counts */
+	MCAP_ITEM_STATISTICS,    /* log_time_ns, publish_time_ns: of first and last message; data:
+				    counts */
 	MCAP_ITEM_OTHER,         /* a record that this reader has no use for */
 	MCAP_ITEM_DATA_END,      /* the last item of a file that was closed */
 	MCAP_ITEM_DAMAGE,        /* reason; the reader goes on behind it if !is_final */
@@ -38,8 +39,8 @@ struct mcap_text {
 /* What it points to is valid until the next mcap_reader_next(). */
 struct mcap_item {
 	enum mcap_item_kind kind;
-	int is_final;          /* damage: nothing behind it can be read */
-	int is_inner;          /* the record stands inside a chunk */
+	int is_final; /* damage: nothing behind it can be read */
+	int is_inner; /* the record stands inside a chunk */
 	const char *reason;
 	uint64_t offset;       /* of the record in the file; inside a chunk: of the chunk */
 	const uint8_t *record; /* whole, head included; NULL for damage */
@@ -55,9 +56,11 @@ struct mcap_item {
 	size_t data_len;
 };
 
-/** 0; -EPROTO: does not start as an MCAP file; -ENODATA: ends within its magic; or -errno. @source is copied. */
+/** 0; -EPROTO: does not start as an MCAP file; -ENODATA: ends within its magic; or -errno. @source
+ * is copied. */
 int mcap_reader_create(const struct mcap_source *source, struct mcap_reader **ret_reader);
-/** The same for the summary section of a closed file; -ENODATA where there is none, -EBADMSG: its CRC is wrong. */
+/** The same for the summary section of a closed file; -ENODATA where there is none, -EBADMSG: its
+ * CRC is wrong. */
 int mcap_reader_create_summary(const struct mcap_source *source, struct mcap_reader **ret_reader);
 void mcap_reader_destroy(struct mcap_reader *r);
 

@@ -48,7 +48,8 @@ static size_t index_len(const struct mcap_scan *scan)
 	return len;
 }
 
-/* Ours writes the index right behind the chunk, always the same bytes; anything else needs a copy. */
+/* Ours writes the index right behind the chunk, always the same bytes; anything else needs a copy.
+ */
 static void take_message_index(struct mcap_scan *scan, const struct mcap_item *item)
 {
 	size_t wanted_len;
@@ -300,8 +301,8 @@ static int copy_item(struct mcap_writer *w, struct mcap_chunk_index *messages,
 		return item->is_inner ? 0 : copy_message(w, item);
 	case MCAP_ITEM_SCHEMA:
 	case MCAP_ITEM_CHANNEL:
-		return item->is_inner ? mcap_writer_note(w, item->record, item->record_len) :
-					mcap_writer_copy(w, item->record, item->record_len);
+		return item->is_inner ? mcap_writer_note(w, item->record, item->record_len)
+				      : mcap_writer_copy(w, item->record, item->record_len);
 	case MCAP_ITEM_ATTACHMENT:
 	case MCAP_ITEM_METADATA:
 		return mcap_writer_copy(w, item->record, item->record_len);

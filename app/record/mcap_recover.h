@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Mends MCAP files. A file that only lost its end (power cut, killed writer) is mended in place: cut to
- * its last whole record, index of the last chunk completed, summary written. A file that is damaged before its end
- * is copied, damaged records left out. Context of all functions: blocking.
+ * Mends MCAP files. A file that only lost its end (power cut, killed writer) is mended in place:
+ * cut to its last whole record, index of the last chunk completed, summary written. A file that is
+ * damaged before its end is copied, damaged records left out. Context of all functions: blocking.
  */
 #ifndef RECORD_MCAP_RECOVER_H
 #define RECORD_MCAP_RECOVER_H
@@ -13,15 +13,15 @@
 struct mcap_scan;
 
 struct mcap_findings {
-	uint64_t chunks;          /* with a right CRC */
-	uint64_t messages;        /* in those */
-	uint64_t valid_bytes;     /* up to the end of the last whole record of the data section */
-	uint64_t lost_bytes;      /* behind it, where the file was not closed */
-	uint64_t damaged;         /* damaged records; the torn one at the end is one of them */
-	const char *reason;       /* of the first; NULL: none */
+	uint64_t chunks;      /* with a right CRC */
+	uint64_t messages;    /* in those */
+	uint64_t valid_bytes; /* up to the end of the last whole record of the data section */
+	uint64_t lost_bytes;  /* behind it, where the file was not closed */
+	uint64_t damaged;     /* damaged records; the torn one at the end is one of them */
+	const char *reason;   /* of the first; NULL: none */
 	uint64_t reason_offset;
 	enum mcap_ending ending;
-	int needs_copy;           /* cannot be mended in place */
+	int needs_copy; /* cannot be mended in place */
 };
 
 /* Called for each item that the reader finds, damage included. */
@@ -31,8 +31,8 @@ struct mcap_visitor {
 };
 
 /**
- * Read all of @source. 0; -EPROTO not MCAP; -ENODATA: ends before its first record; or -errno. @visitor may be
- * NULL. Free with mcap_scan_destroy().
+ * Read all of @source. 0; -EPROTO not MCAP; -ENODATA: ends before its first record; or -errno.
+ * @visitor may be NULL. Free with mcap_scan_destroy().
  */
 int mcap_scan_create(const struct mcap_source *source, const struct mcap_visitor *visitor,
 		     struct mcap_scan **ret_scan);
@@ -42,8 +42,9 @@ const struct mcap_findings *mcap_scan_findings(const struct mcap_scan *scan);
 int mcap_scan_is_whole(const struct mcap_scan *scan);
 
 /**
- * A writer to @io, the scanned file itself, that goes on behind its valid part; the caller may add records and
- * finishes it. 0; -EXDEV: needs_copy; or -errno. Consumes the scan's index: once per scan.
+ * A writer to @io, the scanned file itself, that goes on behind its valid part; the caller may add
+ * records and finishes it. 0; -EXDEV: needs_copy; or -errno. Consumes the scan's index: once per
+ * scan.
  */
 int mcap_scan_resume(struct mcap_scan *scan, const struct mcap_io *io,
 		     struct mcap_writer **ret_writer);

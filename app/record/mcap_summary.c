@@ -52,6 +52,8 @@ static void put_summary_offset(struct mcap_buf *out, enum mcap_opcode opcode, ui
 
 static const struct mcap_buf *group_records(const struct mcap_index *ix, enum mcap_opcode opcode)
 {
+	static const struct mcap_buf none;
+
 	switch ((int)opcode) {
 	case MCAP_OP_SCHEMA:
 		return &ix->schemas;
@@ -64,14 +66,14 @@ static const struct mcap_buf *group_records(const struct mcap_index *ix, enum mc
 	case MCAP_OP_METADATA_INDEX:
 		return &ix->metadata;
 	default: /* statistics are made on the spot */
-		return NULL;
+		return &none;
 	}
 }
 
 void mcap_summary_put(const struct mcap_index *ix, uint64_t offset, struct mcap_buf *out)
 {
 	static const enum mcap_opcode order[GROUPS] = {
-		MCAP_OP_SCHEMA,	     MCAP_OP_CHANNEL,	       MCAP_OP_STATISTICS,
+		MCAP_OP_SCHEMA,      MCAP_OP_CHANNEL,          MCAP_OP_STATISTICS,
 		MCAP_OP_CHUNK_INDEX, MCAP_OP_ATTACHMENT_INDEX, MCAP_OP_METADATA_INDEX,
 	};
 	size_t base = out->len;
@@ -88,10 +90,10 @@ void mcap_summary_put(const struct mcap_index *ix, uint64_t offset, struct mcap_
 		const struct mcap_buf *records = group_records(ix, order[i]);
 
 		group_start[i] = out->len;
-		if (records != NULL) {
-			mcap_buf_put(out, records->data, records->len);
-		} else {
+		if (order[i] == MCAP_OP_STATISTICS) {
 			put_statistics(ix, out);
+		} else {
+			mcap_buf_put(out, records->data, records->len);
 		}
 	}
 	group_start[GROUPS] = out->len;

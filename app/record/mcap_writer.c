@@ -23,7 +23,7 @@ struct mcap_writer {
 	uint64_t offset;       /* end of the last whole record in the file */
 	uint16_t next_schema;
 	uint32_t next_channel;
-	int is_torn;           /* something may stand behind offset: cut before writing */
+	int is_torn; /* something may stand behind offset: cut before writing */
 };
 
 int mcap_writer_create(const struct mcap_io *io, int zstd_level, struct mcap_writer **ret_writer)
@@ -45,8 +45,8 @@ int mcap_writer_create(const struct mcap_io *io, int zstd_level, struct mcap_wri
 		if (w->zstd == NULL) {
 			goto destroy;
 		}
-		if (ZSTD_isError(ZSTD_CCtx_setParameter(w->zstd, ZSTD_c_compressionLevel,
-							zstd_level))) {
+		if (ZSTD_isError(
+			    ZSTD_CCtx_setParameter(w->zstd, ZSTD_c_compressionLevel, zstd_level))) {
 			r = -EINVAL;
 			goto destroy;
 		}
@@ -296,8 +296,8 @@ int mcap_writer_attachment(struct mcap_writer *w, const char *name, const char *
 
 int mcap_writer_note(struct mcap_writer *w, const uint8_t *record, size_t record_len)
 {
-	return record[0] == MCAP_OP_SCHEMA ? mcap_index_schema(&w->index, record, record_len) :
-					     mcap_index_channel(&w->index, record, record_len);
+	return record[0] == MCAP_OP_SCHEMA ? mcap_index_schema(&w->index, record, record_len)
+					   : mcap_index_channel(&w->index, record, record_len);
 }
 
 int mcap_writer_copy(struct mcap_writer *w, const uint8_t *record, size_t record_len)

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Writes an MCAP file, append-only. Messages gather in one chunk in memory until it is closed; every
- * other record goes out at once. A failed write leaves the file cut back to its last whole record (or is cut
- * before the next write) and the writer as it was: the caller may try again, nothing in the chunk is lost.
- * Context of all functions: blocking.
+ * Writes an MCAP file, append-only. Messages gather in one chunk in memory until it is closed;
+ * every other record goes out at once. A failed write leaves the file cut back to its last whole
+ * record (or is cut before the next write) and the writer as it was: the caller may try again,
+ * nothing in the chunk is lost. Context of all functions: blocking.
  */
 #ifndef RECORD_MCAP_WRITER_H
 #define RECORD_MCAP_WRITER_H
@@ -34,15 +34,17 @@ struct mcap_message {
 };
 
 /**
- * A writer to @io; @zstd_level 0 writes chunks uncompressed. Nothing is written yet. 0, -ENOMEM, -EINVAL.
- * Free with mcap_writer_destroy(), which writes nothing either. @io is copied, its ctx is not.
+ * A writer to @io; @zstd_level 0 writes chunks uncompressed. Nothing is written yet. 0, -ENOMEM,
+ * -EINVAL. Free with mcap_writer_destroy(), which writes nothing either. @io is copied, its ctx is
+ * not.
  */
 int mcap_writer_create(const struct mcap_io *io, int zstd_level, struct mcap_writer **ret_writer);
 void mcap_writer_destroy(struct mcap_writer *w);
 
 /** Magic and header: first of all. 0 or -errno of the I/O. */
 int mcap_writer_begin(struct mcap_writer *w, const char *profile, const char *library);
-/** Go on with a file that ends in a whole record at @offset and has what @index says; @index is moved in. */
+/** Go on with a file that ends in a whole record at @offset and has what @index says; @index is
+ * moved in. */
 void mcap_writer_resume(struct mcap_writer *w, uint64_t offset, struct mcap_index *index);
 
 /** Add a schema. Its id (from 1 on) or -errno. */
@@ -53,10 +55,12 @@ int mcap_writer_channel(struct mcap_writer *w, const struct mcap_channel_spec *s
 
 /** Add a message to the open chunk. 0, -ENOMEM; -ENOBUFS: close the chunk first (no room). */
 int mcap_writer_message(struct mcap_writer *w, const struct mcap_message *m);
-/** Bytes that messages can still take in the open chunk; each takes its data plus MCAP_MESSAGE_COST_BYTES. */
+/** Bytes that messages can still take in the open chunk; each takes its data plus
+ * MCAP_MESSAGE_COST_BYTES. */
 size_t mcap_writer_room(const struct mcap_writer *w);
 #define MCAP_MESSAGE_COST_BYTES ((size_t)MCAP_HEAD_BYTES + MCAP_MESSAGE_HEAD_BYTES)
-/** Write the open chunk and its message index; an empty one is nothing. 0 or -errno: it stays open. */
+/** Write the open chunk and its message index; an empty one is nothing. 0 or -errno: it stays open.
+ */
 int mcap_writer_close_chunk(struct mcap_writer *w);
 
 int mcap_writer_metadata(struct mcap_writer *w, const char *name, const struct mcap_pair *pairs,
@@ -76,8 +80,8 @@ int mcap_writer_copy_chunk(struct mcap_writer *w, const uint8_t *record, size_t 
 /** Make all that is written durable. 0 or -errno. */
 int mcap_writer_sync(struct mcap_writer *w);
 /**
- * Close the chunk, write the summary and the end, and sync. 0 or -errno: the file is then cut back to its
- * data section, and finishing may be tried again.
+ * Close the chunk, write the summary and the end, and sync. 0 or -errno: the file is then cut back
+ * to its data section, and finishing may be tried again.
  */
 int mcap_writer_finish(struct mcap_writer *w);
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The messages that every recording has, whatever its slaves: cycle, event, time map. Each is one table of
- * fields that its definition and its IDL are made from.
+ * The messages that every recording has, whatever its slaves: cycle, event, time map. Each is one
+ * table of fields that its definition and its IDL are made from.
  */
 #ifndef RECORD_MESSAGES_H
 #define RECORD_MESSAGES_H
@@ -43,7 +43,8 @@ size_t messages_encode_cycle(const struct sample_header *header, uint8_t *buf);
 size_t messages_encode_event(const struct messages_event *ev, uint8_t *buf);
 size_t messages_encode_timemap(const struct timemap_state *state, uint8_t *buf);
 
-/** What tells where a recording ends: of a cycle (or slave) message, of an event message. 0, -EBADMSG. */
+/** What tells where a recording ends: of a cycle (or slave) message, of an event message. 0,
+ * -EBADMSG. */
 int messages_decode_cycle(const uint8_t *data, size_t data_len, uint64_t *ret_cycle);
 int messages_decode_event(const uint8_t *data, size_t data_len, uint64_t *ret_sequence,
 			  int64_t *ret_mono_ns);

@@ -6,8 +6,8 @@
 #include <stddef.h>
 
 /**
- * A field name: a-z first, then a-z 0-9 and single underscores, none at the end; no word that IDL, C++ or Python
- * keeps for itself. Never empty. "Status Word.1" -> "status_word_1".
+ * A field name: a-z first, then a-z 0-9 and single underscores, none at the end; no word that IDL,
+ * C++ or Python keeps for itself. Never empty. "Status Word.1" -> "status_word_1".
  */
 void name_make_field(const char *name, char *buf, size_t buf_len);
 

@@ -18,14 +18,14 @@ struct record_file {
 	const struct layout *layout;
 	const struct layout_topic *topic;
 	size_t topic_count;
-	size_t cycle_cost;     /* room that one cycle takes in a chunk */
-	uint8_t *buf;          /* one message */
+	size_t cycle_cost; /* room that one cycle takes in a chunk */
+	uint8_t *buf;      /* one message */
 	size_t buf_len;
 	uint64_t cycles;
-	uint64_t open_cycles;  /* of those: in the open chunk */
+	uint64_t open_cycles; /* of those: in the open chunk */
 	uint64_t first_cycle;
 	uint64_t last_cycle;
-	uint64_t last_utc_ns;  /* log times go up only */
+	uint64_t last_utc_ns; /* log times go up only */
 	uint32_t event_count;
 	int has_end;
 	int is_finished;

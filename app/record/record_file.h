@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * One recording being written: DIR/NAME.part, with the topics of a layout, until it is finished and renamed to
- * DIR/NAME.mcap. Context: blocking.
+ * One recording being written: DIR/NAME.part, with the topics of a layout, until it is finished and
+ * renamed to DIR/NAME.mcap. Context: blocking.
  */
 #ifndef RECORD_RECORD_FILE_H
 #define RECORD_RECORD_FILE_H
@@ -34,21 +34,22 @@ struct record_file_spec {
 	int zstd_level;
 	const struct store_state *before; /* what was recorded of the session so far */
 	uint64_t file_sequence;
-	uint64_t start_utc_ns;       /* log times start here */
+	uint64_t start_utc_ns; /* log times start here */
 	const struct timemap_state *timemap;
-	const char *config_path;     /* "" where there is none */
+	const char *config_path; /* "" where there is none */
 	const char *config_text;
 	const struct record_seam *seam; /* NULL: none */
 };
 
-/** Make the file with all that goes before the first sample. 0 or -errno: then nothing is left behind. */
+/** Make the file with all that goes before the first sample. 0 or -errno: then nothing is left
+ * behind. */
 int record_file_create(const struct record_file_spec *spec, struct record_file **ret_file);
 /** Close without finishing: what was written stays as .part. NULL is fine. */
 void record_file_destroy(struct record_file *f);
 
 /**
- * Add the messages of one sample, all in one chunk. 0; or -errno of closing the chunk before it: the sample is
- * not in the file then.
+ * Add the messages of one sample, all in one chunk. 0; or -errno of closing the chunk before it:
+ * the sample is not in the file then.
  */
 int record_file_sample(struct record_file *f, const struct sample_header *header,
 		       const uint8_t *image, uint64_t utc_ns);
@@ -62,7 +63,7 @@ int record_file_close_chunk(struct record_file *f);
 int record_file_sync(struct record_file *f);
 
 struct record_file_end {
-	const char *reason;      /* "rotated", "producer ended", ... */
+	const char *reason; /* "rotated", "producer ended", ... */
 	uint64_t events_lost;
 	const struct store_state *after; /* what was recorded of the session with this file */
 	const struct timemap_state *timemap;

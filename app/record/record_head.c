@@ -189,9 +189,9 @@ static int put_session(struct mcap_writer *w, const struct record_file_spec *spe
 	add_unsigned(&n, "channels", meta->channel_count);
 	add_signed(&n, "tai_offset_s", meta->tai_offset_s);
 	add_text(&n, "time_scale",
-		 meta->tai_offset_s == 0 ?
-			 "the kernel's TAI offset is unset: CLOCK_TAI was taken for UTC" :
-			 "UTC from CLOCK_TAI and the kernel's TAI offset");
+		 meta->tai_offset_s == 0
+			 ? "the kernel's TAI offset is unset: CLOCK_TAI was taken for UTC"
+			 : "UTC from CLOCK_TAI and the kernel's TAI offset");
 	return mcap_writer_metadata(w, "ecdaq.session", n.pair, n.count);
 }
 
@@ -231,8 +231,8 @@ static int put_idl(struct mcap_writer *w, const struct record_file_spec *spec)
 {
 	char *idl = layout_idl(spec->layout);
 	int64_t utc_ns = spec->timemap->utc_ns;
-	int r = idl == NULL ? -ENOMEM :
-			      mcap_writer_attachment(w, "ecdaq.idl", "text/x-omg-idl",
+	int r = idl == NULL ? -ENOMEM
+			    : mcap_writer_attachment(w, "ecdaq.idl", "text/x-omg-idl",
 						     utc_ns > 0 ? (uint64_t)utc_ns : 0, idl,
 						     strlen(idl));
 

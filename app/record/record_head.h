@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What stands in a recording besides its messages: at the start and at the end. Context: blocking. */
+/* What stands in a recording besides its messages: at the start and at the end. Context: blocking.
+ */
 #ifndef RECORD_RECORD_HEAD_H
 #define RECORD_RECORD_HEAD_H
 
@@ -7,8 +8,8 @@
 #include "record/record_file.h"
 
 /**
- * Header, schemas, channels (MESSAGE_CYCLE.. first, then one for each topic of the layout, in this order),
- * session, configuration, channel table, time map, IDL. 0 or -errno.
+ * Header, schemas, channels (MESSAGE_CYCLE.. first, then one for each topic of the layout, in this
+ * order), session, configuration, channel table, time map, IDL. 0 or -errno.
  */
 int record_head_put(struct mcap_writer *w, const struct record_file_spec *spec);
 

@@ -22,13 +22,13 @@ struct recorder {
 	struct recorder_options opt;
 	struct sink *sink;
 	struct event_feed *events;
-	struct ring_reader *ring;  /* NULL: waiting for one */
+	struct ring_reader *ring;    /* NULL: waiting for one */
 	struct sample_feed *samples; /* NULL: the ring is done with (or waiting) */
-	struct record_status *page; /* shared, or own while there is no run directory */
+	struct record_status *page;  /* shared, or own while there is no run directory */
 	struct record_status own;
 	int64_t looked_ns;
 	int64_t told_ns;
-	int ring_error;            /* newest reason why no ring is open: told once */
+	int ring_error; /* newest reason why no ring is open: told once */
 };
 
 __attribute__((format(printf, 2, 3))) static void say(const struct recorder *rec,
@@ -43,8 +43,8 @@ __attribute__((format(printf, 2, 3))) static void say(const struct recorder *rec
 	rec->opt.report(rec->opt.report_ctx, line);
 }
 
-int recorder_create(const struct recorder_options *opt, struct recorder **ret_recorder,
-		    char *error, size_t error_bytes)
+int recorder_create(const struct recorder_options *opt, struct recorder **ret_recorder, char *error,
+		    size_t error_bytes)
 {
 	struct recorder *rec = calloc(1, sizeof(*rec));
 	int r;
@@ -189,8 +189,7 @@ static void look_for_ring(struct recorder *rec)
 			say(rec, "recording session %" PRIu64 " to %s",
 			    sample_feed_number(rec->samples), rec->opt.dir);
 			if (sample_feed_missed_start(rec->samples) > 0) {
-				say(rec,
-				    "came late: %" PRIu64 " samples had left the ring before",
+				say(rec, "came late: %" PRIu64 " samples had left the ring before",
 				    sample_feed_missed_start(rec->samples));
 			}
 		}
@@ -207,7 +206,8 @@ static void note_tai_offset(struct sample_feed *samples)
 	}
 }
 
-/* Events go where samples go; one that comes while no file is open opens it. Returns how many were taken. */
+/* Events go where samples go; one that comes while no file is open opens it. Returns how many were
+ * taken. */
 static int take_events(struct recorder *rec)
 {
 	struct event_mark mark = event_mark(rec);
@@ -323,7 +323,7 @@ int recorder_finish(struct recorder *rec)
 			uint64_t left = until - ring_cursor(rec->ring);
 
 			sample_feed_read(rec->samples,
-				     left < SAMPLES_A_STEP ? (unsigned)left : SAMPLES_A_STEP);
+					 left < SAMPLES_A_STEP ? (unsigned)left : SAMPLES_A_STEP);
 			sink_tick(rec->sink, now_ns(rec));
 		}
 		r = end_session(rec, "stopped");

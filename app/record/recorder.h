@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Follows the sample ring and the event ring of the master, session after session, and records them. Where it
- * stands is known by cycle number: killed and started again, it goes on behind the last cycle on disk.
- * Context of all functions: blocking, one thread.
+ * Follows the sample ring and the event ring of the master, session after session, and records
+ * them. Where it stands is known by cycle number: killed and started again, it goes on behind the
+ * last cycle on disk. Context of all functions: blocking, one thread.
  */
 #ifndef RECORD_RECORDER_H
 #define RECORD_RECORDER_H
@@ -19,19 +19,19 @@ struct record_seam;
 struct recorder_options {
 	const char *ring_path;
 	const char *events_path;
-	const char *status_path;     /* "": none */
-	const char *dir;             /* of the recordings */
-	int64_t pid;                 /* for the status page */
+	const char *status_path; /* "": none */
+	const char *dir;         /* of the recordings */
+	int64_t pid;             /* for the status page */
 	int64_t chunk_period_ns;
 	int64_t sync_period_ns;
-	int64_t rotate_period_ns;    /* 0: never */
-	uint64_t rotate_bytes;       /* 0: never */
-	uint64_t budget_bytes;       /* 0: none */
-	uint64_t reserve_bytes;      /* 0: none */
-	int zstd_level;              /* 0: no compression */
+	int64_t rotate_period_ns; /* 0: never */
+	uint64_t rotate_bytes;    /* 0: never */
+	uint64_t budget_bytes;    /* 0: none */
+	uint64_t reserve_bytes;   /* 0: none */
+	int zstd_level;           /* 0: no compression */
 	const char *config_path;
 	const char *config_text;
-	struct platform platform;    /* its monotonic clock */
+	struct platform platform;       /* its monotonic clock */
 	const struct record_seam *seam; /* NULL: none */
 	/** One line for a person (log). */
 	void (*report)(void *ctx, const char *line);
@@ -39,11 +39,11 @@ struct recorder_options {
 };
 
 /**
- * Lock the directory and recover what is unfinished. 0, or -errno with one line in @error: -EBUSY another
- * recorder works there. @opt is copied, its strings are not. Free with recorder_destroy().
+ * Lock the directory and recover what is unfinished. 0, or -errno with one line in @error: -EBUSY
+ * another recorder works there. @opt is copied, its strings are not. Free with recorder_destroy().
  */
-int recorder_create(const struct recorder_options *opt, struct recorder **ret_recorder,
-		    char *error, size_t error_bytes);
+int recorder_create(const struct recorder_options *opt, struct recorder **ret_recorder, char *error,
+		    size_t error_bytes);
 /** Does not finish anything: what was written stays as .part. NULL is fine. */
 void recorder_destroy(struct recorder *rec);
 

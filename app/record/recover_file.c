@@ -34,8 +34,7 @@ static int put_note(struct mcap_writer *w, const struct recover_outcome *o)
 	snprintf(chunks, sizeof(chunks), "%" PRIu64, o->found.chunks);
 	snprintf(lost_bytes, sizeof(lost_bytes), "%" PRIu64, o->found.lost_bytes);
 	snprintf(damaged, sizeof(damaged), "%" PRIu64, o->found.damaged);
-	return mcap_writer_metadata(w, "ecdaq.recovered", pairs,
-				    sizeof(pairs) / sizeof(pairs[0]));
+	return mcap_writer_metadata(w, "ecdaq.recovered", pairs, sizeof(pairs) / sizeof(pairs[0]));
 }
 
 static int note_and_finish(struct mcap_writer *w, const struct recover_outcome *o)
@@ -78,7 +77,7 @@ static int mend(int *fd, struct mcap_scan *scan, const struct recover_outcome *o
 int recover_in_place(const char *path, struct recover_outcome *ret_outcome)
 {
 	struct recover_outcome o = { .result = RECOVER_MENDED };
-	struct mcap_scan *scan;
+	struct mcap_scan *scan = NULL;
 	int fd = open(path, O_RDWR | O_CLOEXEC);
 	int r;
 
@@ -86,7 +85,7 @@ int recover_in_place(const char *path, struct recover_outcome *ret_outcome)
 		return -errno;
 	}
 	r = look(&fd, &o, &scan);
-	if (r < 0) {
+	if (r != 0) {
 		close(fd);
 		return r;
 	}
@@ -139,7 +138,7 @@ static int copy_to(int *fd, const char *output, const struct recover_outcome *o)
 int recover_copy(const char *path, const char *output, struct recover_outcome *ret_outcome)
 {
 	struct recover_outcome o = { .result = RECOVER_COPIED };
-	struct mcap_scan *scan;
+	struct mcap_scan *scan = NULL;
 	int fd = open(path, O_RDONLY | O_CLOEXEC);
 	int r;
 
@@ -181,11 +180,12 @@ static void say_outcome(const struct recover_report *report, const char *name,
 	case RECOVER_MENDED:
 	case RECOVER_COPIED:
 		snprintf(what, sizeof(what),
-			 "recovered %" PRIu64 " cycles up to cycle %" PRIu64 "%s%s", o->track.cycles,
-			 o->track.last_cycle,
-			 o->result == RECOVER_COPIED ? "; the damaged file is kept as .damaged: " : "",
-			 o->result == RECOVER_COPIED && o->found.reason != NULL ? o->found.reason :
-										  "");
+			 "recovered %" PRIu64 " cycles up to cycle %" PRIu64 "%s%s",
+			 o->track.cycles, o->track.last_cycle,
+			 o->result == RECOVER_COPIED ? "; the damaged file is kept as .damaged: "
+						     : "",
+			 o->result == RECOVER_COPIED && o->found.reason != NULL ? o->found.reason
+										: "");
 		say(report, name, what);
 		return;
 	}
@@ -265,21 +265,22 @@ static int recover_part(const struct store *s, const struct store_entry *e,
 	return 0;
 }
 
-/* A finished file that is newer than the state (which was lost, or could not be written) knows better. */
+/* A finished file that is newer than the state (which was lost, or could not be written) knows
+ * better. */
 static void ask_finished(const struct store *s, const struct store_entry *e, int is_newest,
 			 struct store_state *state)
 {
 	struct recover_outcome o = { .result = RECOVER_WAS_WHOLE };
-	struct mcap_scan *scan;
+	struct mcap_scan *scan = NULL;
 	char path[PATH_MAX];
 	int fd;
 
 	if (e->sequence <= state->sequence) {
 		return;
 	}
-	fd = !is_newest || store_path(store_dir(s), e->name, path, sizeof(path)) < 0 ?
-		     -1 :
-		     open(path, O_RDONLY | O_CLOEXEC);
+	fd = !is_newest || store_path(store_dir(s), e->name, path, sizeof(path)) < 0
+		     ? -1
+		     : open(path, O_RDONLY | O_CLOEXEC);
 	if (fd >= 0) {
 		if (look(&fd, &o, &scan) == 0) {
 			mcap_scan_destroy(scan);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Recovery of recordings on disk: one file, or all unfinished ones of a store. Context: blocking. */
+/* Recovery of recordings on disk: one file, or all unfinished ones of a store. Context: blocking.
+ */
 #ifndef RECORD_RECOVER_FILE_H
 #define RECORD_RECOVER_FILE_H
 
@@ -22,11 +23,13 @@ struct recover_outcome {
 
 /**
  * Mend the file at @path in place and make it durable. 0; -EXDEV: damaged before its end, copy it;
- * -EPROTO: not MCAP; -ENODATA: ends before its first record; or -errno. An empty recording is left as it is.
+ * -EPROTO: not MCAP; -ENODATA: ends before its first record; or -errno. An empty recording is left
+ * as it is.
  */
 int recover_in_place(const char *path, struct recover_outcome *ret_outcome);
 
-/** Copy what is whole in @path to a new file at @output (-EEXIST if it is there), durable. Errors as above. */
+/** Copy what is whole in @path to a new file at @output (-EEXIST if it is there), durable. Errors
+ * as above. */
 int recover_copy(const char *path, const char *output, struct recover_outcome *ret_outcome);
 
 struct recover_report {
@@ -36,8 +39,9 @@ struct recover_report {
 };
 
 /**
- * Mend and rename all .part files of the store, and set @state by what they hold. Empty ones are removed, what
- * cannot be read is renamed to .damaged. 0, or -errno of the first that failed in a way that may pass (EIO, ENOSPC).
+ * Mend and rename all .part files of the store, and set @state by what they hold. Empty ones are
+ * removed, what cannot be read is renamed to .damaged. 0, or -errno of the first that failed in a
+ * way that may pass (EIO, ENOSPC).
  */
 int recover_store(const struct store *s, const struct recover_report *report,
 		  struct store_state *state);

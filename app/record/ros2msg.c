@@ -14,10 +14,12 @@ static const struct {
 	enum ros2msg_type type;
 	uint8_t bytes;
 } types[] = {
-	{ "bool", ROS2MSG_BOOL, 1 },	 { "byte", ROS2MSG_UINT, 1 },	 { "char", ROS2MSG_UINT, 1 },
-	{ "uint8", ROS2MSG_UINT, 1 },	 { "uint16", ROS2MSG_UINT, 2 },	 { "uint32", ROS2MSG_UINT, 4 },
-	{ "uint64", ROS2MSG_UINT, 8 },	 { "int8", ROS2MSG_INT, 1 },	 { "int16", ROS2MSG_INT, 2 },
-	{ "int32", ROS2MSG_INT, 4 },	 { "int64", ROS2MSG_INT, 8 },	 { "float32", ROS2MSG_FLOAT, 4 },
+	{ "bool", ROS2MSG_BOOL, 1 },     { "byte", ROS2MSG_UINT, 1 },
+	{ "char", ROS2MSG_UINT, 1 },     { "uint8", ROS2MSG_UINT, 1 },
+	{ "uint16", ROS2MSG_UINT, 2 },   { "uint32", ROS2MSG_UINT, 4 },
+	{ "uint64", ROS2MSG_UINT, 8 },   { "int8", ROS2MSG_INT, 1 },
+	{ "int16", ROS2MSG_INT, 2 },     { "int32", ROS2MSG_INT, 4 },
+	{ "int64", ROS2MSG_INT, 8 },     { "float32", ROS2MSG_FLOAT, 4 },
 	{ "float64", ROS2MSG_FLOAT, 8 }, { "string", ROS2MSG_STRING, 4 },
 };
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Reads a flat ROS 2 message definition (what our recordings have) and decodes messages by it. Whatever
- * the text and the bytes are, nothing is read outside of them. Context: blocking.
+ * Reads a flat ROS 2 message definition (what our recordings have) and decodes messages by it.
+ * Whatever the text and the bytes are, nothing is read outside of them. Context: blocking.
  */
 #ifndef RECORD_ROS2MSG_H
 #define RECORD_ROS2MSG_H
@@ -23,11 +23,13 @@ struct ros2msg {
 };
 
 struct ros2msg_value {
-	uint64_t raw;      /* integers and bool: extended to 64 bits; floats: their bits; strings: length */
-	const char *text;  /* strings: not zero-terminated */
+	uint64_t raw; /* integers and bool: extended to 64 bits; floats: their bits; strings: length
+		       */
+	const char *text; /* strings: not zero-terminated */
 };
 
-/** 0; -ENOTSUP: not flat (arrays, nested types, constants); -EBADMSG; -ENOMEM. Free with ros2msg_done(). */
+/** 0; -ENOTSUP: not flat (arrays, nested types, constants); -EBADMSG; -ENOMEM. Free with
+ * ros2msg_done(). */
 int ros2msg_parse(const char *text, size_t text_len, struct ros2msg *ret_msg);
 void ros2msg_done(struct ros2msg *msg);
 

@@ -23,8 +23,8 @@ struct sample_feed {
 	const struct sample_meta *meta;
 	struct timemap *map;
 	enum time_base base;
-	int64_t told_map_ns;   /* dc_ns of the newest time map message */
-	uint8_t *payload;      /* one slot */
+	int64_t told_map_ns; /* dc_ns of the newest time map message */
+	uint8_t *payload;    /* one slot */
 	uint64_t next_cycle;
 	int has_next;          /* next_cycle is known: what is not it is a gap */
 	int is_catching_up;    /* what is before next_cycle was recorded before */
@@ -64,7 +64,8 @@ static void go_to_start(struct sample_feed *s)
 	s->missed_start = s->has_next ? 0 : oldest;
 }
 
-int sample_feed_create(struct ring_reader *ring, struct sink *sink, struct sample_feed **ret_session)
+int sample_feed_create(struct ring_reader *ring, struct sink *sink,
+		       struct sample_feed **ret_session)
 {
 	struct sample_feed *s = calloc(1, sizeof(*s));
 	const struct store_state *resume = sink_resume_point(sink);
@@ -181,7 +182,8 @@ static enum timemap_news feed_map(struct sample_feed *s, const struct sample_hea
 	if (h->frame_dc_ns == 0 || h->round_trip_ns < 0) {
 		return TIMEMAP_QUIET;
 	}
-	/* The frame left right after the wake, and passed the reference clock half a round trip later. */
+	/* The frame left right after the wake, and passed the reference clock half a round trip
+	 * later. */
 	return timemap_feed(s->map, h->frame_dc_ns, h->wake_tai_ns + half_ns, half_ns);
 }
 
@@ -212,8 +214,8 @@ static int map_sample(struct sample_feed *s, const struct sample_header *h)
 	}
 	news = feed_map(s, h);
 	/* Without one frame back there is no map yet: the wake has to do. */
-	s->utc_ns = timemap_is_ready(s->map) ? timemap_utc_ns(s->map, map_time(s, h)) :
-					       timemap_tai_to_utc_ns(s->map, h->wake_tai_ns);
+	s->utc_ns = timemap_is_ready(s->map) ? timemap_utc_ns(s->map, map_time(s, h))
+					     : timemap_tai_to_utc_ns(s->map, h->wake_tai_ns);
 	return news != TIMEMAP_QUIET ? tell_map(s, news) : 0;
 }
 
@@ -252,9 +254,9 @@ static int mind_gap(struct sample_feed *s, uint64_t cycle)
 	}
 	if (cycle > s->next_cycle) {
 		r = put_gap(s, s->next_cycle, cycle - s->next_cycle,
-			    s->has_lost_slots || s->is_catching_up ?
-				    "they had left the ring before they could be read" :
-				    "the master made no sample for them");
+			    s->has_lost_slots || s->is_catching_up
+				    ? "they had left the ring before they could be read"
+				    : "the master made no sample for them");
 	} else {
 		r = put_gap(s, cycle, 0, "the cycle number went back");
 	}
@@ -322,8 +324,8 @@ int sample_feed_event(struct sample_feed *s, const struct event *ev, uint64_t se
 	int r = sink_open_file(s->sink, s->next_cycle, utc_ns);
 
 	event_format(ev, text, sizeof(text));
-	return r < 0 ? r :
-		       sink_event(s->sink, &(struct messages_event){ .event = *ev,
+	return r < 0 ? r
+		     : sink_event(s->sink, &(struct messages_event){ .event = *ev,
 								     .sequence = sequence,
 								     .utc_ns = utc_ns,
 								     .text = text });

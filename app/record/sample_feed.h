@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * One run of the master: its samples from the ring into the sink, by cycle number, each mapped to UTC. Gaps are
- * found, counted and told here. Context: blocking.
+ * One run of the master: its samples from the ring into the sink, by cycle number, each mapped to
+ * UTC. Gaps are found, counted and told here. Context: blocking.
  */
 #ifndef RECORD_SAMPLE_FEED_H
 #define RECORD_SAMPLE_FEED_H
@@ -13,10 +13,12 @@
 struct sample_feed;
 
 /**
- * Begin to read @ring: behind the last recorded cycle if the sink knows this session, else at the oldest slot.
- * 0; -EPROTO: not a sample ring of this version; -ENOMEM. Both are kept. Free with sample_feed_destroy().
+ * Begin to read @ring: behind the last recorded cycle if the sink knows this session, else at the
+ * oldest slot. 0; -EPROTO: not a sample ring of this version; -ENOMEM. Both are kept. Free with
+ * sample_feed_destroy().
  */
-int sample_feed_create(struct ring_reader *ring, struct sink *sink, struct sample_feed **ret_session);
+int sample_feed_create(struct ring_reader *ring, struct sink *sink,
+		       struct sample_feed **ret_session);
 void sample_feed_destroy(struct sample_feed *s);
 uint64_t sample_feed_number(const struct sample_feed *s);
 /** Slots that had left the ring before this session could be read for the first time. */

@@ -68,7 +68,8 @@ int sink_create(const struct recorder_options *opt, struct sink **ret_sink, char
 	(void)store_load_state(s->store, &s->resume);
 	r = recover(s);
 	if (r < 0) {
-		sink_say(s, "%s: cannot recover what is there: %s; trying again", opt->dir, strerror(-r));
+		sink_say(s, "%s: cannot recover what is there: %s; trying again", opt->dir,
+			 strerror(-r));
 		s->state = SINK_FAILED;
 	}
 	*ret_sink = s;
@@ -112,9 +113,9 @@ int sink_ask_free_bytes(struct sink *s)
 {
 	const struct record_seam *seam = s->opt.seam;
 
-	return seam != NULL && seam->free_bytes != NULL ?
-		       seam->free_bytes(seam->ctx, s->opt.dir, &s->bytes_free) :
-		       store_free_bytes(s->store, &s->bytes_free);
+	return seam != NULL && seam->free_bytes != NULL
+		       ? seam->free_bytes(seam->ctx, s->opt.dir, &s->bytes_free)
+		       : store_free_bytes(s->store, &s->bytes_free);
 }
 
 int sink_trouble(struct sink *s, int error, const char *what)
@@ -122,8 +123,10 @@ int sink_trouble(struct sink *s, int error, const char *what)
 	s->checked_ns = s->now_ns;
 	if (error == -ENOSPC || error == -EDQUOT) {
 		if (s->state != SINK_FULL) {
-			sink_say(s, "recording stopped, disk full: %s: %" PRIu64 " bytes free, reserve %" PRIu64,
-			    s->opt.dir, s->bytes_free, s->opt.reserve_bytes);
+			sink_say(s,
+				 "recording stopped, disk full: %s: %" PRIu64
+				 " bytes free, reserve %" PRIu64,
+				 s->opt.dir, s->bytes_free, s->opt.reserve_bytes);
 			s->full_event = (struct event){ .id = EVENT_RECORD_DISK_FULL,
 							.cycle = s->resume.next_cycle,
 							.value = (int64_t)s->bytes_free,
@@ -135,7 +138,7 @@ int sink_trouble(struct sink *s, int error, const char *what)
 	}
 	if (s->state != SINK_FAILED) {
 		sink_say(s, "recording failed: %s: %s: %s; trying again", s->opt.dir, what,
-		    strerror(-error));
+			 strerror(-error));
 	}
 	/* What is on disk is recovered as after a crash; what is not is still in the ring. */
 	record_file_destroy(s->file);
@@ -210,7 +213,8 @@ static void tick_ready(struct sink *s)
 	}
 }
 
-/* Once a second: is there space again? The reserve and an eighth, so that it does not go to and fro. */
+/* Once a second: is there space again? The reserve and an eighth, so that it does not go to and
+ * fro. */
 static void tick_full(struct sink *s)
 {
 	uint64_t wanted = s->opt.reserve_bytes + s->opt.reserve_bytes / 8;

@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Where samples go: the store and the file being written, with all that is due on time (chunk, sync, rotation,
- * budget) and all that can go wrong. A full disk or a failing one makes the sink not ready; the caller then
- * leaves samples in the ring and comes back. Context: blocking.
+ * Where samples go: the store and the file being written, with all that is due on time (chunk,
+ * sync, rotation, budget) and all that can go wrong. A full disk or a failing one makes the sink
+ * not ready; the caller then leaves samples in the ring and comes back. Context: blocking.
  */
 #ifndef RECORD_SINK_H
 #define RECORD_SINK_H
 
 #include "base/event.h"
 #include "record/record_file.h"
-#include "record/recover_file.h"
 #include "record/recorder.h"
+#include "record/recover_file.h"
 #include "record/store.h"
 
 struct sink;
@@ -18,7 +18,8 @@ struct sink;
 enum sink_state {
 	SINK_READY,
 	SINK_FULL,   /* no space, or less than the reserve; asked again every second */
-	SINK_FAILED, /* another error; every second all is recovered as at start, then it is ready again */
+	SINK_FAILED, /* another error; every second all is recovered as at start, then it is ready
+			again */
 };
 
 /** Lock the directory and recover what is unfinished. As recorder_create(). */

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Inside of the sink: what its two halves share (sink.c: states and time; sink_file.c: the file). */
+/* Inside of the sink: what its two halves share (sink.c: states and time; sink_file.c: the file).
+ */
 #ifndef RECORD_SINK_INSIDE_H
 #define RECORD_SINK_INSIDE_H
 
@@ -11,27 +12,27 @@
 struct sink {
 	struct recorder_options opt;
 	struct store *store;
-	struct store_state resume;   /* where to go on if all ended now */
+	struct store_state resume; /* where to go on if all ended now */
 	enum sink_state state;
 	int has_rewind;
 	struct record_file *file;    /* NULL between files */
 	const struct layout *layout; /* NULL between sessions */
 	struct timemap_state timemap;
-	int64_t now_ns;              /* of the newest tick */
+	int64_t now_ns; /* of the newest tick */
 	int64_t file_opened_ns;
-	int64_t chunk_opened_ns;     /* 0: the chunk is empty */
+	int64_t chunk_opened_ns; /* 0: the chunk is empty */
 	int64_t synced_ns;
-	int64_t checked_ns;          /* free space was asked; trouble was looked at */
-	int is_dirty;                /* written since the last sync */
+	int64_t checked_ns; /* free space was asked; trouble was looked at */
+	int is_dirty;       /* written since the last sync */
 	uint64_t synced_cycle;
-	uint64_t events_lost;        /* in this session, by this process */
+	uint64_t events_lost; /* in this session, by this process */
 	uint64_t files;
-	uint64_t bytes_done;         /* in finished files */
+	uint64_t bytes_done; /* in finished files */
 	uint64_t bytes_free;
-	int64_t last_utc_ns;         /* of the newest sample */
-	struct event full_event;     /* the disk was full: told in the next file */
+	int64_t last_utc_ns;     /* of the newest sample */
+	struct event full_event; /* the disk was full: told in the next file */
 	int64_t full_utc_ns;
-	char path[512];              /* of the newest file */
+	char path[512]; /* of the newest file */
 	char message[256];
 };
 

@@ -16,7 +16,6 @@
 #include <unistd.h>
 
 #include "base/clock.h"
-#include "record/file_io.h"
 
 #define LOCK_NAME ".ecdaq-record.lock"
 #define STATE_NAME ".ecdaq-record.state"
@@ -207,9 +206,10 @@ int store_list(const char *dir, struct store_entry **ret_entries, size_t *ret_co
 	size_t count = 0;
 	struct dirent *d;
 	DIR *stream = opendir(dir);
+	int fd = stream != NULL ? dirfd(stream) : -1;
 	int r = 0;
 
-	if (stream == NULL) {
+	if (fd < 0) {
 		return -errno;
 	}
 	while (r == 0 && (d = readdir(stream)) != NULL) {
@@ -217,8 +217,7 @@ int store_list(const char *dir, struct store_entry **ret_entries, size_t *ret_co
 		struct stat st;
 
 		if (!store_parse_name(d->d_name, &e.sequence, &e.is_part) ||
-		    fstatat(dirfd(stream), d->d_name, &st, AT_SYMLINK_NOFOLLOW) < 0 ||
-		    !S_ISREG(st.st_mode)) {
+		    fstatat(fd, d->d_name, &st, AT_SYMLINK_NOFOLLOW) < 0 || !S_ISREG(st.st_mode)) {
 			continue;
 		}
 		memcpy(e.name, d->d_name, strlen(d->d_name) + 1); /* its length was checked */
@@ -294,8 +293,8 @@ int store_load_state(const struct store *s, struct store_state *ret_state)
 		r = -EBADMSG;
 	}
 	for (size_t i = 0; i < STATE_FIELDS && r == 0; i++) {
-		r = fgets(line, sizeof(line), in) == NULL ? -EBADMSG :
-							    parse_state_line(line, i, &state);
+		r = fgets(line, sizeof(line), in) == NULL ? -EBADMSG
+							  : parse_state_line(line, i, &state);
 	}
 	fclose(in);
 	if (r == 0) {
@@ -353,9 +352,9 @@ int store_free_bytes(const struct store *s, uint64_t *ret_bytes)
 
 int store_enforce_budget(const struct store *s, uint64_t budget_bytes, uint64_t open_bytes)
 {
-	struct store_entry *entries;
+	struct store_entry *entries = NULL;
 	uint64_t total = open_bytes;
-	size_t count;
+	size_t count = 0;
 	int deleted = 0;
 	int r;
 

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The directory of recordings: ecdaq-<UTC>-<session>-<sequence>.mcap, .part while being written. The sequence
- * counts up over all sessions, so it orders the files even where the clock was wrong. One recorder at a time
- * (lock file). The state file says where recording is to go on; an unfinished file knows better.
- * Context: blocking.
+ * The directory of recordings: ecdaq-<UTC>-<session>-<sequence>.mcap, .part while being written.
+ * The sequence counts up over all sessions, so it orders the files even where the clock was wrong.
+ * One recorder at a time (lock file). The state file says where recording is to go on; an
+ * unfinished file knows better. Context: blocking.
  */
 #ifndef RECORD_STORE_H
 #define RECORD_STORE_H
@@ -27,17 +27,17 @@ struct store_state {
 	uint64_t session;
 	uint64_t next_cycle;
 	uint64_t first_cycle;
-	uint64_t cycles;       /* samples recorded */
+	uint64_t cycles; /* samples recorded */
 	uint64_t gaps;
-	uint64_t missing;      /* cycles in the gaps */
+	uint64_t missing; /* cycles in the gaps */
 	uint64_t event_next;
 	int64_t event_mono_ns; /* of the event before that */
-	uint64_t sequence; /* of the newest file */
+	uint64_t sequence;     /* of the newest file */
 };
 
 /**
- * Make @dir if it is not there, and lock it. 0; -EBUSY: another recorder has it (*@ret_pid, 0 unknown); -errno.
- * Free with store_close().
+ * Make @dir if it is not there, and lock it. 0; -EBUSY: another recorder has it (*@ret_pid, 0
+ * unknown); -errno. Free with store_close().
  */
 int store_open(const char *dir, struct store **ret_store, int64_t *ret_pid);
 void store_close(struct store *s);
@@ -64,8 +64,8 @@ int store_save_state(const struct store *s, const struct store_state *state);
 int store_free_bytes(const struct store *s, uint64_t *ret_bytes);
 
 /**
- * Delete the oldest finished recordings until all together with @open_bytes hold @budget_bytes; the newest
- * finished one goes last. Returns the number of files deleted or -errno.
+ * Delete the oldest finished recordings until all together with @open_bytes hold @budget_bytes; the
+ * newest finished one goes last. Returns the number of files deleted or -errno.
  */
 int store_enforce_budget(const struct store *s, uint64_t budget_bytes, uint64_t open_bytes);
 

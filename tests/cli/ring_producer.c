@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A master without a bus: writes synthetic samples of two slaves to a sample ring, so that what reads rings
- * is tested alone. piccolo0.adc is a 1 Hz sine of 0.5 V around 1 V, piccolo1.adc the same a quarter
- * period later; counters count; sample_time is the DC time of the edge.
+ * A master without a bus: writes synthetic samples of two slaves to a sample ring, so that what
+ * reads rings is tested alone. piccolo0.adc is a 1 Hz sine of 0.5 V around 1 V, piccolo1.adc the
+ * same a quarter period later; counters count; sample_time is the DC time of the edge.
  *
  * usage: test_ring_producer RUN_DIR --cycles N [--pace] [--first N] [--skip FROM:COUNT] [--depth N]
  *        [--no-close] [--wait] [--events N]
@@ -200,7 +200,8 @@ static void produce(struct ring *ring, struct ring *events, const struct argumen
 	}
 }
 
-static int make_ring(const char *dir, const char *file, struct ring_spec spec, struct ring **ret_ring)
+static int make_ring(const char *dir, const char *file, struct ring_spec spec,
+		     struct ring **ret_ring)
 {
 	char path[CONFIG_PATH_BYTES];
 	int r;
@@ -232,14 +233,15 @@ int main(int argc, char **argv)
 					  .payload_bytes = sizeof(struct event),
 					  .slot_count = 1024 },
 		      &events) < 0 ||
-	    make_ring(a.run_dir, CONFIG_RUN_SAMPLES,
-		      (struct ring_spec){ .kind = "sample",
-					  .payload_bytes = sizeof(struct sample_header) + IMAGE_BYTES,
-					  .slot_count = a.depth,
-					  .meta = &meta,
-					  .meta_bytes = sizeof(meta),
-					  .period_ns = PERIOD_NS },
-		      &ring) < 0) {
+	    make_ring(
+		    a.run_dir, CONFIG_RUN_SAMPLES,
+		    (struct ring_spec){ .kind = "sample",
+					.payload_bytes = sizeof(struct sample_header) + IMAGE_BYTES,
+					.slot_count = a.depth,
+					.meta = &meta,
+					.meta_bytes = sizeof(meta),
+					.period_ns = PERIOD_NS },
+		    &ring) < 0) {
 		return 1;
 	}
 	produce(ring, events, &a);

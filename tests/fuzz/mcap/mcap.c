@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Any bytes as a recording: read, checked, printed as a table, mended. What was mended must be whole, and
- * have the messages that were found before.
+ * Any bytes as a recording: read, checked, printed as a table, mended. What was mended must be
+ * whole, and have the messages that were found before.
  */
 #include <assert.h>
 #include <stddef.h>
@@ -61,8 +61,9 @@ static struct mcap_source source_of(struct bytes *b)
 
 static struct mcap_io io_of(struct bytes *b)
 {
-	return (struct mcap_io){ .write = write_end, .sync = sync_nothing,
-				 .truncate = truncate_bytes, .ctx = b };
+	return (struct mcap_io){
+		.write = write_end, .sync = sync_nothing, .truncate = truncate_bytes, .ctx = b
+	};
 }
 
 static void print_table(struct bytes *b, FILE *nowhere)

@@ -8,7 +8,8 @@
 #define DC_START (INT64_C(820000000) * NS_PER_S)
 #define TAI_START (INT64_C(1766000037) * NS_PER_S)
 
-/* One millisecond after the other: DC runs @rate_ppm away from the host; each pair has its delay. */
+/* One millisecond after the other: DC runs @rate_ppm away from the host; each pair has its delay.
+ */
 struct feeder {
 	struct timemap *map;
 	struct prng prng;
@@ -22,9 +23,14 @@ struct feeder {
 
 static struct feeder feeder_make(int64_t tai_ns, int32_t tai_offset_s)
 {
-	struct feeder f = { .map = timemap_create(tai_offset_s), .prng = { 7 }, .dc_ns = DC_START,
-			    .host_ns = tai_ns, .rate_ppm = 0, .jitter_ns = 0,
-			    .last_utc_ns = INT64_MIN, .back_steps = 0 };
+	struct feeder f = { .map = timemap_create(tai_offset_s),
+			    .prng = { 7 },
+			    .dc_ns = DC_START,
+			    .host_ns = tai_ns,
+			    .rate_ppm = 0,
+			    .jitter_ns = 0,
+			    .last_utc_ns = INT64_MIN,
+			    .back_steps = 0 };
 
 	CHECK(f.map != NULL);
 	return f;
@@ -35,8 +41,9 @@ static enum timemap_news feed_ms(struct feeder *f, int count)
 	enum timemap_news worst = TIMEMAP_QUIET;
 
 	for (int i = 0; i < count; i++) {
-		int64_t delay = f->jitter_ns == 0 ? 0 :
-				(int64_t)prng_below(&f->prng, (uint64_t)f->jitter_ns);
+		int64_t delay = f->jitter_ns == 0
+					? 0
+					: (int64_t)prng_below(&f->prng, (uint64_t)f->jitter_ns);
 		enum timemap_news news;
 		int64_t utc_ns;
 
@@ -101,7 +108,8 @@ TEST(timemap, late_wakes_neither_bend_the_map_nor_make_it_step)
 	timemap_get(f.map, &state);
 	CHECK_EQ(state.steps, 0);
 	CHECK_EQ(f.back_steps, 0);
-	/* The median delay of 50 us is not known to the map; its scatter around it is what is tested. */
+	/* The median delay of 50 us is not known to the map; its scatter around it is what is
+	 * tested. */
 	CHECK(llabs(error_ns(&f, 0) + 50000) < 15000);
 	CHECK(state.rate_ppb > -45000 && state.rate_ppb < -35000);
 	CHECK(state.uncertainty_ns >= 10000 && state.uncertainty_ns < 100000);

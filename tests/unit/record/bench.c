@@ -65,8 +65,9 @@ static void seam_wrap(void *ctx, const char *path, struct mcap_io *io)
 
 	CHECK(path[0] != '\0');
 	b->io = *io;
-	*io = (struct mcap_io){ .write = io_write, .sync = io_sync, .truncate = io_truncate,
-				.ctx = b };
+	*io = (struct mcap_io){
+		.write = io_write, .sync = io_sync, .truncate = io_truncate, .ctx = b
+	};
 }
 
 static int seam_free_bytes(void *ctx, const char *dir, uint64_t *ret_bytes)
@@ -89,7 +90,8 @@ static void make_rings(struct bench *b, uint64_t slots)
 			     .period_ns = 1000000,
 			     .session = b->session },
 		   .slave = { .name = "adc" },
-		   .channel = { .name = "adc.value", .type = CHANNEL_UINT, .bit_len = 32, .scale = 1 } };
+		   .channel = {
+			   .name = "adc.value", .type = CHANNEL_UINT, .bit_len = 32, .scale = 1 } };
 	const struct ring_spec samples = { .path = b->ring_path,
 					   .kind = "sample",
 					   .payload_bytes =
@@ -121,7 +123,8 @@ void bench_init(struct bench *b, uint64_t session, uint64_t slots)
 	b->now_ns = 1000 * NS_PER_S;
 	b->bytes_free = UINT64_C(1) << 40;
 	b->session = session;
-	b->seam = (struct record_seam){ .wrap = seam_wrap, .free_bytes = seam_free_bytes, .ctx = b };
+	b->seam =
+		(struct record_seam){ .wrap = seam_wrap, .free_bytes = seam_free_bytes, .ctx = b };
 	b->options = (struct recorder_options){ .ring_path = b->ring_path,
 						.events_path = b->events_path,
 						.status_path = b->status_path,
@@ -196,8 +199,7 @@ void bench_push(struct bench *b, uint64_t first, uint64_t count)
 		struct sample_header h = {
 			.cycle = cycle,
 			.dc_time_ns = INT64_C(800000000) * NS_PER_S + since_ns,
-			.wake_tai_ns =
-				INT64_C(1766000000) * NS_PER_S + since_ns + b->tai_step_ns,
+			.wake_tai_ns = INT64_C(1766000000) * NS_PER_S + since_ns + b->tai_step_ns,
 			.frame_dc_ns = INT64_C(800000000) * NS_PER_S + since_ns + 500000,
 			.round_trip_ns = 20000,
 			.wkc = 1,

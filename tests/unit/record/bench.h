@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A master and a recorder on the bench: rings and recordings in a directory of their own, time that stands
- * still until it is moved, files whose calls can be made to fail.
+ * A master and a recorder on the bench: rings and recordings in a directory of their own, time that
+ * stands still until it is moved, files whose calls can be made to fail.
  */
 #ifndef TESTS_UNIT_RECORD_BENCH_H
 #define TESTS_UNIT_RECORD_BENCH_H
@@ -24,20 +24,21 @@ struct bench {
 	struct ring *events;
 	uint64_t session;
 	int64_t now_ns;
-	int64_t tai_step_ns;    /* the host's clock was set by this much */
+	int64_t tai_step_ns; /* the host's clock was set by this much */
 	struct recorder_options options;
 	struct recorder *recorder;
 	struct record_seam seam;
-	struct mcap_io io;      /* the real one, of the newest file */
-	unsigned calls;         /* to files, all together */
-	unsigned fail_call;     /* from this one on calls fail; 0: none */
-	unsigned fail_count;    /* so many */
+	struct mcap_io io;   /* the real one, of the newest file */
+	unsigned calls;      /* to files, all together */
+	unsigned fail_call;  /* from this one on calls fail; 0: none */
+	unsigned fail_count; /* so many */
 	int error;
-	uint64_t bytes_free;    /* as the file system is to say */
-	char said[4096];        /* by the recorder, a line each */
+	uint64_t bytes_free; /* as the file system is to say */
+	char said[4096];     /* by the recorder, a line each */
 };
 
-/** Rings of session @session with @slots slots, and options to record them. Start from a zeroed struct. */
+/** Rings of session @session with @slots slots, and options to record them. Start from a zeroed
+ * struct. */
 void bench_init(struct bench *b, uint64_t session, uint64_t slots);
 void bench_done(struct bench *b);
 /** Another run of the master: new rings. The old are closed first where @is_closed. */

@@ -243,16 +243,18 @@ TEST(log, export_has_a_row_a_cycle_over_all_files)
 	CHECK(strstr(out, "\n1499,") != NULL);
 	CHECK(strstr(out, ",0,1,1499\n") != NULL);
 	free(out);
-	out = export_of(&b,
-			(struct log_export_options){
-				.channels = "adc.value", .from = 700, .to = 702, .format = LOG_JSON },
-			LOG_OK);
+	out = export_of(
+		&b,
+		(struct log_export_options){
+			.channels = "adc.value", .from = 700, .to = 702, .format = LOG_JSON },
+		LOG_OK);
 	CHECK_EQ(lines_of(out), 3);
 	CHECK(strstr(out, "{\"cycle\":701,\"utc_ns\":") != NULL);
 	CHECK(strstr(out, ",\"adc.value\":701}") != NULL);
 	free(out);
-	out = export_of(&b, (struct log_export_options){ .channels = "adc.value,adc.nothing",
-							 .to = UINT64_MAX },
+	out = export_of(&b,
+			(struct log_export_options){ .channels = "adc.value,adc.nothing",
+						     .to = UINT64_MAX },
 			LOG_FAILED);
 	CHECK_STR(out, "");
 	free(out);

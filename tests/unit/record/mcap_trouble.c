@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The n-th call to the file fails, for n = 1, 2, 3...: nothing is lost but by the caller's choice. */
+/* The n-th call to the file fails, for n = 1, 2, 3...: nothing is lost but by the caller's choice.
+ */
 #include <errno.h>
 
 #include "harness/test.h"

@@ -63,8 +63,9 @@ static int io_truncate(void *ctx, uint64_t bytes)
 
 struct mcap_io memory_io(struct memory_file *f)
 {
-	return (struct mcap_io){ .write = io_write, .sync = io_sync, .truncate = io_truncate,
-				 .ctx = f };
+	return (struct mcap_io){
+		.write = io_write, .sync = io_sync, .truncate = io_truncate, .ctx = f
+	};
 }
 
 static int source_read_at(void *ctx, uint64_t offset, void *buf, size_t len)

@@ -8,7 +8,7 @@
 struct memory_file {
 	uint8_t *data;
 	size_t len;
-	size_t synced_len;   /* what a power cut would leave */
+	size_t synced_len; /* what a power cut would leave */
 	unsigned calls;
 	unsigned fail_call;  /* the call with this number (from 1 on) fails; 0: none */
 	unsigned fail_count; /* and so many more */

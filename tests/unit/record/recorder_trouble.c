@@ -21,7 +21,7 @@ static struct track read_all(struct bench *b)
 	return t;
 }
 
-TEST(recorder_trouble, less_free_than_the_reserve_stops_with_an_alarm_and_goes_on_when_there_is_space)
+TEST(recorder_trouble, below_the_reserve_it_stops_with_an_alarm_until_there_is_space)
 {
 	struct bench b = { .calls = 0 };
 	struct track t;
@@ -40,7 +40,7 @@ TEST(recorder_trouble, less_free_than_the_reserve_stops_with_an_alarm_and_goes_o
 	bench_wait(&b, 3 * NS_PER_S);
 	CHECK(recorder_status(b.recorder)->recorded_cycles < 1500);
 	CHECK_EQ(read_all(&b).gaps, 0); /* what was written is a whole file */
-	b.bytes_free = 1000001; /* not yet: an eighth above the reserve is wanted */
+	b.bytes_free = 1000001;         /* not yet: an eighth above the reserve is wanted */
 	bench_wait(&b, 3 * NS_PER_S);
 	CHECK_EQ(recorder_status(b.recorder)->state, RECORD_DISK_FULL);
 	b.bytes_free = 2000000;
@@ -50,7 +50,7 @@ TEST(recorder_trouble, less_free_than_the_reserve_stops_with_an_alarm_and_goes_o
 	CHECK_EQ(bench_stop(&b), 0);
 	t = read_all(&b);
 	CHECK_EQ(t.cycles, 3000);
-	CHECK_EQ(t.gaps, 0); /* the ring held them */
+	CHECK_EQ(t.gaps, 0);  /* the ring held them */
 	CHECK(t.events >= 4); /* started, started, disk full, resumed */
 	bench_done(&b);
 }

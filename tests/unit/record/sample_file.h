@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A small recording in memory: two channels, chunks of a few messages, metadata and an attachment. */
+/* A small recording in memory: two channels, chunks of a few messages, metadata and an attachment.
+ */
 #ifndef TESTS_UNIT_RECORD_SAMPLE_FILE_H
 #define TESTS_UNIT_RECORD_SAMPLE_FILE_H
 

@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: MIT
+"""ecdaq-record on a ring without a bus, its recordings read by independent software."""
+
+from __future__ import annotations
+
+import csv
+import io
+import itertools
+import json
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from ecdaq import BIN, BUILD, ECDAQ, NOBODY
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+
+RECORD = BIN / "ecdaq-record"
+PRODUCER = BUILD / "tests" / "cli" / "test_ring_producer"
+PERIOD_NS = 1_000_000
+
+
+def wait_until(what: str, ready: Callable[[], bool], seconds: float = 30) -> None:
+    end = time.monotonic() + seconds
+    while not ready():
+        assert time.monotonic() < end, f"{what}: not within {seconds} s"
+        time.sleep(0.02)
+
+
+class Bench:
+    """Rings in one folder, recordings in another, and the processes between them."""
+
+    def __init__(self, run_dir: Path, folder: Path) -> None:
+        self.run_dir = run_dir
+        self.folder = folder
+        self.processes: list[subprocess.Popen[str]] = []
+
+    def start(self, *command: str | Path) -> subprocess.Popen[str]:
+        process = subprocess.Popen(
+            [str(word) for word in command],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self.processes.append(process)
+        return process
+
+    def produce(self, *options: str) -> subprocess.Popen[str]:
+        return self.start(PRODUCER, self.run_dir, *options)
+
+    def record(self, *options: str) -> subprocess.Popen[str]:
+        return self.start(
+            RECORD, "--run-dir", self.run_dir, "--dir", self.folder,
+            "--set", "record.reserve=0B", *options,
+        )  # fmt: skip
+
+    def record_all(self, *options: str) -> str:
+        """Record a session that has ended; what was said."""
+        process = self.record("--once", *options)
+        _, said = process.communicate(timeout=60)
+        assert process.returncode == 0, said
+        return said
+
+    def recorded_bytes(self) -> int:
+        return sum(path.stat().st_size for path in self.folder.glob("ecdaq-*"))
+
+    def log(self, *words: str | Path) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [ECDAQ, "log", *words], capture_output=True, text=True, timeout=60, check=False
+        )
+
+    def files(self) -> list[Path]:
+        return sorted(self.folder.glob("*.mcap"))
+
+    def messages(self, topic: str) -> Iterator[tuple[int, Any]]:
+        for path in self.files():
+            with path.open("rb") as file:
+                reader = make_reader(file, decoder_factories=[DecoderFactory()], validate_crcs=True)
+                for _, _, raw, message in reader.iter_decoded_messages(topics=[topic]):
+                    yield raw.log_time, message
+
+    def close(self) -> None:
+        for process in self.processes:
+            if process.poll() is None:
+                process.kill()
+            process.communicate()
+
+
+@pytest.fixture
+def bench(run_dir: Path, tmp_path: Path) -> Iterator[Bench]:
+    for program in (RECORD, PRODUCER):
+        if not program.exists():
+            pytest.fail(f"{program} is not there: run ./build.sh build")
+    made = Bench(run_dir, tmp_path / "records")
+    made.folder.mkdir()
+    yield made
+    made.close()
+
+
+def test_every_sample_decodes_and_is_what_the_ring_held(bench: Bench) -> None:
+    bench.produce("--cycles", "3000", "--events", "3").wait(60)
+    bench.record_all()
+    cycles = list(bench.messages("/ecdaq/cycle"))
+    assert [m.cycle for _, m in cycles] == list(range(3000))
+    assert {b[0] - a[0] for a, b in itertools.pairwise(cycles)} == {PERIOD_NS}
+    assert all(m.wkc == m.wkc_expected == 6 and m.round_trip_ns == 30000 for _, m in cycles)
+    for slave in range(2):
+        samples = list(bench.messages(f"/ecdaq/piccolo{slave}"))
+        assert [m.cycle for _, m in samples] == list(range(3000))
+        assert [t for t, _ in samples] == [t for t, _ in cycles]
+        assert all(m.good and m.flags == 0 for _, m in samples)
+        assert all(m.counter == m.cycle % 65536 for _, m in samples)
+        assert all(m.sample_time == m.dc_time_ns for _, m in samples)
+        volt = np.array([m.adc for _, m in samples]) * 3.3 / 4096
+        angle = 2 * np.pi * (np.arange(3000) / 1000 - 0.25 * slave)
+        basis = np.column_stack((np.sin(angle), np.cos(angle), np.ones(3000)))
+        (sine, cosine, offset), *_ = np.linalg.lstsq(basis, volt, rcond=None)
+        assert sine == pytest.approx(0.5, abs=1e-4)
+        assert cosine == pytest.approx(0, abs=1e-4)
+        assert offset == pytest.approx(1, abs=1e-4)
+    assert [m.led for _, m in bench.messages("/ecdaq/piccolo1")][499:501] == [False, True]
+    events = [m for _, m in bench.messages("/ecdaq/event")]
+    assert [m.value for m in events if m.name == "output_set"] == [0, 1, 2]
+    assert [m.name for m in events if m.sequence == 2**64 - 1] == ["record_started"]
+    assert len(list(bench.messages("/ecdaq/timemap"))) >= 2
+
+
+def test_the_file_describes_itself(bench: Bench, tmp_path: Path) -> None:
+    config = tmp_path / "ecdaq.yaml"
+    config.write_text("# as on the appliance\nrecord:\n  compression: 0\n")
+    bench.produce("--cycles", "100").wait(60)
+    bench.record_all("--config", str(config))
+    with bench.files()[0].open("rb") as file:
+        reader = make_reader(file)
+        assert reader.get_header().profile == "ros2"
+        metadata = {record.name: record.metadata for record in reader.iter_metadata()}
+        attachments = {a.name: a.data.decode() for a in reader.iter_attachments()}
+        summary = reader.get_summary()
+    assert metadata["ecdaq.config"]["yaml"] == config.read_text()
+    table = json.loads(metadata["ecdaq.channels"]["json"])
+    assert [c["name"] for c in table["channels"]][:2] == ["piccolo0.adc", "piccolo0.counter"]
+    assert table["channels"][0]["unit"] == "V"
+    assert metadata["ecdaq.end"]["cycles"] == "100"
+    assert metadata["ecdaq.end"]["reason"] == "producer ended"
+    assert int(metadata["ecdaq.timemap"]["utc_ns"]) > 1_600_000_000 * 10**9
+    assert "struct Piccolo0 {" in attachments["ecdaq.idl"]
+    assert summary is not None and summary.statistics is not None
+    assert summary.statistics.message_count == 3 * 100 + 1
+    assert all(chunk.compression == "" for chunk in summary.chunk_indexes)
+
+
+def test_killed_again_and_again_it_misses_no_cycle(bench: Bench) -> None:
+    producer = bench.produce("--cycles", "4000", "--pace")
+    wait_until("ring", (bench.run_dir / "samples").exists)
+    for _ in range(4):
+        before = bench.recorded_bytes()
+        recorder = bench.record()
+        wait_until("recording", lambda before=before: bench.recorded_bytes() > before + 20000)
+        recorder.send_signal(signal.SIGKILL)
+        assert recorder.wait(30) == -signal.SIGKILL
+        assert list(bench.folder.glob("*.part"))
+    assert producer.wait(60) == 0
+    said = bench.record_all()
+    assert "recovered" in said
+    assert not list(bench.folder.glob("*.part"))
+    assert [m.cycle for _, m in bench.messages("/ecdaq/cycle")] == list(range(4000))
+    checked = bench.log("check", bench.folder)
+    assert checked.returncode == 0, checked.stdout
+    assert "4000 cycles, 0 gaps" in checked.stdout
+
+
+def test_gaps_of_the_master_are_exact_events(bench: Bench) -> None:
+    bench.produce("--cycles", "1000", "--skip", "300:7").wait(60)
+    bench.record_all()
+    gaps = [m for _, m in bench.messages("/ecdaq/event") if m.name == "record_gap"]
+    assert [(m.value, m.arg0, m.severity) for m in gaps] == [(300, 7, "error")]
+    checked = bench.log("check", bench.folder, "--json")
+    assert checked.returncode == 1
+    result = json.loads(checked.stdout)
+    assert (result["gaps"], result["cycles_missing"], result["clean"]) == (1, 7, False)
+    assert result["files"][0]["gaps"] == [{"first": 300, "count": 7}]
+
+
+def test_export_is_read_by_csv_readers(bench: Bench) -> None:
+    bench.produce("--cycles", "500").wait(60)
+    bench.record_all("--set", "record.rotate_size=64KiB", "--set", "record.compression=0")
+    assert len(bench.files()) > 1
+    exported = bench.log("export", bench.folder, "--from", "100", "--to", "399")
+    rows = list(csv.DictReader(io.StringIO(exported.stdout)))
+    assert [int(row["cycle"]) for row in rows] == list(range(100, 400))
+    assert float(rows[150]["piccolo0.adc"]) == pytest.approx(1.5, abs=1e-3)
+    assert rows[0]["piccolo1.counter"] == "100"
+    raw = bench.log("export", bench.folder, "--raw", "--channels", "piccolo0.adc", "--json")
+    lines = [json.loads(line) for line in raw.stdout.splitlines()]
+    assert len(lines) == 500
+    assert set(lines[0]) == {"cycle", "utc_ns", "piccolo0.adc"}
+    assert lines[250]["piccolo0.adc"] == round(1.5 / 3.3 * 4096)
+    missing = bench.log("export", bench.folder, "--channels", "piccolo9.adc")
+    assert missing.returncode == 1
+    assert missing.stderr.count("\n") == 1 and "no channel piccolo9.adc" in missing.stderr
+
+
+def test_stopped_by_a_signal_it_leaves_a_finished_file(bench: Bench) -> None:
+    for number in (signal.SIGTERM, signal.SIGINT):
+        bench.produce("--cycles", "1000", "--no-close").wait(60)
+        recorder = bench.record()
+        wait_until("file", lambda: bool(list(bench.folder.glob("*.part"))) or bool(bench.files()))
+        recorder.send_signal(number)
+        assert recorder.wait(30) == 0
+        assert not list(bench.folder.glob("*.part"))
+        assert [m.cycle for _, m in bench.messages("/ecdaq/cycle")] == list(range(1000))
+        for path in bench.files():
+            path.unlink()
+
+
+def test_a_crashed_master_ends_the_session(bench: Bench) -> None:
+    bench.produce("--cycles", "700", "--no-close").wait(60)
+    said = bench.record_all()
+    assert "producer gone" in said
+    assert [m.cycle for _, m in bench.messages("/ecdaq/cycle")] == list(range(700))
+
+
+def test_a_second_recorder_is_refused_in_one_line(bench: Bench) -> None:
+    bench.record()
+    wait_until("lock", lambda: bool((bench.folder / ".ecdaq-record.lock").exists()))
+    wait_until("status", (bench.run_dir / "record-status").exists)
+    second = bench.record()
+    _, said = second.communicate(timeout=30)
+    assert second.returncode == 6
+    assert said.count("\n") == 1 and "another ecdaq-record (process " in said
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "why"),
+    [
+        (["--loud"], 2, "no such option"),
+        (["--dir"], 2, "needs a value"),
+        (["somewhere"], 2, "takes no operand"),
+        (["--set", "record.compression=99"], 3, "record.compression"),
+        (["--set", "record.nothing=1"], 3, "record.nothing"),
+        (["--config", "/nowhere/ecdaq.yaml"], 3, "/nowhere/ecdaq.yaml"),
+        (["--dir", "/dev/null/records"], 1, "/dev/null/records: Not a directory"),
+    ],
+)
+def test_trouble_is_one_line_and_a_code(options: list[str], code: int, why: str) -> None:
+    ended = subprocess.run(
+        [RECORD, *options], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert ended.returncode == code
+    assert ended.stderr.startswith("ecdaq-record: ")
+    assert ended.stderr.count("\n") == 1 and why in ended.stderr
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="needs root to become somebody else")
+def test_a_folder_that_may_not_be_written_is_said(bench: Bench) -> None:
+    folder = bench.run_dir / "records"
+    folder.mkdir(mode=0o755)
+    ended = subprocess.run(
+        [RECORD, "--run-dir", bench.run_dir, "--dir", folder],
+        capture_output=True, text=True, timeout=60, check=False, user=NOBODY, group=NOBODY,
+    )  # fmt: skip
+    assert ended.returncode == 4
+    assert ended.stderr == f"ecdaq-record: {folder}: Permission denied\n"
