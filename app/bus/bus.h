@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The master's service side: finds the slaves, compares them with what is expected, maps their
- * process data, sets up distributed clocks, leads them to OP while the cycle runs, watches them, and
- * stops them in order. Everything here blocks and belongs to the service thread; it reaches the wire
- * through a line (link/line.h) that is direct at first and rides along once the cycle runs.
+ * process data, sets up distributed clocks, leads them to OP while the cycle runs, watches them,
+ * and stops them in order. Everything here blocks and belongs to the service thread; it reaches the
+ * wire through a line (link/line.h) that is direct at first and rides along once the cycle runs.
  *
  * Every call that fails writes one line, what and why, with position, vendor, product, register or
  * AL status text, to @error (BUS_ERROR_BYTES) and returns -errno:
- *   -ENODEV no slave, -ENXIO a slave too few or too many or the wrong one, -EPROTO mapping does not fit,
- *   -ETIME a state or lock was not reached in time, -EIO the wire, -ENOTSUP, -E2BIG a limit.
+ *   -ENODEV no slave, -ENXIO a slave too few or too many or the wrong one, -EPROTO mapping does not
+ * fit, -ETIME a state or lock was not reached in time, -EIO the wire, -ENOTSUP, -E2BIG a limit.
  */
 #ifndef BUS_BUS_H
 #define BUS_BUS_H
@@ -38,7 +38,8 @@ void bus_destroy(struct bus *bus);
 int bus_scan(struct bus *bus, char *error);
 /** Found against configured slaves: position, vendor, product, revision, alias, count. */
 int bus_compare(const struct bus *bus, char *error);
-/** Start-up SDOs, SM and FMMU, PDO mapping (CoE or SII) into the channel table, watchdog (T08), exchange plan. */
+/** Start-up SDOs, SM and FMMU, PDO mapping (CoE or SII) into the channel table, watchdog (T08),
+ * exchange plan. */
 int bus_map(struct bus *bus, char *error);
 /** Filters, latch, delays, offsets, burst, check of 0x092C. Nothing to do without DC slaves. */
 int bus_dc_setup(struct bus *bus, char *error);
@@ -51,7 +52,8 @@ int bus_dc_setup(struct bus *bus, char *error);
  * One-shot slaves get 0x0980 = PDI. Call when the servo is locked.
  */
 int bus_sync0_start(struct bus *bus, int64_t dc_now_ns, char *error);
-/** All slaves to @state (SAFE-OP, OP, PRE-OP, INIT), with AL errors named by slave, code and text. */
+/** All slaves to @state (SAFE-OP, OP, PRE-OP, INIT), with AL errors named by slave, code and text.
+ */
 int bus_request_state(struct bus *bus, enum al_state state, span_t timeout, char *error);
 /** SYNC0 off, all to INIT; goes on over errors. The cycle has put outputs to fail-safe before. */
 int bus_stop(struct bus *bus, char *error);
@@ -65,9 +67,10 @@ struct bus_watch_report {
 };
 
 /**
- * Read AL state, error counters, DC difference of every slave into @page (its slave[] entries), emit events through
- * @emit, acknowledge errors and lead slaves that fell back to SAFE-OP or PRE-OP or were power-cycled to OP again
- * (with DC redone for a returned slave, T18), a step per call.
+ * Read AL state, error counters, DC difference of every slave into @page (its slave[] entries),
+ * emit events through
+ * @emit, acknowledge errors and lead slaves that fell back to SAFE-OP or PRE-OP or were
+ * power-cycled to OP again (with DC redone for a returned slave, T18), a step per call.
  */
 int bus_watch(struct bus *bus, struct status_page *page,
 	      void (*emit)(void *ctx, const struct event *ev), void *emit_ctx,

@@ -66,8 +66,8 @@ static void fill(struct channel *ch, const struct slave_info *slave, const struc
 }
 
 /* An entry of more than 64 bits becomes several channels, name_0 first. Returns how many. */
-static size_t put_entry(struct channel *ch, const struct slave_info *slave, const struct pdo_entry *e,
-			const char *name, uint32_t bit_offset)
+static size_t put_entry(struct channel *ch, const struct slave_info *slave,
+			const struct pdo_entry *e, const char *name, uint32_t bit_offset)
 {
 	unsigned pieces = (e->bit_len + PIECE_BITS - 1) / PIECE_BITS;
 
@@ -94,7 +94,7 @@ int channels_add(struct slave_info *slave, const struct pdo_entry *entry, size_t
 {
 	struct channels_place at = *place;
 	size_t n = *count;
-	char(*name)[PDO_NAME_BYTES];
+	char (*name)[PDO_NAME_BYTES];
 
 	name = calloc(entry_count + 1, sizeof(*name));
 	if (name == NULL) {

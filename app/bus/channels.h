@@ -17,8 +17,8 @@ struct channels_place {
 };
 
 /**
- * Append the channels of @slave to @channel (which holds *count of @capacity); sets its counter_channel and bits. 0
- * or -E2BIG (*count untouched).
+ * Append the channels of @slave to @channel (which holds *count of @capacity); sets its
+ * counter_channel and bits. 0 or -E2BIG (*count untouched).
  */
 int channels_add(struct slave_info *slave, const struct pdo_entry *entry, size_t entry_count,
 		 const struct channels_place *place, struct channel *channel, size_t *count,

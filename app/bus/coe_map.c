@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The mapping as the slave's object dictionary has it: SyncManager types (0x1C00), assigned PDOs (0x1C1n), their
- * entries. An object that is not there means no mapping by CoE; a transfer that fails is an error, never an
- * empty mapping.
+ * The mapping as the slave's object dictionary has it: SyncManager types (0x1C00), assigned PDOs
+ * (0x1C1n), their entries. An object that is not there means no mapping by CoE; a transfer that
+ * fails is an error, never an empty mapping.
  */
 #include <errno.h>
 #include <stdio.h>
@@ -37,9 +37,9 @@ static int read_value(struct coe_walk *w, uint16_t index, uint8_t subindex, uint
 		return 0;
 	}
 	if (r < 0) {
-		return bus_fail_slave(w->bus, w->pos, -EIO, "SDO 0x%04x:%02x of its mapping: %s", index,
-				      subindex,
-				      r == -ETIMEDOUT ? "no answer from its mailbox" : strerror(-r));
+		return bus_fail_slave(
+			w->bus, w->pos, -EIO, "SDO 0x%04x:%02x of its mapping: %s", index, subindex,
+			r == -ETIMEDOUT ? "no answer from its mailbox" : strerror(-r));
 	}
 	return 1;
 }
@@ -49,8 +49,8 @@ static int add_entry(struct coe_walk *w, const struct pdo_entry *common, uint64_
 	struct pdo_entry *e = &w->entry[w->count];
 
 	if (w->count >= w->capacity) {
-		return bus_fail_slave(w->bus, w->pos, -E2BIG, "more mapped entries than PDO_LIMIT (%d)",
-				      PDO_LIMIT);
+		return bus_fail_slave(w->bus, w->pos, -E2BIG,
+				      "more mapped entries than PDO_LIMIT (%d)", PDO_LIMIT);
 	}
 	*e = *common;
 	e->index = (uint16_t)(word >> 16);
@@ -74,9 +74,10 @@ static int walk_pdo(struct coe_walk *w, const struct pdo_entry *common)
 		}
 	}
 	if (r == 0) {
-		return bus_fail_slave(w->bus, w->pos, -EPROTO,
-				      "PDO 0x%04x is assigned to SM%u, but its mapping cannot be read",
-				      common->pdo, common->sm);
+		return bus_fail_slave(
+			w->bus, w->pos, -EPROTO,
+			"PDO 0x%04x is assigned to SM%u, but its mapping cannot be read",
+			common->pdo, common->sm);
 	}
 	return r;
 }

@@ -12,7 +12,8 @@ struct text {
 	size_t used;
 };
 
-static void append(struct text *text, const char *format, ...) __attribute__((format(printf, 2, 3)));
+static void append(struct text *text, const char *format, ...)
+	__attribute__((format(printf, 2, 3)));
 
 static void append(struct text *text, const char *format, ...)
 {
@@ -23,8 +24,8 @@ static void append(struct text *text, const char *format, ...)
 	r = vsnprintf(text->buf + text->used, text->bytes - text->used, format, args);
 	va_end(args);
 	if (r > 0) {
-		text->used += (size_t)r < text->bytes - text->used ? (size_t)r :
-								     text->bytes - text->used - 1;
+		text->used += (size_t)r < text->bytes - text->used ? (size_t)r
+								   : text->bytes - text->used - 1;
 	}
 }
 
@@ -79,7 +80,8 @@ int compare_slaves(const struct config *cfg, const struct slave_info *found, siz
 		const struct config_slave *want = &cfg->slave[i];
 
 		if (i >= found_count) {
-			append(&text, "slave %zu%s%s is missing: %zu found, %zu expected; expected ", i,
+			append(&text,
+			       "slave %zu%s%s is missing: %zu found, %zu expected; expected ", i,
 			       want->name[0] != '\0' ? " " : "", want->name, found_count,
 			       cfg->slave_count);
 			append_wanted(&text, want);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Distributed clocks, in place of SOEM's: stop, filters, latch, delays, offsets, drift burst, check. Every register
- * access is checked; 0x0934 goes before 0x0930, which is written again after the offsets, so that the loops
- * start from nothing.
+ * Distributed clocks, in place of SOEM's: stop, filters, latch, delays, offsets, drift burst,
+ * check. Every register access is checked; 0x0934 goes before 0x0930, which is written again after
+ * the offsets, so that the loops start from nothing.
  */
 #include <errno.h>
 #include <inttypes.h>
@@ -13,12 +13,13 @@
 #include "bus/registers.h"
 
 enum {
-	TIME_FILTER = 0x00,    /* 0x0934: none, as the good masters have it */
-	SPEED_FILTER = 0x0c,   /* 0x0935: the ET1100's own default */
+	TIME_FILTER = 0x00,  /* 0x0934: none, as the good masters have it */
+	SPEED_FILTER = 0x0c, /* 0x0935: the ET1100's own default */
 	SPEED_COUNTER_START = 0x1000,
-	BURST_PER_FRAME = 1,   /* a slave compares once a frame, at its end (ET1100 data sheet, 0x0910) */
+	BURST_PER_FRAME = 1, /* a slave compares once a frame, at its end (ET1100 data sheet,
+				0x0910) */
 	DIFF_MAGNITUDE = 0x7fffffff,
-	SETTLE_FRAMES = 500,   /* between two looks at 0x092C */
+	SETTLE_FRAMES = 500, /* between two looks at 0x092C */
 	GOOD_LOOKS = 2,
 };
 
@@ -29,7 +30,8 @@ static int is_follower(const struct bus *bus, size_t pos)
 
 /* --- clear, latch, read --- */
 
-/* WKC 0 is news only where a slave has a system time: the broadcasts reach whoever has the register. */
+/* WKC 0 is news only where a slave has a system time: the broadcasts reach whoever has the
+ * register. */
 static int clear_clocks(struct bus *bus)
 {
 	static const uint8_t zero[8];
@@ -94,7 +96,8 @@ static int read_latched(struct bus *bus, size_t pos, uint64_t *ret_local_ns)
 	if (sl->clock.kind != CLOCK_SYSTEM_TIME) {
 		return 0;
 	}
-	if (register_read(bus, pos, ESC_REG_DC_RECEIVE_TIME_PU, local, sl->is_clock_64bit ? 8 : 4) < 0) {
+	if (register_read(bus, pos, ESC_REG_DC_RECEIVE_TIME_PU, local, sl->is_clock_64bit ? 8 : 4) <
+	    0) {
 		return bus_fail_slave(bus, pos, -EIO, "its receive time (0x0918) cannot be read");
 	}
 	*ret_local_ns = get_le64(local);
@@ -103,7 +106,7 @@ static int read_latched(struct bus *bus, size_t pos, uint64_t *ret_local_ns)
 
 /* --- offsets --- */
 
-static int write_clock(struct bus *bus, size_t pos, int64_t offset_ns)
+int bus_clock_write(struct bus *bus, size_t pos, int64_t offset_ns)
 {
 	struct bus_slave *sl = &bus->slave[pos];
 	uint8_t offset[8];
@@ -115,7 +118,8 @@ static int write_clock(struct bus *bus, size_t pos, int64_t offset_ns)
 	put_le64(offset, (uint64_t)offset_ns);
 	put_le32(delay, (int)pos == bus->reference ? 0 : (uint32_t)sl->clock.delay_ns);
 	put_le16(start, SPEED_COUNTER_START);
-	r = register_write(bus, pos, ESC_REG_DC_SYSTEM_TIME_OFFSET, offset, sl->is_clock_64bit ? 8 : 4);
+	r = register_write(bus, pos, ESC_REG_DC_SYSTEM_TIME_OFFSET, offset,
+			   sl->is_clock_64bit ? 8 : 4);
 	if (r >= 0) {
 		r = register_write(bus, pos, ESC_REG_DC_SYSTEM_TIME_DELAY, delay, sizeof(delay));
 	}
@@ -144,9 +148,10 @@ static int solve(struct bus *bus)
 	}
 	if (bus->reference == -EPROTO) {
 		bus->reference = -1;
-		return bus_fail(bus, -EPROTO,
-				"the open ports of the slaves (0x0110) make no tree: a cable in a wrong "
-				"port, or a slave that came or went during the scan");
+		return bus_fail(
+			bus, -EPROTO,
+			"the open ports of the slaves (0x0110) make no tree: a cable in a wrong "
+			"port, or a slave that came or went during the scan");
 	}
 	return 0;
 }
@@ -169,9 +174,10 @@ static int set_clocks(struct bus *bus)
 		if (sl->clock.kind != CLOCK_SYSTEM_TIME) {
 			continue;
 		}
-		r = write_clock(bus, i, latched_ns + sl->clock.delay_ns - (int64_t)local_ns[i]);
+		r = bus_clock_write(bus, i, latched_ns + sl->clock.delay_ns - (int64_t)local_ns[i]);
 		if (r < 0) {
-			return bus_fail_slave(bus, i, -EIO, "its clock does not take offset and delay");
+			return bus_fail_slave(bus, i, -EIO,
+					      "its clock does not take offset and delay");
 		}
 	}
 	return r;
@@ -290,8 +296,9 @@ int bus_dc_setup(struct bus *bus, char *error)
 		return r;
 	}
 	if (!bus->slave[bus->reference].is_clock_64bit) {
-		return bus_fail_slave(bus, (size_t)bus->reference, -ENOTSUP,
-				      "the first clock on the bus has 32 bits only and cannot be the reference");
+		return bus_fail_slave(
+			bus, (size_t)bus->reference, -ENOTSUP,
+			"the first clock on the bus has 32 bits only and cannot be the reference");
 	}
 	r = settle(bus);
 	if (r < 0) {
@@ -299,97 +306,8 @@ int bus_dc_setup(struct bus *bus, char *error)
 	}
 	bus->plan.dc_reference = bus->slave[bus->reference].info.station_addr;
 	bus_publish_slaves(bus);
-	return bus_reference_time(bus, &bus->reference_ns) < 0 ?
-		       bus_fail_slave(bus, (size_t)bus->reference, -EIO,
-				      "the reference clock does not answer") :
-		       0;
-}
-
-int bus_reference_time(struct bus *bus, int64_t *ret_ns)
-{
-	uint8_t time[8];
-	mono_t at = bus_now(bus);
-	int r = register_read(bus, (size_t)bus->reference, ESC_REG_DC_SYSTEM_TIME, time, sizeof(time));
-
-	if (r < 0) {
-		return r;
-	}
-	/* While riding, the frame left up to a cycle later; good enough to keep an outage of the reference. */
-	bus->reference_at = at;
-	bus->reference_ns = (int64_t)get_le64(time);
-	*ret_ns = bus->reference_ns;
-	return 0;
-}
-
-static int is_guide(const struct bus *bus, size_t pos)
-{
-	const struct bus_slave *sl = &bus->slave[pos];
-
-	return sl->clock.kind == CLOCK_SYSTEM_TIME && sl->is_clock_64bit && sl->is_clock_set &&
-	       !sl->is_lost && sl->misses == 0;
-}
-
-/* A living clock other than @pos to set it by: the reference, else any that kept its time. -1: none. */
-static int find_guide(const struct bus *bus, size_t pos)
-{
-	if ((size_t)bus->reference != pos && is_guide(bus, (size_t)bus->reference)) {
-		return bus->reference;
-	}
-	for (size_t i = 0; i < bus->slave_count; i++) {
-		if (i != pos && is_guide(bus, i)) {
-			return (int)i;
-		}
-	}
-	return -1;
-}
-
-/* One frame reads both clocks; the second is passed later by the difference of the delays. */
-static int read_pair(struct bus *bus, size_t guide, size_t pos, int64_t *ret_guide_ns, int64_t *ret_ns)
-{
-	uint8_t time[2][8] = { { 0 } };
-	struct access access[2];
-
-	for (int i = 0; i < 2; i++) {
-		const struct bus_slave *sl = &bus->slave[i == 0 ? guide : pos];
-
-		access[i] = (struct access){ .cmd = ECAT_CMD_FPRD,
-					     .adp = sl->info.station_addr,
-					     .reg = ESC_REG_DC_SYSTEM_TIME,
-					     .len = sl->is_clock_64bit ? 8 : 4,
-					     .data = time[i] };
-	}
-	if (registers_run(bus, access, 2) < 0 || access[0].wkc == 0 || access[1].wkc == 0) {
-		return -EIO;
-	}
-	*ret_guide_ns = (int64_t)get_le64(time[0]) - bus->slave[guide].clock.delay_ns;
-	*ret_ns = (int64_t)get_le64(time[1]);
-	return 0;
-}
-
-int bus_clock_restore(struct bus *bus, size_t pos)
-{
-	struct bus_slave *sl = &bus->slave[pos];
-	static const uint8_t zero[8];
-	int guide = find_guide(bus, pos);
-	int64_t guide_ns;
-	int64_t local_ns;
-	int r;
-
-	if (sl->clock.kind != CLOCK_SYSTEM_TIME || bus->plan.dc_reference == 0) {
-		return 0;
-	}
-	r = register_write(bus, pos, ESC_REG_DC_SYSTEM_TIME_OFFSET, zero, sl->is_clock_64bit ? 8 : 4);
-	if (r < 0) {
-		return r;
-	}
-	if (guide >= 0) {
-		r = read_pair(bus, (size_t)guide, pos, &guide_ns, &local_ns);
-	} else {
-		uint8_t time[8] = { 0 };
-
-		guide_ns = bus->reference_ns + mono_sub(bus_now(bus), bus->reference_at).ns;
-		r = register_read(bus, pos, ESC_REG_DC_SYSTEM_TIME, time, sl->is_clock_64bit ? 8 : 4);
-		local_ns = (int64_t)get_le64(time);
-	}
-	return r < 0 ? r : write_clock(bus, pos, guide_ns + sl->clock.delay_ns - local_ns);
+	return bus_reference_time(bus, &bus->reference_ns) < 0
+		       ? bus_fail_slave(bus, (size_t)bus->reference, -EIO,
+					"the reference clock does not answer")
+		       : 0;
 }

@@ -154,7 +154,8 @@ static void solve_branch(struct dc_node *node, size_t count, size_t parent, uint
 {
 	const struct dc_node *p = &node[parent];
 	uint8_t before = previous_port(p, port);
-	int64_t start_ns = p->arrival_ns + (int64_t)(p->time_ns[before] - p->time_ns[p->entry_port]);
+	int64_t start_ns =
+		p->arrival_ns + (int64_t)(p->time_ns[before] - p->time_ns[p->entry_port]);
 	int64_t wire_ns = (int64_t)(p->time_ns[port] - p->time_ns[before]);
 	int64_t loops_ns = 0;
 	struct tour tour;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Propagation delays from what the slaves latched: which ports are open, and when the latching frame passed
- * each. Pure. Times are unsigned 32 bit and may wrap between ports (T13); slaves without receive times may
- * stand anywhere (T14).
+ * Propagation delays from what the slaves latched: which ports are open, and when the latching
+ * frame passed each. Pure. Times are unsigned 32 bit and may wrap between ports (T13); slaves
+ * without receive times may stand anywhere (T14).
  */
 #ifndef BUS_DC_TOPOLOGY_H
 #define BUS_DC_TOPOLOGY_H
@@ -20,14 +20,14 @@ enum { DC_PORTS = 4 };
 
 struct dc_node {
 	enum clock_kind kind;
-	uint8_t ports;               /* bit per port that is open */
-	uint32_t time_ns[DC_PORTS];  /* 0x0900.., valid unless CLOCK_NONE */
+	uint8_t ports;              /* bit per port that is open */
+	uint32_t time_ns[DC_PORTS]; /* 0x0900.., valid unless CLOCK_NONE */
 	/* found by dc_topology_solve() */
-	int parent;                  /* position; -1: the master */
+	int parent; /* position; -1: the master */
 	uint8_t entry_port;
 	uint8_t parent_port;
-	int64_t arrival_ns;          /* after the frame came to the first clock */
-	int64_t delay_ns;            /* after it came to the reference clock; 0 on the reference */
+	int64_t arrival_ns; /* after the frame came to the first clock */
+	int64_t delay_ns;   /* after it came to the reference clock; 0 on the reference */
 };
 
 /**

@@ -12,7 +12,8 @@
 #include "wire/datagram.h"
 
 enum {
-	HISTORY = 256, /* exchanges whose frames are remembered, to tell a late one from a doubled one */
+	HISTORY = 256, /* exchanges whose frames are remembered, to tell a late one from a doubled
+			  one */
 	DC_DIFF_MAGNITUDE = 0x7fffffff,
 };
 
@@ -24,12 +25,12 @@ struct exchange {
 	struct transport transport;
 	struct platform platform;
 	unsigned frame_count;
-	uint16_t sequence;              /* of the exchange that runs or ran last */
+	uint16_t sequence; /* of the exchange that runs or ran last */
 	uint64_t run_count;
-	unsigned missing;               /* bit per frame of this exchange that is not back */
-	uint8_t history[HISTORY];       /* by sequence: bit per frame that came back */
+	unsigned missing;         /* bit per frame of this exchange that is not back */
+	uint8_t history[HISTORY]; /* by sequence: bit per frame that came back */
 	struct dc_track dc;
-	struct exchange_result result;  /* being made; keeps what a ride met for the next one */
+	struct exchange_result result; /* being made; keeps what a ride met for the next one */
 	struct exchange_frame frame[LIMIT_FRAMES];
 	uint8_t inputs[LIMIT_IMAGE_BYTES];
 	uint8_t received[LIMIT_FRAME_BYTES];
@@ -165,7 +166,8 @@ static void keep_monitor(struct exchange *ex, const struct exchange_frame *ef)
 	res->al_wkc = exchange_wkc(ex->received, ef->al);
 	res->al_status = get_le16(exchange_data(ex->received, ef->al));
 	if (exchange_wkc(ex->received, ef->diff) > 0) {
-		res->dc_diff_ns = get_le32(exchange_data(ex->received, ef->diff)) & DC_DIFF_MAGNITUDE;
+		res->dc_diff_ns =
+			get_le32(exchange_data(ex->received, ef->diff)) & DC_DIFF_MAGNITUDE;
 	}
 }
 
@@ -207,7 +209,8 @@ static void sort_frame(struct exchange *ex, unsigned number, uint16_t sequence, 
 	if (age < HISTORY) {
 		*came |= bit;
 	}
-	/* Outside exchange_run() nothing is missing any more: what comes then is late by one at least. */
+	/* Outside exchange_run() nothing is missing any more: what comes then is late by one at
+	 * least. */
 	if (age == 0 && (ex->missing & bit) != 0) {
 		ex->missing &= ~(unsigned)bit;
 		keep_frame(ex, number);
@@ -243,8 +246,8 @@ static void take_frame(struct exchange *ex, size_t len, mono_t at)
 static int receive_one(struct exchange *ex, mono_t deadline)
 {
 	mono_t at = { 0 };
-	int r = ex->transport.receive(ex->transport.ctx, ex->received, sizeof(ex->received), deadline,
-				      &at);
+	int r = ex->transport.receive(ex->transport.ctx, ex->received, sizeof(ex->received),
+				      deadline, &at);
 
 	if (r < 0) {
 		return r;

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The cyclic exchange: our own frames, made once, sent every cycle. The first frame carries LRW (of
- * the first part of the process image), FRMW of 0x0910, and, if wanted, BRD of 0x0130 and of 0x092C; further
- * frames carry the rest of the image. A SyncManager's buffer is never split (T41). Every
- * datagram's echo is checked (command, index, address, length, and that a slave marked the source
- * address); its index bytes carry a 16-bit exchange sequence, so that a late or doubled frame is
- * recognised, counted and never taken (T05, T06). The reference clock is asked by FPRD instead of
- * FRMW in the first cycle and while it is gone (T17, bus/exchange_dc.h).
+ * the first part of the process image), FRMW of 0x0910, and, if wanted, BRD of 0x0130 and of
+ * 0x092C; further frames carry the rest of the image. A SyncManager's buffer is never split (T41).
+ * Every datagram's echo is checked (command, index, address, length, and that a slave marked the
+ * source address); its index bytes carry a 16-bit exchange sequence, so that a late or doubled
+ * frame is recognised, counted and never taken (T05, T06). The reference clock is asked by FPRD
+ * instead of FRMW in the first cycle and while it is gone (T17, bus/exchange_dc.h).
  */
 #ifndef BUS_EXCHANGE_H
 #define BUS_EXCHANGE_H
@@ -25,32 +25,33 @@ enum exchange_status {
 
 struct exchange_plan {
 	uint32_t image_bytes;
-	uint32_t output_bytes;      /* the first of them */
+	uint32_t output_bytes; /* the first of them */
 	uint32_t logical_start;
 	uint32_t chunk_bytes[LIMIT_FRAMES]; /* how the image is cut into LRW datagrams */
 	unsigned chunk_count;
-	uint16_t chunk_wkc[LIMIT_FRAMES];   /* expected of each */
-	uint16_t wkc_expected;      /* sum, with every slave in SAFE-OP or OP */
-	uint16_t dc_reference;      /* station address of the reference clock; 0: no DC */
+	uint16_t chunk_wkc[LIMIT_FRAMES]; /* expected of each */
+	uint16_t wkc_expected;            /* sum, with every slave in SAFE-OP or OP */
+	uint16_t dc_reference;            /* station address of the reference clock; 0: no DC */
 	uint16_t slave_count;
-	int monitor;                /* 1: BRD of AL status and DC difference */
+	int monitor; /* 1: BRD of AL status and DC difference */
 };
 
 struct exchange_result {
 	enum exchange_status status;
 	uint16_t wkc;
 	uint16_t wkc_expected;
-	int64_t dc_time_ns;    /* system time of the reference at this frame; 0: no (believable) answer */
-	uint16_t al_status;    /* all slaves' AL status ORed: exactly AL_OP only if all are in OP */
-	uint16_t al_wkc;       /* how many answered; 0 without monitor */
-	int64_t dc_diff_ns;    /* all slaves' |0x092C| ORed: an upper estimate; -1: not read */
-	mono_t sent;           /* when the first frame was handed to the NIC */
-	span_t round_trip;     /* first frame out to last frame back; -1 ns: not back */
-	unsigned late;         /* frames of earlier cycles thrown away in this one */
-	unsigned late_by;      /* cycles, of the latest of them */
+	int64_t dc_time_ns; /* system time of the reference at this frame; 0: no (believable) answer
+			     */
+	uint16_t al_status; /* all slaves' AL status ORed: exactly AL_OP only if all are in OP */
+	uint16_t al_wkc;    /* how many answered; 0 without monitor */
+	int64_t dc_diff_ns; /* all slaves' |0x092C| ORed: an upper estimate; -1: not read */
+	mono_t sent;        /* when the first frame was handed to the NIC */
+	span_t round_trip;  /* first frame out to last frame back; -1 ns: not back */
+	unsigned late;      /* frames of earlier cycles thrown away in this one */
+	unsigned late_by;   /* cycles, of the latest of them */
 	unsigned doubled;
 	unsigned foreign;
-	int send_error;        /* 0 or -errno of the transport */
+	int send_error; /* 0 or -errno of the transport */
 };
 
 struct exchange;
@@ -61,12 +62,14 @@ int exchange_create(const struct exchange_plan *plan, struct line *line,
 void exchange_destroy(struct exchange *ex);
 
 /**
- * Send the outputs (first output_bytes of @image), take back the inputs (the rest of @image, touched only
- * with EXCHANGE_OK) until @deadline. Answers to service frames met on the way are handed over. Context: cycle thread.
+ * Send the outputs (first output_bytes of @image), take back the inputs (the rest of @image,
+ * touched only with EXCHANGE_OK) until @deadline. Answers to service frames met on the way are
+ * handed over. Context: cycle thread.
  */
 struct exchange_result exchange_run(struct exchange *ex, uint8_t *image, mono_t deadline);
 
-/** Send a waiting service frame, if there is one, and look for its answer until @deadline. Context: cycle thread. 1 if one was sent. */
+/** Send a waiting service frame, if there is one, and look for its answer until @deadline. Context:
+ * cycle thread. 1 if one was sent. */
 int exchange_ride(struct exchange *ex, mono_t deadline);
 
 #endif

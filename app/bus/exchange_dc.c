@@ -34,7 +34,8 @@ static int has_reference_answered(const struct dc_track *track, uint8_t cmd, uin
 	return cmd == ECAT_CMD_FPRD || wkc >= track->wkc_full || time_ns != track->sent_ns;
 }
 
-int64_t dc_track_answer(struct dc_track *track, uint8_t cmd, uint16_t wkc, int64_t time_ns, mono_t sent)
+int64_t dc_track_answer(struct dc_track *track, uint8_t cmd, uint16_t wkc, int64_t time_ns,
+			mono_t sent)
 {
 	int64_t off_ns = time_ns - predict(track, sent);
 

@@ -53,7 +53,8 @@ uint32_t exchange_frame_capacity(const struct exchange_plan *plan, unsigned numb
 static size_t add(struct exchange_frame *ef, struct ecat_frame_builder *fb, enum ecat_cmd cmd,
 		  uint32_t address, uint16_t data_len)
 {
-	uint8_t *data = ecat_frame_add(fb, cmd, 0, (uint16_t)address, (uint16_t)(address >> 16), data_len);
+	uint8_t *data =
+		ecat_frame_add(fb, cmd, 0, (uint16_t)address, (uint16_t)(address >> 16), data_len);
 
 	if (data == NULL) {
 		return 0;
@@ -67,7 +68,8 @@ static uint32_t register_address(uint16_t station, uint16_t reg)
 	return (uint32_t)reg << 16 | station;
 }
 
-int exchange_frame_build(const struct exchange_plan *plan, unsigned number, struct exchange_frame *ret)
+int exchange_frame_build(const struct exchange_plan *plan, unsigned number,
+			 struct exchange_frame *ret)
 {
 	struct ecat_frame_builder fb;
 	uint32_t image_len = number < plan->chunk_count ? plan->chunk_bytes[number] : 0;
@@ -93,8 +95,9 @@ int exchange_frame_build(const struct exchange_plan *plan, unsigned number, stru
 	if (has_monitor(plan, number)) {
 		ret->al = add(ret, &fb, ECAT_CMD_BRD, register_address(0, ESC_REG_AL_STATUS),
 			      EXCHANGE_AL_BYTES);
-		ret->diff = add(ret, &fb, ECAT_CMD_BRD, register_address(0, ESC_REG_DC_SYSTEM_TIME_DIFF),
-				EXCHANGE_DIFF_BYTES);
+		ret->diff =
+			add(ret, &fb, ECAT_CMD_BRD,
+			    register_address(0, ESC_REG_DC_SYSTEM_TIME_DIFF), EXCHANGE_DIFF_BYTES);
 	}
 	while (ret->datagram_count < 2) {
 		add(ret, &fb, ECAT_CMD_NOP, 0, EXCHANGE_NOP_BYTES);
@@ -109,7 +112,8 @@ void exchange_frame_number(struct exchange_frame *ef, uint16_t sequence)
 	ef->bytes[ef->datagram[1] + 1] = (uint8_t)(sequence >> 8);
 }
 
-/* The reference is read by FRMW in one cycle and by FPRD in another; an older frame may have either. */
+/* The reference is read by FRMW in one cycle and by FPRD in another; an older frame may have
+ * either. */
 static int is_dc_command(uint8_t cmd)
 {
 	return cmd == ECAT_CMD_FRMW || cmd == ECAT_CMD_FPRD;

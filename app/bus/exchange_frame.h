@@ -21,7 +21,8 @@ enum {
 	EXCHANGE_DATAGRAMS = 4, /* in one frame */
 };
 
-/* Offsets in bytes of a datagram's header from the frame's first byte; 0: it has none of that kind. */
+/* Offsets in bytes of a datagram's header from the frame's first byte; 0: it has none of that kind.
+ */
 struct exchange_frame {
 	uint8_t bytes[LIMIT_FRAME_BYTES];
 	size_t len;
@@ -30,16 +31,17 @@ struct exchange_frame {
 	size_t image;          /* LRW */
 	uint32_t image_offset; /* of its data in the process image */
 	uint32_t image_len;
-	size_t dc;             /* FRMW or FPRD of 0x0910 */
-	size_t al;             /* BRD of 0x0130 */
-	size_t diff;           /* BRD of 0x092C */
+	size_t dc;   /* FRMW or FPRD of 0x0910 */
+	size_t al;   /* BRD of 0x0130 */
+	size_t diff; /* BRD of 0x092C */
 };
 
 /** How many process data bytes fit into frame @number of @plan. */
 uint32_t exchange_frame_capacity(const struct exchange_plan *plan, unsigned number);
 
 /** Build frame @number. 0, or -E2BIG if the plan's chunk does not fit. */
-int exchange_frame_build(const struct exchange_plan *plan, unsigned number, struct exchange_frame *ret);
+int exchange_frame_build(const struct exchange_plan *plan, unsigned number,
+			 struct exchange_frame *ret);
 
 /** The exchange sequence goes low byte first into the index bytes of the first two datagrams. */
 void exchange_frame_number(struct exchange_frame *ef, uint16_t sequence);

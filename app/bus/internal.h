@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What the files of bus/ share: the bus, its slaves, and the way to say what went wrong. Positions are
- * 0-based everywhere but in SOEM's calls, which take soem_index(pos). Context: service thread.
+ * What the files of bus/ share: the bus, its slaves, and the way to say what went wrong. Positions
+ * are 0-based everywhere but in SOEM's calls, which take soem_index(pos). Context: service thread.
  */
 #ifndef BUS_INTERNAL_H
 #define BUS_INTERNAL_H
@@ -34,14 +34,14 @@ enum {
 /* Way of a slave back to the bus (bus/recover.c); one step a call. */
 enum recovery_step {
 	RECOVERY_NONE,
-	RECOVERY_BACK,      /* answers again: see what it has become */
-	RECOVERY_FIND,      /* not answering: look whether its place is taken again */
-	RECOVERY_IDENTIFY,  /* something answers there: is it the same slave? */
+	RECOVERY_BACK,     /* answers again: see what it has become */
+	RECOVERY_FIND,     /* not answering: look whether its place is taken again */
+	RECOVERY_IDENTIFY, /* something answers there: is it the same slave? */
 	RECOVERY_INIT,
 	RECOVERY_PREOP,
-	RECOVERY_SETUP,     /* start-up SDOs, SM, FMMU, watchdog */
-	RECOVERY_CLOCK,     /* offset, delay, filters */
-	RECOVERY_SETTLE,    /* wait for 0x092C */
+	RECOVERY_SETUP,  /* start-up SDOs, SM, FMMU, watchdog */
+	RECOVERY_CLOCK,  /* offset, delay, filters */
+	RECOVERY_SETTLE, /* wait for 0x092C */
 	RECOVERY_SYNC0,
 	RECOVERY_SAFEOP,
 	RECOVERY_OP,
@@ -49,22 +49,22 @@ enum recovery_step {
 
 struct bus_slave {
 	struct slave_info info;
-	struct dc_node clock;       /* ports, receive times, parent, delay */
+	struct dc_node clock; /* ports, receive times, parent, delay */
 	uint16_t esc_features;
 	uint8_t is_clock_64bit;
-	uint16_t assign_activate;   /* low byte 0x0980, high byte 0x0981; 0: no SYNC0 */
+	uint16_t assign_activate; /* low byte 0x0980, high byte 0x0981; 0: no SYNC0 */
 	int64_t sync0_shift_ns;
-	size_t pdo_first;           /* its entries in bus->pdo */
+	size_t pdo_first; /* its entries in bus->pdo */
 	size_t pdo_count;
 	enum config_mode mode;
-	uint8_t *sii;               /* in bus->sii; shared by slaves of one type and revision */
+	uint8_t *sii; /* in bus->sii; shared by slaves of one type and revision */
 	size_t sii_len;
 	/* bus/watch.c */
-	uint16_t al_status;         /* as last seen */
-	unsigned misses;            /* looks in a row without an answer */
+	uint16_t al_status; /* as last seen */
+	unsigned misses;    /* looks in a row without an answer */
 	int is_lost;
-	int is_clock_set;           /* offset and delay are in place since its last power-up */
-	unsigned good_looks;        /* at 0x092C, in a row */
+	int is_clock_set;    /* offset and delay are in place since its last power-up */
+	unsigned good_looks; /* at 0x092C, in a row */
 	enum recovery_step step;
 	mono_t step_deadline;
 	mono_t retry_at;
@@ -73,8 +73,8 @@ struct bus_slave {
 struct bus {
 	const struct config *cfg;
 	struct line *line;
-	char *error;                /* of the public call that runs */
-	uint8_t sequence;           /* index byte of our own frames */
+	char *error;      /* of the public call that runs */
+	uint8_t sequence; /* index byte of our own frames */
 	struct bus_slave slave[LIMIT_SLAVES];
 	size_t slave_count;
 	struct slave_info info[LIMIT_SLAVES]; /* what bus_slaves() shows */
@@ -84,12 +84,12 @@ struct bus {
 	struct channel channel[LIMIT_CHANNELS];
 	size_t channel_count;
 	struct exchange_plan plan;
-	int reference;              /* position of the reference clock; -1: none */
-	int64_t reference_ns;       /* its time as last read, and when */
+	int reference;        /* position of the reference clock; -1: none */
+	int64_t reference_ns; /* its time as last read, and when */
 	mono_t reference_at;
-	int64_t sync0_start_ns;     /* common grid; 0: SYNC0 was not started */
-	enum al_state target;       /* newest state asked for */
-	size_t next_recovery;       /* whose turn it is first */
+	int64_t sync0_start_ns; /* common grid; 0: SYNC0 was not started */
+	enum al_state target;   /* newest state asked for */
+	size_t next_recovery;   /* whose turn it is first */
 	/* SOEM */
 	ecx_contextt context;
 	ecx_portt port;
@@ -107,7 +107,7 @@ struct bus {
 	ec_PDOdesct pdo_description;
 	ec_eepromSMt sii_sm;
 	ec_eepromFMMUt sii_fmmu;
-	struct sii parsed;          /* the SII looked at last */
+	struct sii parsed; /* the SII looked at last */
 	ec_ODlistt od_list;
 	ec_OElistt od_entries;
 };
@@ -125,14 +125,16 @@ static inline int is_piccolo(const struct slave_info *info)
 mono_t bus_now(const struct bus *bus);
 
 /** Write one line to the caller's error buffer. Returns @code. */
-int bus_fail(struct bus *bus, int code, const char *format, ...) __attribute__((format(printf, 3, 4)));
+int bus_fail(struct bus *bus, int code, const char *format, ...)
+	__attribute__((format(printf, 3, 4)));
 /** "slave 1 (piccolo1): " and the line. Returns @code. */
 int bus_fail_slave(struct bus *bus, size_t pos, int code, const char *format, ...)
 	__attribute__((format(printf, 4, 5)));
 
 /* --- sii_read.c --- */
 
-/** Read the SII of a slave to its sii, sii_len: the categories that matter, the rest zero. 0 or -EIO. */
+/** Read the SII of a slave to its sii, sii_len: the categories that matter, the rest zero. 0 or
+ * -EIO. */
 int bus_sii_load(struct bus *bus, size_t pos);
 /** Its mapped entries, outputs first; how many, or -errno with a line. */
 int bus_sii_entries(struct bus *bus, size_t pos, struct pdo_entry *ret, size_t capacity);
@@ -144,7 +146,8 @@ void bus_publish_slaves(struct bus *bus);
 
 /* --- coe_map.c --- */
 
-/** Read SM types, PDO assignment and mapping by CoE. Entries found, 0 if there are no such objects, -errno with a line. */
+/** Read SM types, PDO assignment and mapping by CoE. Entries found, 0 if there are no such objects,
+ * -errno with a line. */
 int bus_coe_entries(struct bus *bus, size_t pos, struct pdo_entry *ret, size_t capacity);
 /** Give entries without name or type what the object dictionary says (SDO information). */
 void bus_coe_names(struct bus *bus, size_t pos, struct pdo_entry *entry, size_t count);
@@ -153,15 +156,16 @@ void bus_coe_names(struct bus *bus, size_t pos, struct pdo_entry *entry, size_t 
 
 int bus_has_coe(const struct bus *bus, size_t pos);
 /** A little-endian value of 1 to 8 bytes; @ret_abort as bus_sdo_read(). */
-int bus_sdo_value(struct bus *bus, size_t pos, uint16_t index, uint8_t subindex, uint64_t *ret_value,
-		  uint32_t *ret_abort);
+int bus_sdo_value(struct bus *bus, size_t pos, uint16_t index, uint8_t subindex,
+		  uint64_t *ret_value, uint32_t *ret_abort);
 /** Mode and configured start-up SDOs of one slave, in PRE-OP. */
 int bus_startup_sdos(struct bus *bus, size_t pos);
 const char *bus_abort_text(uint32_t abort);
 
 /* --- map_sm.c --- */
 
-/** Tell SOEM the SyncManagers and bits of a slave's entries; *total_bytes counts the image. 0 or -errno with a line. */
+/** Tell SOEM the SyncManagers and bits of a slave's entries; *total_bytes counts the image. 0 or
+ * -errno with a line. */
 int bus_map_sm(struct bus *bus, size_t pos, uint32_t *total_bytes);
 
 /* --- map.c --- */
@@ -169,7 +173,10 @@ int bus_map_sm(struct bus *bus, size_t pos, uint32_t *total_bytes);
 /** SM, FMMU and watchdog of one slave, again, as bus_map() left them. */
 int bus_restore_mapping(struct bus *bus, size_t pos);
 
-/* --- dc.c --- */
+/* --- dc.c, dc_restore.c --- */
+
+/** Offset, delay (0 on the reference) and filters of one slave. 0 or -errno, without a line. */
+int bus_clock_write(struct bus *bus, size_t pos, int64_t offset_ns);
 
 /** Time of the reference clock now, by FPRD. */
 int bus_reference_time(struct bus *bus, int64_t *ret_ns);
@@ -184,7 +191,8 @@ int64_t bus_clock_diff(struct bus *bus, size_t pos);
 int bus_sync0_is_wanted(const struct bus *bus, size_t pos);
 /** Program and start SYNC0 of one slave. 0 or -errno, without a line. */
 int bus_sync0_program(struct bus *bus, size_t pos, int64_t start_ns);
-/** SYNC unit of a slave that lost it: into the grid of the others, or back to its own controller. */
+/** SYNC unit of a slave that lost it: into the grid of the others, or back to its own controller.
+ */
 int bus_sync0_restore(struct bus *bus, size_t pos);
 /** 1 if SYNC0 of the slave fires on the grid; 0 if not; -errno. */
 int bus_sync0_is_running(struct bus *bus, size_t pos);

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * SDO transfers on SOEM's mailbox. A mailbox write is sent once only (link/nicdrv.c), so a lost one is mended
- * here: the whole transfer is tried again with a new counter, after the mailbox has been emptied (T42).
+ * SDO transfers on SOEM's mailbox. A mailbox write is sent once only (link/nicdrv.c), so a lost one
+ * is mended here: the whole transfer is tried again with a new counter, after the mailbox has been
+ * emptied (T42).
  */
 #include <errno.h>
 #include <inttypes.h>
@@ -26,7 +27,8 @@ const char *bus_abort_text(uint32_t abort)
 	return ec_sdoerror2string(abort);
 }
 
-/* What SOEM noted about the transfer that failed: -EREMOTEIO abort, -EMSGSIZE, -ETIMEDOUT nothing. */
+/* What SOEM noted about the transfer that failed: -EREMOTEIO abort, -EMSGSIZE, -ETIMEDOUT nothing.
+ */
 static int take_errors(struct bus *bus, uint16_t index, uint32_t *ret_abort)
 {
 	int result = -ETIMEDOUT;
@@ -99,8 +101,8 @@ int bus_sdo_write(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t s
 	r = -ETIMEDOUT;
 	take_errors(bus, index, &abort);
 	for (int i = 0; i < TRIES && r == -ETIMEDOUT; i++) {
-		if (ecx_SDOwrite(&bus->context, soem_index(slave_pos), index, subindex, FALSE, (int)len,
-				 data, patience_us(bus, slave_pos)) > 0) {
+		if (ecx_SDOwrite(&bus->context, soem_index(slave_pos), index, subindex, FALSE,
+				 (int)len, data, patience_us(bus, slave_pos)) > 0) {
 			return 0;
 		}
 		r = take_errors(bus, index, ret_abort);
@@ -108,8 +110,8 @@ int bus_sdo_write(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t s
 	return r;
 }
 
-int bus_sdo_value(struct bus *bus, size_t pos, uint16_t index, uint8_t subindex, uint64_t *ret_value,
-		  uint32_t *ret_abort)
+int bus_sdo_value(struct bus *bus, size_t pos, uint16_t index, uint8_t subindex,
+		  uint64_t *ret_value, uint32_t *ret_abort)
 {
 	uint8_t data[8] = { 0 };
 	size_t len = sizeof(data);
@@ -135,15 +137,17 @@ static int write_startup(struct bus *bus, size_t pos, const struct config_sdo *s
 	r = bus_sdo_write(bus, (uint16_t)pos, sdo->index, sdo->subindex, data, sdo->bytes, &abort);
 	if (r == -EREMOTEIO) {
 		return bus_fail_slave(bus, pos, -EPROTO,
-				      "start-up SDO 0x%04x:%02x = 0x%" PRIx64 " (%s:%d) is refused: abort "
+				      "start-up SDO 0x%04x:%02x = 0x%" PRIx64
+				      " (%s:%d) is refused: abort "
 				      "0x%08x, %s",
-				      sdo->index, sdo->subindex, sdo->value, bus->cfg->path, sdo->line,
-				      abort, bus_abort_text(abort));
+				      sdo->index, sdo->subindex, sdo->value, bus->cfg->path,
+				      sdo->line, abort, bus_abort_text(abort));
 	}
 	if (r < 0) {
-		return bus_fail_slave(bus, pos, r, "start-up SDO 0x%04x:%02x (%s:%d): %s", sdo->index,
-				      sdo->subindex, bus->cfg->path, sdo->line,
-				      r == -ENOTSUP ? "the slave has no CoE mailbox" : strerror(-r));
+		return bus_fail_slave(bus, pos, r, "start-up SDO 0x%04x:%02x (%s:%d): %s",
+				      sdo->index, sdo->subindex, bus->cfg->path, sdo->line,
+				      r == -ENOTSUP ? "the slave has no CoE mailbox"
+						    : strerror(-r));
 	}
 	return 0;
 }
@@ -163,10 +167,11 @@ static int write_mode(struct bus *bus, size_t pos)
 		return 0;
 	}
 	if (!is_piccolo(&sl->info)) {
-		return bus_fail_slave(bus, pos, -ENOTSUP,
-				      "mode is an option of the FB1111-Piccolo; this is vendor 0x%08x "
-				      "product 0x%08x",
-				      sl->info.vendor, sl->info.product);
+		return bus_fail_slave(
+			bus, pos, -ENOTSUP,
+			"mode is an option of the FB1111-Piccolo; this is vendor 0x%08x "
+			"product 0x%08x",
+			sl->info.vendor, sl->info.product);
 	}
 	return write_startup(bus, pos, &sdo);
 }

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Process data: what each slave maps (CoE, else SII), where SOEM puts it in the image, which channels, datagrams and
- * working counters follow from that. SOEM programs SyncManagers and FMMUs; the mapping is read here, so that a
- * lost mailbox answer is an error and not an empty mapping (T42).
+ * Process data: what each slave maps (CoE, else SII), where SOEM puts it in the image, which
+ * channels, datagrams and working counters follow from that. SOEM programs SyncManagers and FMMUs;
+ * the mapping is read here, so that a lost mailbox answer is an error and not an empty mapping
+ * (T42).
  */
 #include <errno.h>
 #include <inttypes.h>
@@ -19,7 +20,7 @@ enum {
 	SM_TYPE_INPUTS = 4,
 	FMMU_INPUTS = 1,
 	FMMU_OUTPUTS = 2,
-	WATCHDOG_DIVIDER = 0x09c2,  /* (2498 + 2) * 40 ns = 100 us */
+	WATCHDOG_DIVIDER = 0x09c2, /* (2498 + 2) * 40 ns = 100 us */
 	WATCHDOG_UNIT_NS = 100000,
 };
 
@@ -36,9 +37,11 @@ static void borrow_names(struct pdo_entry *entry, size_t count, const struct pdo
 {
 	for (size_t i = 0; i < count; i++) {
 		for (size_t k = 0; k < sii_count && entry[i].index != 0; k++) {
-			if (sii[k].index == entry[i].index && sii[k].subindex == entry[i].subindex) {
+			if (sii[k].index == entry[i].index &&
+			    sii[k].subindex == entry[i].subindex) {
 				memcpy(entry[i].name, sii[k].name, sizeof(entry[i].name));
-				memcpy(entry[i].pdo_name, sii[k].pdo_name, sizeof(entry[i].pdo_name));
+				memcpy(entry[i].pdo_name, sii[k].pdo_name,
+				       sizeof(entry[i].pdo_name));
 				entry[i].data_type = sii[k].data_type;
 				break;
 			}
@@ -96,16 +99,18 @@ static int check_mapped(struct bus *bus, size_t pos)
 
 	if ((soem->Obits > 0 && (out == 0 || out < soem->Obytes)) ||
 	    (soem->Ibits > 0 && (in == 0 || in < soem->Ibytes))) {
-		return bus_fail_slave(bus, pos, -EPROTO,
-				      "%u bits of outputs and %u bits of inputs do not fit into its FMMUs",
-				      soem->Obits, soem->Ibits);
+		return bus_fail_slave(
+			bus, pos, -EPROTO,
+			"%u bits of outputs and %u bits of inputs do not fit into its FMMUs",
+			soem->Obits, soem->Ibits);
 	}
 	return 0;
 }
 
 /* Where the slave's SMs of one direction begin, and the areas they take. */
 static void place_direction(const struct bus *bus, size_t pos, const uint8_t *image, int is_output,
-			    struct channels_place *place, struct plan_area *area, size_t *area_count)
+			    struct channels_place *place, struct plan_area *area,
+			    size_t *area_count)
 {
 	const ec_slavet *soem = &bus->soem_slave[soem_index(pos)];
 	const uint8_t *base = is_output ? soem->outputs : soem->inputs;
@@ -151,7 +156,8 @@ static int build_channels(struct bus *bus, const uint8_t *image, struct plan_are
 		r = channels_add(&sl->info, &bus->pdo[sl->pdo_first], sl->pdo_count, &place,
 				 bus->channel, &bus->channel_count, LIMIT_CHANNELS);
 		if (r < 0) {
-			return bus_fail_slave(bus, i, r, "more channels than LIMIT_CHANNELS (%d) with it",
+			return bus_fail_slave(bus, i, r,
+					      "more channels than LIMIT_CHANNELS (%d) with it",
 					      LIMIT_CHANNELS);
 		}
 	}
@@ -173,13 +179,15 @@ static int build_plan(struct bus *bus, const struct plan_area *area, size_t area
 	};
 	if (plan_chunks(&bus->plan, area, area_count, &blocked) < 0) {
 		if (blocked < 0) {
-			return bus_fail(bus, -E2BIG,
-					"%u bytes of process data need more than LIMIT_FRAMES (%d) frames",
-					bus->plan.image_bytes, LIMIT_FRAMES);
+			return bus_fail(
+				bus, -E2BIG,
+				"%u bytes of process data need more than LIMIT_FRAMES (%d) frames",
+				bus->plan.image_bytes, LIMIT_FRAMES);
 		}
-		return bus_fail_slave(bus, area[blocked].slave_pos, -E2BIG,
-				      "SM%u has %u bytes: more than one frame holds, and it must not be split",
-				      area[blocked].sm, area[blocked].end - area[blocked].start);
+		return bus_fail_slave(
+			bus, area[blocked].slave_pos, -E2BIG,
+			"SM%u has %u bytes: more than one frame holds, and it must not be split",
+			area[blocked].sm, area[blocked].end - area[blocked].start);
 	}
 	bus->plan.dc_reference = 0;
 	return 0;
@@ -187,7 +195,8 @@ static int build_plan(struct bus *bus, const struct plan_area *area, size_t area
 
 /* --- watchdog --- */
 
-/* A slave without the register keeps what it has; one that takes another value than asked is an error (T08). */
+/* A slave without the register keeps what it has; one that takes another value than asked is an
+ * error (T08). */
 static int set_watchdog(struct bus *bus, size_t pos)
 {
 	int64_t time = (bus->cfg->bus_watchdog_ns + WATCHDOG_UNIT_NS - 1) / WATCHDOG_UNIT_NS;
@@ -205,9 +214,10 @@ static int set_watchdog(struct bus *bus, size_t pos)
 		register_write(bus, pos, reg[i], wanted[i], sizeof(wanted[i]));
 		if (register_read(bus, pos, reg[i], got, sizeof(got)) == 0 &&
 		    memcmp(got, wanted[i], sizeof(got)) != 0) {
-			return bus_fail_slave(bus, pos, -EPROTO,
-					      "watchdog register 0x%04x reads 0x%04x after 0x%04x was written",
-					      reg[i], get_le16(got), get_le16(wanted[i]));
+			return bus_fail_slave(
+				bus, pos, -EPROTO,
+				"watchdog register 0x%04x reads 0x%04x after 0x%04x was written",
+				reg[i], get_le16(got), get_le16(wanted[i]));
 		}
 	}
 	return 0;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * SyncManagers from mapped bits: how long each is, whether it fits where the SII puts it, and whether the two
- * descriptions of a fixed mapping agree.
+ * SyncManagers from mapped bits: how long each is, whether it fits where the SII puts it, and
+ * whether the two descriptions of a fixed mapping agree.
  */
 #include <errno.h>
 
@@ -38,7 +38,8 @@ static int sum_bits(struct bus *bus, size_t pos, struct sm_bits *ret)
 		const struct pdo_entry *e = &bus->pdo[sl->pdo_first + i];
 
 		if (ret->is_used[e->sm] && ret->is_output[e->sm] != e->is_output) {
-			return bus_fail_slave(bus, pos, -EPROTO, "SM%u has inputs and outputs", e->sm);
+			return bus_fail_slave(bus, pos, -EPROTO, "SM%u has inputs and outputs",
+					      e->sm);
 		}
 		ret->is_used[e->sm] = 1;
 		ret->is_output[e->sm] = e->is_output;
@@ -52,7 +53,8 @@ static uint32_t sm_room(const ec_smt *sm, uint32_t bytes)
 	return (etohl(sm->SMflags) & SM_MODE_MASK) == SM_MODE_BUFFERED ? bytes * SM_BUFFERS : bytes;
 }
 
-/* Buffers must not run into the next one; digital outputs live below the process RAM and have one buffer. */
+/* Buffers must not run into the next one; digital outputs live below the process RAM and have one
+ * buffer. */
 static int check_room(struct bus *bus, size_t pos, unsigned n, uint32_t bytes)
 {
 	const ec_slavet *soem = &bus->soem_slave[soem_index(pos)];
@@ -63,16 +65,18 @@ static int check_room(struct bus *bus, size_t pos, unsigned n, uint32_t bytes)
 		uint32_t other = etohs(soem->SM[k].StartAddr);
 
 		if (k != n && other > start && other < start + room) {
-			return bus_fail_slave(bus, pos, -EPROTO,
-					      "%u bytes are mapped to SM%u at 0x%04x, which needs %u, but "
-					      "SM%u begins at 0x%04x",
-					      bytes, n, start, room, k, other);
+			return bus_fail_slave(
+				bus, pos, -EPROTO,
+				"%u bytes are mapped to SM%u at 0x%04x, which needs %u, but "
+				"SM%u begins at 0x%04x",
+				bytes, n, start, room, k, other);
 		}
 	}
 	return 0;
 }
 
-/* A slave whose mapping is fixed says twice how long it is: in its SII and in its object dictionary. */
+/* A slave whose mapping is fixed says twice how long it is: in its SII and in its object
+ * dictionary. */
 static int check_fixed(struct bus *bus, size_t pos, unsigned n, uint32_t bytes)
 {
 	const ec_slavet *soem = &bus->soem_slave[soem_index(pos)];
@@ -82,10 +86,11 @@ static int check_fixed(struct bus *bus, size_t pos, unsigned n, uint32_t bytes)
 	if (!bus_has_coe(bus, pos) || is_variable || sii_bytes == 0 || sii_bytes == bytes) {
 		return 0;
 	}
-	return bus_fail_slave(bus, pos, -EPROTO,
-			      "PDO mapping does not fit: %u bytes mapped to SM%u by CoE, but its SII says %u "
-			      "and the mapping is fixed",
-			      bytes, n, sii_bytes);
+	return bus_fail_slave(
+		bus, pos, -EPROTO,
+		"PDO mapping does not fit: %u bytes mapped to SM%u by CoE, but its SII says %u "
+		"and the mapping is fixed",
+		bytes, n, sii_bytes);
 }
 
 static int set_sm(struct bus *bus, size_t pos, unsigned n, const struct sm_bits *sb)
@@ -96,9 +101,10 @@ static int set_sm(struct bus *bus, size_t pos, unsigned n, const struct sm_bits 
 
 	if (bytes > 0) {
 		if (soem->SM[n].StartAddr == 0) {
-			return bus_fail_slave(bus, pos, -EPROTO,
-					      "%u bytes are mapped to SM%u, which its SII does not have",
-					      bytes, n);
+			return bus_fail_slave(
+				bus, pos, -EPROTO,
+				"%u bytes are mapped to SM%u, which its SII does not have", bytes,
+				n);
 		}
 		r = check_fixed(bus, pos, n, bytes);
 		if (r >= 0) {
@@ -140,7 +146,8 @@ int bus_map_sm(struct bus *bus, size_t pos, uint32_t *total_bytes)
 	struct sm_bits sb;
 	int r = sum_bits(bus, pos, &sb);
 
-	for (unsigned n = soem->mbx_l > 0 ? SM_FIRST_BEHIND_MAILBOX : 0; n < EC_MAXSM && r >= 0; n++) {
+	for (unsigned n = soem->mbx_l > 0 ? SM_FIRST_BEHIND_MAILBOX : 0; n < EC_MAXSM && r >= 0;
+	     n++) {
 		r = set_sm(bus, pos, n, &sb);
 	}
 	if (r < 0) {

@@ -58,7 +58,8 @@ void name_slave(const char *device, int is_piccolo, size_t pos, char *ret_name, 
 }
 
 /* How often entry @i's name stands among the names of those that get a channel. */
-static int is_shared(const struct pdo_entry *entry, size_t count, char (*name)[PDO_NAME_BYTES], size_t i)
+static int is_shared(const struct pdo_entry *entry, size_t count, char (*name)[PDO_NAME_BYTES],
+		     size_t i)
 {
 	for (size_t k = 0; k < count; k++) {
 		if (k != i && entry[k].index != 0 && strcmp(name[k], name[i]) == 0) {
@@ -110,7 +111,8 @@ static void name_with_index(const struct pdo_entry *e, char *name)
 
 void name_entries(const struct pdo_entry *entry, size_t count, char (*ret_name)[PDO_NAME_BYTES])
 {
-	void (*const widen[])(const struct pdo_entry *, char *) = { name_with_pdo, name_with_index };
+	void (*const widen[])(const struct pdo_entry *, char *) = { name_with_pdo,
+								    name_with_index };
 	uint8_t shared[PDO_LIMIT];
 
 	for (size_t i = 0; i < count; i++) {

@@ -8,15 +8,18 @@
 #include "base/sample.h"
 #include "bus/pdo.h"
 
-/** Lower case, runs of anything but letters and digits become one underscore; never starts or ends with one. */
+/** Lower case, runs of anything but letters and digits become one underscore; never starts or ends
+ * with one. */
 void name_sanitise(const char *text, char *ret_name, size_t name_bytes);
 
-/** "piccolo0", "el2828_1": the last word of a name like "FB1111-Piccolo", else the first, and the position. */
+/** "piccolo0", "el2828_1": the last word of a name like "FB1111-Piccolo", else the first, and the
+ * position. */
 void name_slave(const char *device, int is_piccolo, size_t pos, char *ret_name, size_t name_bytes);
 
 /**
- * Names of @count entries of one slave, without the slave's name: the entry's own; where several share it, the
- * PDO's in front; where that is not enough, index and subindex behind; at last a number.
+ * Names of @count entries of one slave, without the slave's name: the entry's own; where several
+ * share it, the PDO's in front; where that is not enough, index and subindex behind; at last a
+ * number.
  */
 void name_entries(const struct pdo_entry *entry, size_t count, char (*ret_name)[PDO_NAME_BYTES]);
 

@@ -10,10 +10,10 @@
 enum { PDO_LIMIT = 4096, PDO_NAME_BYTES = 32 };
 
 struct pdo_entry {
-	uint16_t pdo;       /* 0x1600, 0x1A00 */
-	uint16_t index;     /* 0: padding */
+	uint16_t pdo;   /* 0x1600, 0x1A00 */
+	uint16_t index; /* 0: padding */
 	uint8_t subindex;
-	uint8_t sm;         /* SyncManager */
+	uint8_t sm; /* SyncManager */
 	uint8_t bit_len;
 	uint8_t is_output;  /* from the master's side */
 	uint16_t data_type; /* CoE number, 0: not told */

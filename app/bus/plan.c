@@ -7,7 +7,8 @@
 
 enum { WKC_READ = 1, WKC_WRITE = 2 }; /* what one slave adds to an LRW, ETG.1000.4 */
 
-/* The furthest cut in (@from, @to] that splits no area; @from when there is none, *ret_area what is in the way. */
+/* The furthest cut in (@from, @to] that splits no area; @from when there is none, *ret_area what is
+ * in the way. */
 static uint32_t find_cut(const struct plan_area *area, size_t count, uint32_t from, uint32_t to,
 			 int *ret_area)
 {
@@ -28,7 +29,8 @@ static uint32_t find_cut(const struct plan_area *area, size_t count, uint32_t fr
 	return to;
 }
 
-/* LRW adds once for each slave that reads and twice for each that is written, whatever it maps there. */
+/* LRW adds once for each slave that reads and twice for each that is written, whatever it maps
+ * there. */
 static uint16_t expected_wkc(const struct plan_area *area, size_t count, uint32_t from, uint32_t to)
 {
 	uint8_t adds[LIMIT_SLAVES] = { 0 };
@@ -45,7 +47,8 @@ static uint16_t expected_wkc(const struct plan_area *area, size_t count, uint32_
 	return wkc;
 }
 
-int plan_chunks(struct exchange_plan *plan, const struct plan_area *area, size_t count, int *ret_area)
+int plan_chunks(struct exchange_plan *plan, const struct plan_area *area, size_t count,
+		int *ret_area)
 {
 	uint32_t from = 0;
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * From the areas of the process image to LRW datagrams: where to cut, and which working counter to expect.
- * SOEM's own expectation is wrong where slaves share a byte. Pure.
+ * From the areas of the process image to LRW datagrams: where to cut, and which working counter to
+ * expect. SOEM's own expectation is wrong where slaves share a byte. Pure.
  */
 #ifndef BUS_PLAN_H
 #define BUS_PLAN_H
@@ -13,8 +13,8 @@
 
 /* One SyncManager's buffer in the process image. */
 struct plan_area {
-	uint32_t start;   /* byte */
-	uint32_t end;     /* one past */
+	uint32_t start; /* byte */
+	uint32_t end;   /* one past */
 	uint16_t slave_pos;
 	uint8_t sm;
 	uint8_t is_output;
@@ -23,9 +23,11 @@ struct plan_area {
 enum { PLAN_AREAS = LIMIT_SLAVES * 8 };
 
 /**
- * Fill chunk_bytes, chunk_count, chunk_wkc and wkc_expected of @plan (the rest is set already). No area is split
- * (T41). 0; -E2BIG with *ret_area the index of an area that fits no frame, or -1 when LIMIT_FRAMES are too few.
+ * Fill chunk_bytes, chunk_count, chunk_wkc and wkc_expected of @plan (the rest is set already). No
+ * area is split (T41). 0; -E2BIG with *ret_area the index of an area that fits no frame, or -1 when
+ * LIMIT_FRAMES are too few.
  */
-int plan_chunks(struct exchange_plan *plan, const struct plan_area *area, size_t count, int *ret_area);
+int plan_chunks(struct exchange_plan *plan, const struct plan_area *area, size_t count,
+		int *ret_area);
 
 #endif

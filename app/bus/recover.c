@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The way of one slave back to OP, a step a call: found again, identified, INIT, PRE-OP, set up, its clock set
- * by those that run, SYNC0 into the common grid, SAFE-OP, OP (T18). Others are not disturbed: every access
- * goes to this slave's address.
+ * The way of one slave back to OP, a step a call: found again, identified, INIT, PRE-OP, set up,
+ * its clock set by those that run, SYNC0 into the common grid, SAFE-OP, OP (T18). Others are not
+ * disturbed: every access goes to this slave's address.
  */
 #include <errno.h>
 
@@ -18,7 +18,8 @@ enum { SII_WORD_VENDOR = 0x08, SII_WORD_PRODUCT = 0x0a, EEPROM_TIMEOUT_US = 2000
 static void enter(struct bus *bus, size_t pos, enum recovery_step step)
 {
 	struct bus_slave *sl = &bus->slave[pos];
-	int64_t patience_ns = step == RECOVERY_SETTLE ? bus->cfg->dc_lock_timeout_ns : STEP_TIMEOUT_NS;
+	int64_t patience_ns =
+		step == RECOVERY_SETTLE ? bus->cfg->dc_lock_timeout_ns : STEP_TIMEOUT_NS;
 
 	sl->step = step;
 	sl->step_deadline = mono_add(bus_now(bus), (span_t){ patience_ns });
@@ -117,8 +118,9 @@ static void identify(struct bus *bus, size_t pos, const struct bus_emit *emit)
 		sl->is_lost = 0;
 		sl->misses = 0;
 		sl->is_clock_set = 0;
-		bus_emit_event(bus, emit,
-			       (struct event){ .id = EVENT_SLAVE_BACK, .slave_pos = (uint16_t)pos });
+		bus_emit_event(
+			bus, emit,
+			(struct event){ .id = EVENT_SLAVE_BACK, .slave_pos = (uint16_t)pos });
 		enter(bus, pos, RECOVERY_INIT);
 		return;
 	}
@@ -279,8 +281,9 @@ static void set_clock(struct bus *bus, size_t pos)
 
 static int is_overdue(const struct bus *bus, const struct bus_slave *sl)
 {
-	return sl->step != RECOVERY_NONE && sl->step != RECOVERY_BACK && sl->step != RECOVERY_FIND &&
-	       sl->step != RECOVERY_IDENTIFY && bus_now(bus).ns >= sl->step_deadline.ns;
+	return sl->step != RECOVERY_NONE && sl->step != RECOVERY_BACK &&
+	       sl->step != RECOVERY_FIND && sl->step != RECOVERY_IDENTIFY &&
+	       bus_now(bus).ns >= sl->step_deadline.ns;
 }
 
 void bus_recover(struct bus *bus, size_t pos, const struct bus_emit *emit)

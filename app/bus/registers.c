@@ -20,8 +20,8 @@ static int is_reading(enum ecat_cmd cmd)
 }
 
 /* As many of @access as fit into one frame. Returns how many. */
-static size_t pack(struct ecat_frame_builder *fb, uint8_t *buf, const struct access *access, size_t count,
-		   uint8_t idx)
+static size_t pack(struct ecat_frame_builder *fb, uint8_t *buf, const struct access *access,
+		   size_t count, uint8_t idx)
 {
 	size_t n;
 

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Registers of slaves, many at a time: accesses are packed into as few frames as possible, and a lost
- * frame is sent again (T42), so only what may be repeated belongs here. Context: service thread.
+ * Registers of slaves, many at a time: accesses are packed into as few frames as possible, and a
+ * lost frame is sent again (T42), so only what may be repeated belongs here. Context: service
+ * thread.
  */
 #ifndef BUS_REGISTERS_H
 #define BUS_REGISTERS_H
@@ -18,14 +19,15 @@ struct access {
 	uint16_t adp;
 	uint16_t reg;
 	uint16_t len;
-	void *data;   /* written from and, for reading commands with a WKC, read into; NULL: zeros */
+	void *data; /* written from and, for reading commands with a WKC, read into; NULL: zeros */
 	uint16_t wkc; /* out */
 };
 
 /** Do all accesses in order. 0, or -errno if a frame did not come back at all. */
 int registers_run(struct bus *bus, struct access *access, size_t count);
 
-/** One register of one slave. 0; -EIO no frame; -ENXIO the slave or the register does not answer. */
+/** One register of one slave. 0; -EIO no frame; -ENXIO the slave or the register does not answer.
+ */
 int register_read(struct bus *bus, size_t pos, uint16_t reg, void *ret_data, uint16_t len);
 int register_write(struct bus *bus, size_t pos, uint16_t reg, const void *data, uint16_t len);
 /** The same register of all slaves. Returns the WKC or -EIO. */

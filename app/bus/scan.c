@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Finds the slaves. SOEM does the work; around it: stop what an earlier master left running (T09), notice
- * blank and unreadable EEPROMs before anything is built on them (T31), bring all to PRE-OP, name them.
+ * Finds the slaves. SOEM does the work; around it: stop what an earlier master left running (T09),
+ * notice blank and unreadable EEPROMs before anything is built on them (T31), bring all to PRE-OP,
+ * name them.
  */
 #include <errno.h>
 #include <stdio.h>
@@ -23,7 +24,8 @@ enum {
 	ASSIGN_ONE_SHOT = 0x0001, /* 0x0980 bit 0: the SYNC unit is the slave's own */
 };
 
-/* SYNC pulses of a master that was killed; a slave whose SYNC unit its PDI owns is freed in free_sync(). */
+/* SYNC pulses of a master that was killed; a slave whose SYNC unit its PDI owns is freed in
+ * free_sync(). */
 static void silence(struct bus *bus)
 {
 	uint8_t off = 0;
@@ -67,12 +69,13 @@ static int find_slaves(struct bus *bus)
 				LIMIT_SLAVES);
 	}
 	if (found <= 0) {
-		return bus_fail(bus, -ENODEV, "no slave answers on %s: %s",
-				bus->cfg->interface[0] != '\0' ? bus->cfg->interface : "the line",
-				tp->is_up != NULL && tp->is_up(tp->ctx) == 0 ?
-					"the link is down (cable, power of the first slave)" :
-					"the link is up; is this the EtherCAT port, is the IN side "
-					"connected?");
+		return bus_fail(
+			bus, -ENODEV, "no slave answers on %s: %s",
+			bus->cfg->interface[0] != '\0' ? bus->cfg->interface : "the line",
+			tp->is_up != NULL && tp->is_up(tp->ctx) == 0
+				? "the link is down (cable, power of the first slave)"
+				: "the link is up; is this the EtherCAT port, is the IN side "
+				  "connected?");
 	}
 	bus->slave_count = (size_t)found;
 	return 0;
@@ -85,19 +88,22 @@ static int check_eeprom(struct bus *bus, size_t pos)
 
 	register_read(bus, pos, ESC_REG_EEPROM_CONTROL, status, sizeof(status));
 	if ((get_le16(status) & EEPROM_NO_ANSWER) != 0) {
-		return bus_fail_slave(bus, pos, -EPROTO, "its EEPROM does not answer (0x0502 is 0x%04x)",
+		return bus_fail_slave(bus, pos, -EPROTO,
+				      "its EEPROM does not answer (0x0502 is 0x%04x)",
 				      get_le16(status));
 	}
 	if (info->vendor == 0 || info->vendor == UINT32_MAX) {
-		return bus_fail_slave(bus, pos, -EPROTO,
-				      "its EEPROM is blank or unreadable (vendor 0x%08x, 0x0502 is 0x%04x): "
-				      "write its SII first",
-				      info->vendor, get_le16(status));
+		return bus_fail_slave(
+			bus, pos, -EPROTO,
+			"its EEPROM is blank or unreadable (vendor 0x%08x, 0x0502 is 0x%04x): "
+			"write its SII first",
+			info->vendor, get_le16(status));
 	}
 	if ((get_le16(status) & (EEPROM_CHECKSUM_ERROR | EEPROM_NOT_LOADED)) != 0) {
-		return bus_fail_slave(bus, pos, -EPROTO,
-				      "its EEPROM is damaged: checksum of words 0 to 7 (0x0502 is 0x%04x)",
-				      get_le16(status));
+		return bus_fail_slave(
+			bus, pos, -EPROTO,
+			"its EEPROM is damaged: checksum of words 0 to 7 (0x0502 is 0x%04x)",
+			get_le16(status));
 	}
 	return 0;
 }
@@ -112,10 +118,12 @@ static void name_device(struct bus *bus, size_t pos)
 	}
 }
 
-/* Configured; else what the slave is: by its kind, by its SII; else SYNC0 for whoever has a clock. */
+/* Configured; else what the slave is: by its kind, by its SII; else SYNC0 for whoever has a clock.
+ */
 static uint16_t choose_assign_activate(const struct bus *bus, size_t pos)
 {
-	const struct config_slave *want = pos < bus->cfg->slave_count ? &bus->cfg->slave[pos] : NULL;
+	const struct config_slave *want =
+		pos < bus->cfg->slave_count ? &bus->cfg->slave[pos] : NULL;
 	const struct bus_slave *sl = &bus->slave[pos];
 
 	if (want != NULL && want->assign_activate != 0) {
@@ -212,7 +220,8 @@ static int check_names(struct bus *bus)
 	for (size_t i = 0; i < bus->slave_count; i++) {
 		for (size_t k = 0; k < i; k++) {
 			if (strcmp(bus->slave[i].info.name, bus->slave[k].info.name) == 0) {
-				return bus_fail_slave(bus, i, -EEXIST, "slave %zu has the same name", k);
+				return bus_fail_slave(bus, i, -EEXIST,
+						      "slave %zu has the same name", k);
 			}
 		}
 	}

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* SII images out of the slaves, through SOEM's EEPROM access and cache; each type of slave is read once. */
+/* SII images out of the slaves, through SOEM's EEPROM access and cache; each type of slave is read
+ * once. */
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
@@ -125,7 +126,7 @@ int bus_sii_entries(struct bus *bus, size_t pos, struct pdo_entry *ret, size_t c
 	if (count >= 0) {
 		count = add_direction(bus, pos, 0, ret, (size_t)count, capacity);
 	}
-	return count >= 0 ? count :
-			    bus_fail_slave(bus, pos, -E2BIG, "more mapped entries than PDO_LIMIT (%d)",
-					   PDO_LIMIT);
+	return count >= 0 ? count
+			  : bus_fail_slave(bus, pos, -E2BIG,
+					   "more mapped entries than PDO_LIMIT (%d)", PDO_LIMIT);
 }

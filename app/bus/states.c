@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * AL states: ask all slaves, wait while the cycle goes on, and say who refused and why. States are never
- * compared by what a broadcast ORs together.
+ * AL states: ask all slaves, wait while the cycle goes on, and say who refused and why. States are
+ * never compared by what a broadcast ORs together.
  */
 #include <errno.h>
 
@@ -27,8 +27,8 @@ static uint16_t code_of(const struct al_reading *al)
 }
 
 /*
- * AL control is a mailbox, too: a slave that has not looked at the last request yet does not take another
- * (WKC 0). Write to those that have not taken @state; @taken says who has.
+ * AL control is a mailbox, too: a slave that has not looked at the last request yet does not take
+ * another (WKC 0). Write to those that have not taken @state; @taken says who has.
  */
 static int write_control(struct bus *bus, enum al_state state, uint8_t *taken)
 {
@@ -113,8 +113,9 @@ static int say_why(struct bus *bus, size_t pos, const struct al_reading *al, enu
 		return bus_fail_slave(bus, pos, -EIO, "does not answer on the way to %s", wanted);
 	}
 	if (has_error(al)) {
-		return bus_fail_slave(bus, pos, -ETIME, "refuses %s and is in %s: AL status code 0x%04x, %s",
-				      wanted, al_state_to_str(status_of(al)), code_of(al),
+		return bus_fail_slave(bus, pos, -ETIME,
+				      "refuses %s and is in %s: AL status code 0x%04x, %s", wanted,
+				      al_state_to_str(status_of(al)), code_of(al),
 				      al_status_code_to_str(code_of(al)));
 	}
 	return bus_fail_slave(bus, pos, -ETIME, "did not reach %s in time and is in %s", wanted,
@@ -174,8 +175,8 @@ static int wait_for(struct bus *bus, enum al_state state, mono_t give_up)
 		}
 		if (bus_now(bus).ns >= give_up.ns) {
 			return r < 0 ? bus_fail(bus, -EIO, "no frame comes back on the way to %s",
-						al_state_to_str((uint16_t)state)) :
-				       say_why(bus, (size_t)culprit, &al[culprit], state);
+						al_state_to_str((uint16_t)state))
+				     : say_why(bus, (size_t)culprit, &al[culprit], state);
 		}
 		poll_pause(bus);
 	}

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * SYNC0 of all slaves on one grid: multiples of the cycle period in DC time, plus each slave's shift. A start that
- * lies in the past never fires; so it is verified in the slave, and tried again (T10).
+ * SYNC0 of all slaves on one grid: multiples of the cycle period in DC time, plus each slave's
+ * shift. A start that lies in the past never fires; so it is verified in the slave, and tried again
+ * (T10).
  */
 #include <errno.h>
 #include <inttypes.h>
@@ -13,7 +14,7 @@
 
 enum {
 	TRIES = 3,
-	FRAMES_PER_SLAVE = 8,      /* service frames to program one slave: a cycle each while riding */
+	FRAMES_PER_SLAVE = 8, /* service frames to program one slave: a cycle each while riding */
 	ACTIVATION_SYNC0 = 0x02,
 	SYNC_UNIT_PDI = 0x01,
 	STATUS_PENDING = 0x01,     /* 0x0984: the first SYNC0 has not fired */
@@ -58,8 +59,8 @@ static int64_t shift_of(const struct bus *bus, size_t pos)
 
 static int64_t next_start(const struct bus *bus, int64_t dc_now_ns, size_t slaves)
 {
-	int64_t earliest_ns = dc_now_ns + MARGIN_NS +
-			      (int64_t)slaves * FRAMES_PER_SLAVE * period_ns(bus);
+	int64_t earliest_ns =
+		dc_now_ns + MARGIN_NS + (int64_t)slaves * FRAMES_PER_SLAVE * period_ns(bus);
 
 	return earliest_ns + period_ns(bus) - mod_floor(earliest_ns, period_ns(bus));
 }
@@ -84,7 +85,8 @@ int bus_sync0_program(struct bus *bus, size_t pos, int64_t start_ns)
 		r = register_write(bus, pos, ESC_REG_DC_CYCLIC_CONTROL, &control, 1);
 	}
 	if (r >= 0) {
-		r = register_write(bus, pos, ESC_REG_DC_START_TIME, start, sl->is_clock_64bit ? 8 : 4);
+		r = register_write(bus, pos, ESC_REG_DC_START_TIME, start,
+				   sl->is_clock_64bit ? 8 : 4);
 	}
 	if (r >= 0) {
 		r = register_write(bus, pos, ESC_REG_DC_SYNC0_CYCLE, cycle, sizeof(cycle));
@@ -119,12 +121,32 @@ int bus_sync0_is_running(struct bus *bus, size_t pos)
 	uint8_t cycle[4] = { 0 };
 	uint16_t station = sl->info.station_addr;
 	struct access access[] = {
-		{ .cmd = ECAT_CMD_FPRD, .adp = station, .reg = ESC_REG_DC_SYSTEM_TIME, .len = time_len, .data = now },
-		{ .cmd = ECAT_CMD_FPRD, .adp = station, .reg = ESC_REG_DC_START_TIME, .len = time_len, .data = next },
-		{ .cmd = ECAT_CMD_FPRD, .adp = station, .reg = ESC_REG_DC_ACTIVATION, .len = 1, .data = &activation },
-		{ .cmd = ECAT_CMD_FPRD, .adp = station, .reg = ESC_REG_DC_SYNC0_CYCLE, .len = 4, .data = cycle },
+		{ .cmd = ECAT_CMD_FPRD,
+		  .adp = station,
+		  .reg = ESC_REG_DC_SYSTEM_TIME,
+		  .len = time_len,
+		  .data = now },
+		{ .cmd = ECAT_CMD_FPRD,
+		  .adp = station,
+		  .reg = ESC_REG_DC_START_TIME,
+		  .len = time_len,
+		  .data = next },
+		{ .cmd = ECAT_CMD_FPRD,
+		  .adp = station,
+		  .reg = ESC_REG_DC_ACTIVATION,
+		  .len = 1,
+		  .data = &activation },
+		{ .cmd = ECAT_CMD_FPRD,
+		  .adp = station,
+		  .reg = ESC_REG_DC_SYNC0_CYCLE,
+		  .len = 4,
+		  .data = cycle },
 		/* Not every controller has it. */
-		{ .cmd = ECAT_CMD_FPRD, .adp = station, .reg = ESC_REG_DC_ACTIVATION_STATUS, .len = 1, .data = &status },
+		{ .cmd = ECAT_CMD_FPRD,
+		  .adp = station,
+		  .reg = ESC_REG_DC_ACTIVATION_STATUS,
+		  .len = 1,
+		  .data = &status },
 	};
 
 	if (registers_run(bus, access, sizeof(access) / sizeof(access[0])) < 0) {
@@ -146,7 +168,8 @@ static int program_all(struct bus *bus, const uint8_t *wanted, int64_t start_ns)
 {
 	for (size_t i = 0; i < bus->slave_count; i++) {
 		if (wanted[i] && bus_sync0_program(bus, i, start_ns) < 0) {
-			return bus_fail_slave(bus, i, -EIO, "its SYNC unit (0x0980) cannot be programmed");
+			return bus_fail_slave(bus, i, -EIO,
+					      "its SYNC unit (0x0980) cannot be programmed");
 		}
 	}
 	return 0;
@@ -186,8 +209,9 @@ static int fail_silent(struct bus *bus, const uint8_t *wanted)
 {
 	for (size_t i = 0; i < bus->slave_count; i++) {
 		if (wanted[i]) {
-			return bus_fail_slave(bus, i, -ETIME,
-					      "SYNC0 does not start (0x0984, 0x0990), tried %d times", TRIES);
+			return bus_fail_slave(
+				bus, i, -ETIME,
+				"SYNC0 does not start (0x0984, 0x0990), tried %d times", TRIES);
 		}
 	}
 	return 0;
@@ -204,7 +228,8 @@ static int give_to_pdi(struct bus *bus)
 		}
 		register_write(bus, i, ESC_REG_DC_ACTIVATION, &off, 1);
 		if (register_write(bus, i, ESC_REG_DC_CYCLIC_CONTROL, &control, 1) < 0) {
-			return bus_fail_slave(bus, i, -EIO, "its SYNC unit (0x0980) cannot be given to it");
+			return bus_fail_slave(bus, i, -EIO,
+					      "its SYNC unit (0x0980) cannot be given to it");
 		}
 	}
 	return 0;

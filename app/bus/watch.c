@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A look at every slave, a few times a second: states, error counters, clock difference. Who needs it is led back. */
+/* A look at every slave, a few times a second: states, error counters, clock difference. Who needs
+ * it is led back. */
 #include <string.h>
 
 #include "base/bytes.h"
@@ -40,7 +41,8 @@ static int look_at_all(struct bus *bus, struct look *look)
 					     look[i].rx_errors },
 			[LOOK_LOST_LINKS] = { ESC_REG_LOST_LINK_COUNTER, sizeof(look->lost_links),
 					      look[i].lost_links },
-			[LOOK_DIFF] = { ESC_REG_DC_SYSTEM_TIME_DIFF, sizeof(look->diff), look[i].diff },
+			[LOOK_DIFF] = { ESC_REG_DC_SYSTEM_TIME_DIFF, sizeof(look->diff),
+					look[i].diff },
 		};
 
 		for (int k = 0; k < LOOKS; k++) {
@@ -70,7 +72,8 @@ void bus_emit_event(struct bus *bus, const struct bus_emit *emit, struct event e
 	emit->call(emit->ctx, &ev);
 }
 
-static void note_state(struct bus *bus, size_t pos, const struct look *look, const struct bus_emit *emit)
+static void note_state(struct bus *bus, size_t pos, const struct look *look,
+		       const struct bus_emit *emit)
 {
 	struct bus_slave *sl = &bus->slave[pos];
 	uint16_t status = get_le16(look->al);
@@ -91,7 +94,8 @@ static void note_presence(struct bus *bus, size_t pos, int is_here, const struct
 
 	if (is_here) {
 		sl->misses = 0;
-		/* One that has just got its address again is not back before it has been identified. */
+		/* One that has just got its address again is not back before it has been
+		 * identified. */
 		if (sl->is_lost && sl->step != RECOVERY_IDENTIFY) {
 			sl->is_lost = 0;
 			sl->step = RECOVERY_BACK;
@@ -105,8 +109,9 @@ static void note_presence(struct bus *bus, size_t pos, int is_here, const struct
 	if (!sl->is_lost && sl->misses >= MISSES_LOST) {
 		sl->is_lost = 1;
 		sl->step = RECOVERY_FIND;
-		bus_emit_event(bus, emit,
-			       (struct event){ .id = EVENT_SLAVE_LOST, .slave_pos = (uint16_t)pos });
+		bus_emit_event(
+			bus, emit,
+			(struct event){ .id = EVENT_SLAVE_LOST, .slave_pos = (uint16_t)pos });
 	}
 }
 
@@ -114,16 +119,19 @@ static void show(const struct bus_slave *sl, const struct look *look, struct sla
 {
 	atomic_store_explicit(&page->is_lost, (uint32_t)sl->is_lost, memory_order_relaxed);
 	if (look->wkc[LOOK_AL] > 0) {
-		atomic_store_explicit(&page->al_state, get_le16(look->al) & (AL_STATE_MASK | AL_ERROR),
+		atomic_store_explicit(&page->al_state,
+				      get_le16(look->al) & (AL_STATE_MASK | AL_ERROR),
 				      memory_order_relaxed);
-		atomic_store_explicit(&page->al_status_code, get_le16(look->al + 4), memory_order_relaxed);
+		atomic_store_explicit(&page->al_status_code, get_le16(look->al + 4),
+				      memory_order_relaxed);
 	} else if (sl->is_lost) {
 		atomic_store_explicit(&page->al_state, AL_NONE, memory_order_relaxed);
 	}
 	for (unsigned i = 0; i < ESC_PORTS; i++) {
 		if (look->wkc[LOOK_RX_ERRORS] > 0) {
 			atomic_store_explicit(&page->rx_errors[i],
-					      (uint32_t)look->rx_errors[2 * i] + look->rx_errors[2 * i + 1],
+					      (uint32_t)look->rx_errors[2 * i] +
+						      look->rx_errors[2 * i + 1],
 					      memory_order_relaxed);
 		}
 		if (look->wkc[LOOK_LOST_LINKS] > 0) {
@@ -131,9 +139,10 @@ static void show(const struct bus_slave *sl, const struct look *look, struct sla
 					      memory_order_relaxed);
 		}
 	}
-	atomic_store_explicit(&page->dc_diff_ns,
-			      look->wkc[LOOK_DIFF] > 0 ? (int32_t)(get_le32(look->diff) & DIFF_MAGNITUDE) : -1,
-			      memory_order_relaxed);
+	atomic_store_explicit(
+		&page->dc_diff_ns,
+		look->wkc[LOOK_DIFF] > 0 ? (int32_t)(get_le32(look->diff) & DIFF_MAGNITUDE) : -1,
+		memory_order_relaxed);
 }
 
 static int is_in_op(const struct bus_slave *sl)

@@ -23,7 +23,8 @@ static void note(struct capture *cap, const uint8_t *frame, size_t frame_len)
 
 	if (need <= cap->limit - cap->used) {
 		cap->used += pcapng_write_packet(cap->bytes + cap->used,
-						 cap->platform.tai_ns(cap->platform.ctx), frame, frame_len);
+						 cap->platform.tai_ns(cap->platform.ctx), frame,
+						 frame_len);
 	} else {
 		cap->limit = cap->used; /* a hole would be worse than an end */
 	}
@@ -37,7 +38,8 @@ static int capture_send(void *ctx, const uint8_t *frame, size_t frame_len)
 	return cap->inner.send(cap->inner.ctx, frame, frame_len);
 }
 
-static int capture_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadline, mono_t *ret_at)
+static int capture_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadline,
+			   mono_t *ret_at)
 {
 	struct capture *cap = ctx;
 	int r = cap->inner.receive(cap->inner.ctx, frame, capacity, deadline, ret_at);
@@ -81,8 +83,8 @@ static void capture_destroy(void *ctx)
 	free(cap);
 }
 
-int capture_create(const char *path, size_t limit_bytes, struct platform platform, struct transport inner,
-		   struct transport *ret_transport)
+int capture_create(const char *path, size_t limit_bytes, struct platform platform,
+		   struct transport inner, struct transport *ret_transport)
 {
 	struct capture *cap;
 

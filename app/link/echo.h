@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Is a received frame the answer to a frame that was sent? Slaves change data, working counters,
- * the IRQ field, the position of broadcast and auto-increment addresses, the circulating bit, and set bit
- * 0x02 in the first octet of the source address; all else comes back as it went. Context: any, RT-safe.
+ * the IRQ field, the position of broadcast and auto-increment addresses, the circulating bit, and
+ * set bit 0x02 in the first octet of the source address; all else comes back as it went. Context:
+ * any, RT-safe.
  */
 #ifndef LINK_ECHO_H
 #define LINK_ECHO_H
@@ -12,7 +13,9 @@
 
 enum echo_index { ECHO_INDEX_SAME, ECHO_INDEX_ANY };
 
-/** 1 if @frame answers @sent (a whole, valid frame) in every datagram; @index says if index bytes count. */
-int echo_matches(const uint8_t *sent, const uint8_t *frame, size_t frame_len, enum echo_index index);
+/** 1 if @frame answers @sent (a whole, valid frame) in every datagram; @index says if index bytes
+ * count. */
+int echo_matches(const uint8_t *sent, const uint8_t *frame, size_t frame_len,
+		 enum echo_index index);
 
 #endif

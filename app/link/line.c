@@ -19,7 +19,8 @@
  */
 enum ride_state { RIDE_FREE, RIDE_WAITING, RIDE_TAKING, RIDE_OUT, RIDE_ANSWERING, RIDE_ANSWERED };
 
-/* A service frame shares the wire with the cycle: it may wait for a few cycles of the longest period. */
+/* A service frame shares the wire with the cycle: it may wait for a few cycles of the longest
+ * period. */
 #define RIDE_PATIENCE_NS (100 * NS_PER_MS)
 
 struct frame_buffer {
@@ -118,7 +119,8 @@ static int transact_direct(struct line *line, const uint8_t *frame, size_t frame
 
 	/* Callers repeat in loops: a NIC that is down costs the same time as a lost frame. */
 	while (error >= 0) {
-		int r = tp->receive(tp->ctx, line->in.bytes, sizeof(line->in.bytes), deadline, NULL);
+		int r = tp->receive(tp->ctx, line->in.bytes, sizeof(line->in.bytes), deadline,
+				    NULL);
 
 		if (r == -EAGAIN) {
 			return -ETIMEDOUT;
@@ -139,15 +141,17 @@ static int transact_direct(struct line *line, const uint8_t *frame, size_t frame
 
 static int move_state(struct line *line, int from, int to)
 {
-	return atomic_compare_exchange_strong_explicit(&line->state, &from, to, memory_order_acq_rel,
-						       memory_order_acquire);
+	return atomic_compare_exchange_strong_explicit(&line->state, &from, to,
+						       memory_order_acq_rel, memory_order_acquire);
 }
 
-/* Take the frame back. 0 if the answer came in that very moment. The cycle's hold lasts one memcpy. */
+/* Take the frame back. 0 if the answer came in that very moment. The cycle's hold lasts one memcpy.
+ */
 static int withdraw(struct line *line)
 {
 	for (;;) {
-		if (move_state(line, RIDE_WAITING, RIDE_FREE) || move_state(line, RIDE_OUT, RIDE_FREE)) {
+		if (move_state(line, RIDE_WAITING, RIDE_FREE) ||
+		    move_state(line, RIDE_OUT, RIDE_FREE)) {
 			return 1;
 		}
 		if (atomic_load_explicit(&line->state, memory_order_acquire) == RIDE_ANSWERED) {

@@ -2,12 +2,12 @@
 /*
  * One EtherCAT line: a transport, and the rule who may use it.
  *
- * Direct: the service thread (SOEM's functions, through nicdrv.c) sends and receives itself; this is
- * so from line_create() until line_ride_begin().
- * Riding: the cycle thread owns the transport. A service frame waits in one slot; the cycle sends it
- * when time is left in its cycle (line_ride_take) and gives the answer back (line_ride_answer).
- * There is one service thread, so one slot is enough; it is handed over with acquire and release,
- * nobody locks, the cycle never waits.
+ * Direct: the service thread (SOEM's functions, through nicdrv.c) sends and receives itself; this
+ * is so from line_create() until line_ride_begin(). Riding: the cycle thread owns the transport. A
+ * service frame waits in one slot; the cycle sends it when time is left in its cycle
+ * (line_ride_take) and gives the answer back (line_ride_answer). There is one service thread, so
+ * one slot is enough; it is handed over with acquire and release, nobody locks, the cycle never
+ * waits.
  */
 #ifndef LINK_LINE_H
 #define LINK_LINE_H
@@ -44,9 +44,10 @@ void line_bind(struct line *line);
 struct line *line_bound(void);
 
 /**
- * Send @frame and wait for its echo (link/echo.h: every command, index, address and length the same).
- * Returns the answer's length, -ETIMEDOUT, -EINVAL for bytes that are no EtherCAT frame, or -errno of
- * the transport. Other frames are thrown away and counted. While riding, @timeout is 100 ms at least.
+ * Send @frame and wait for its echo (link/echo.h: every command, index, address and length the
+ * same). Returns the answer's length, -ETIMEDOUT, -EINVAL for bytes that are no EtherCAT frame, or
+ * -errno of the transport. Other frames are thrown away and counted. While riding, @timeout is 100
+ * ms at least.
  */
 int line_transact(struct line *line, const uint8_t *frame, size_t frame_len, uint8_t *ret_answer,
 		  size_t capacity, span_t timeout);

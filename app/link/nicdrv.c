@@ -90,8 +90,8 @@ int ecx_outframe_red(ecx_portt *port, uint8 idx)
 }
 
 /*
- * A mailbox buffer lies in process RAM; writing it again after the answer was lost would put the same
- * message in twice, or block a full mailbox (T03). Registers may be written again.
+ * A mailbox buffer lies in process RAM; writing it again after the answer was lost would put the
+ * same message in twice, or block a full mailbox (T03). Registers may be written again.
  */
 static int may_be_repeated(const uint8_t *frame)
 {

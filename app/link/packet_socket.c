@@ -51,7 +51,8 @@ static int packet_send(void *ctx, const uint8_t *frame, size_t frame_len)
 	return (size_t)r == frame_len ? 0 : -EIO;
 }
 
-/* One look: a frame's length, -EAGAIN, -errno. Our own outgoing frames and jumbo frames are passed over. */
+/* One look: a frame's length, -EAGAIN, -errno. Our own outgoing frames and jumbo frames are passed
+ * over. */
 static int take_frame(const struct packet_socket *ps, uint8_t *frame, size_t capacity)
 {
 	for (;;) {
@@ -77,7 +78,8 @@ static void sleep_for_frame(const struct packet_socket *ps, int64_t left_ns)
 	ppoll(&pfd, 1, &ts, NULL);
 }
 
-static int packet_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadline, mono_t *ret_at)
+static int packet_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadline,
+			  mono_t *ret_at)
 {
 	const struct packet_socket *ps = ctx;
 
@@ -111,13 +113,16 @@ static int bind_to(int fd, int interface_index)
 		.sll_protocol = htons(ECAT_ETHERTYPE),
 		.sll_ifindex = interface_index,
 	};
-	struct packet_mreq promiscuous = { .mr_ifindex = interface_index, .mr_type = PACKET_MR_PROMISC };
+	struct packet_mreq promiscuous = { .mr_ifindex = interface_index,
+					   .mr_type = PACKET_MR_PROMISC };
 
 	if (bind(fd, (struct sockaddr *)&at, sizeof(at)) < 0) {
 		return -errno;
 	}
-	/* Returned frames carry another source and no destination of ours: some NICs filter them. */
-	if (setsockopt(fd, SOL_PACKET, PACKET_ADD_MEMBERSHIP, &promiscuous, sizeof(promiscuous)) < 0) {
+	/* Returned frames carry another source and no destination of ours: some NICs filter them.
+	 */
+	if (setsockopt(fd, SOL_PACKET, PACKET_ADD_MEMBERSHIP, &promiscuous, sizeof(promiscuous)) <
+	    0) {
 		return -errno;
 	}
 	return 0;
@@ -161,7 +166,8 @@ static void packet_destroy(void *ctx)
 	free(ps);
 }
 
-/* What can fail here costs latency, not function: an older kernel, a driver without it, no CAP_NET_ADMIN. */
+/* What can fail here costs latency, not function: an older kernel, a driver without it, no
+ * CAP_NET_ADMIN. */
 static void tune(int fd)
 {
 	int on = 1;
@@ -186,7 +192,8 @@ static void list_interfaces(char *buf, size_t buf_bytes)
 
 	buf[0] = '\0';
 	for (const struct if_nameindex *i = all; i != NULL && i->if_index != 0; i++) {
-		int r = snprintf(buf + used, buf_bytes - used, "%s%s", used > 0 ? ", " : "", i->if_name);
+		int r = snprintf(buf + used, buf_bytes - used, "%s%s", used > 0 ? ", " : "",
+				 i->if_name);
 
 		if (r < 0 || (size_t)r >= buf_bytes - used) {
 			break;
@@ -205,8 +212,9 @@ static int open_bound(const char *interface, int *ret_fd, char *error, size_t er
 
 	if (index == 0) {
 		list_interfaces(there, sizeof(there));
-		snprintf(error, error_bytes, "interface %s: no such network interface; there are: %s",
-			 interface, there);
+		snprintf(error, error_bytes,
+			 "interface %s: no such network interface; there are: %s", interface,
+			 there);
 		return -ENODEV;
 	}
 	/* Type 0: nothing is received before bind(). */
@@ -215,14 +223,15 @@ static int open_bound(const char *interface, int *ret_fd, char *error, size_t er
 		r = -errno;
 		snprintf(error, error_bytes, "interface %s: %s", interface,
 			 r == -EPERM ? "no permission: raw sockets need root or CAP_NET_RAW "
-				       "(setcap cap_net_raw+ep on the program)" :
-				       strerror(-r));
+				       "(setcap cap_net_raw+ep on the program)"
+				     : strerror(-r));
 		return r;
 	}
 	tune(fd);
 	r = bind_to(fd, (int)index);
 	if (r < 0) {
-		snprintf(error, error_bytes, "interface %s: cannot bind to it: %s", interface, strerror(-r));
+		snprintf(error, error_bytes, "interface %s: cannot bind to it: %s", interface,
+			 strerror(-r));
 		close(fd);
 		return r;
 	}
@@ -243,8 +252,8 @@ static int resolve_wait(enum packet_wait wait)
 	return sysconf(_SC_NPROCESSORS_ONLN) >= SPIN_CPUS_MIN;
 }
 
-int packet_socket_open(const char *interface, enum packet_wait wait, struct transport *ret_transport,
-		       char *error, size_t error_bytes)
+int packet_socket_open(const char *interface, enum packet_wait wait,
+		       struct transport *ret_transport, char *error, size_t error_bytes)
 {
 	struct packet_socket *ps;
 	int fd = -1;
@@ -252,8 +261,8 @@ int packet_socket_open(const char *interface, enum packet_wait wait, struct tran
 
 	error[0] = '\0';
 	if (strlen(interface) >= IF_NAMESIZE || interface[0] == '\0') {
-		snprintf(error, error_bytes, "interface \"%s\": a name has 1 to %d characters", interface,
-			 IF_NAMESIZE - 1);
+		snprintf(error, error_bytes, "interface \"%s\": a name has 1 to %d characters",
+			 interface, IF_NAMESIZE - 1);
 		return -ENODEV;
 	}
 	index = open_bound(interface, &fd, error, error_bytes);
@@ -270,7 +279,8 @@ int packet_socket_open(const char *interface, enum packet_wait wait, struct tran
 	atomic_init(&ps->interface_index, index);
 	memcpy(ps->interface, interface, strlen(interface) + 1);
 	if (carrier(ps) == 0) {
-		snprintf(error, error_bytes, "interface %s: the link is down (cable, slave power, ip link set %s up)",
+		snprintf(error, error_bytes,
+			 "interface %s: the link is down (cable, slave power, ip link set %s up)",
 			 interface, interface);
 	}
 	*ret_transport = (struct transport){

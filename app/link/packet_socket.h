@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A real NIC: a packet socket bound to EtherCAT's type. Receiving never blocks past the caller's deadline:
- * it polls without sleeping (spin), or sleeps in ppoll for the time left. A cable pulled or a NIC taken
- * down costs lost frames only; is_up() binds anew when the interface was removed and came back.
+ * A real NIC: a packet socket bound to EtherCAT's type. Receiving never blocks past the caller's
+ * deadline: it polls without sleeping (spin), or sleeps in ppoll for the time left. A cable pulled
+ * or a NIC taken down costs lost frames only; is_up() binds anew when the interface was removed and
+ * came back.
  */
 #ifndef LINK_PACKET_SOCKET_H
 #define LINK_PACKET_SOCKET_H
@@ -12,7 +13,7 @@
 #include "base/platform.h"
 
 enum packet_wait {
-	PACKET_WAIT_AUTO,  /* spin when more than two CPUs are online, else sleep */
+	PACKET_WAIT_AUTO, /* spin when more than two CPUs are online, else sleep */
 	PACKET_WAIT_SPIN,
 	PACKET_WAIT_SLEEP,
 };
@@ -20,11 +21,11 @@ enum packet_wait {
 enum { PACKET_ERROR_BYTES = 256 };
 
 /**
- * Open @interface. 0; or -errno and one line in @error: -ENODEV no such NIC (it lists those there are),
- * -EPERM (what is missing), another. With 0, @error holds a warning (link down) or is empty.
+ * Open @interface. 0; or -errno and one line in @error: -ENODEV no such NIC (it lists those there
+ * are), -EPERM (what is missing), another. With 0, @error holds a warning (link down) or is empty.
  * Nothing is allocated afterwards. Context: blocking.
  */
-int packet_socket_open(const char *interface, enum packet_wait wait, struct transport *ret_transport,
-		       char *error, size_t error_bytes);
+int packet_socket_open(const char *interface, enum packet_wait wait,
+		       struct transport *ret_transport, char *error, size_t error_bytes);
 
 #endif

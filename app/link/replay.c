@@ -47,7 +47,7 @@ struct replay {
 
 /* --- loading --- */
 
-static int read_file(const char *path, uint8_t **ret_bytes, size_t *ret_len)
+static int file_load(const char *path, uint8_t **ret_bytes, size_t *ret_len)
 {
 	FILE *file = fopen(path, "rb");
 	uint8_t *bytes = NULL;
@@ -57,7 +57,8 @@ static int read_file(const char *path, uint8_t **ret_bytes, size_t *ret_len)
 	if (file == NULL) {
 		return -errno;
 	}
-	if (fseek(file, 0, SEEK_END) == 0 && (len = ftell(file)) >= 0 && fseek(file, 0, SEEK_SET) == 0) {
+	if (fseek(file, 0, SEEK_END) == 0 && (len = ftell(file)) >= 0 &&
+	    fseek(file, 0, SEEK_SET) == 0) {
 		bytes = malloc((size_t)len + 1);
 		r = bytes == NULL ? -ENOMEM : 0;
 		if (r == 0 && fread(bytes, 1, (size_t)len, file) != (size_t)len) {
@@ -74,7 +75,7 @@ static int read_file(const char *path, uint8_t **ret_bytes, size_t *ret_len)
 	return 0;
 }
 
-static int add_shot(struct replay *rp, size_t *capacity, const struct pcapng_packet *packet)
+static int shot_grow(struct replay *rp, size_t *capacity, const struct pcapng_packet *packet)
 {
 	struct shot *grown;
 
@@ -92,7 +93,8 @@ static int add_shot(struct replay *rp, size_t *capacity, const struct pcapng_pac
 		.bytes = packet->bytes,
 		.len = packet->len,
 		.is_sent = rp->shot_count == 0 ||
-			   memcmp(packet->bytes + SOURCE, rp->shot[0].bytes + SOURCE, SOURCE_BYTES) == 0,
+			   memcmp(packet->bytes + SOURCE, rp->shot[0].bytes + SOURCE,
+				  SOURCE_BYTES) == 0,
 	};
 	rp->sent_count += rp->shot[rp->shot_count].is_sent ? 1 : 0;
 	rp->shot_count++;
@@ -107,8 +109,9 @@ static int load(struct replay *rp, size_t len)
 	int r = pcapng_open(&file, rp->file, len);
 
 	while (r >= 0 && (r = pcapng_next(&file, &packet)) == 1) {
-		if (ecat_frame_is_valid(packet.bytes, packet.len) && packet.len <= LIMIT_FRAME_BYTES) {
-			r = add_shot(rp, &capacity, &packet);
+		if (ecat_frame_is_valid(packet.bytes, packet.len) &&
+		    packet.len <= LIMIT_FRAME_BYTES) {
+			r = shot_grow(rp, &capacity, &packet);
 		}
 	}
 	return r < 0 ? r : 0;
@@ -119,7 +122,7 @@ int replay_create(const char *path, unsigned mask, struct replay **ret_replay, c
 {
 	struct replay *rp = calloc(1, sizeof(*rp));
 	size_t len = 0;
-	int r = rp == NULL ? -ENOMEM : read_file(path, &rp->file, &len);
+	int r = rp == NULL ? -ENOMEM : file_load(path, &rp->file, &len);
 
 	if (r >= 0) {
 		r = load(rp, len);
@@ -129,9 +132,9 @@ int replay_create(const char *path, unsigned mask, struct replay **ret_replay, c
 	}
 	if (r < 0) {
 		snprintf(error, error_bytes, "capture %s: %s", path,
-			 r == -EBADMSG ? "not a pcapng file, or damaged" :
-			 r == -ENODATA ? "holds no EtherCAT frame" :
-					 strerror(-r));
+			 r == -EBADMSG   ? "not a pcapng file, or damaged"
+			 : r == -ENODATA ? "holds no EtherCAT frame"
+					 : strerror(-r));
 		replay_destroy(rp);
 		return r;
 	}
@@ -161,7 +164,8 @@ static void align(const struct replay *rp, const uint8_t *from, size_t from_len,
 	if ((rp->mask & REPLAY_MASK_SOURCE) != 0) {
 		memcpy(frame + SOURCE, from + SOURCE, SOURCE_BYTES);
 	}
-	while ((rp->mask & REPLAY_MASK_INDEX) != 0 && pos + ECAT_DATAGRAM_HEADER_BYTES <= frame_len &&
+	while ((rp->mask & REPLAY_MASK_INDEX) != 0 &&
+	       pos + ECAT_DATAGRAM_HEADER_BYTES <= frame_len &&
 	       pos + ECAT_DATAGRAM_HEADER_BYTES <= from_len) {
 		uint16_t length_word = get_le16(frame + pos + 6);
 
@@ -193,8 +197,8 @@ static size_t first_difference(const uint8_t *a, const uint8_t *b, size_t len)
 static int refuse(struct replay *rp, const char *why, size_t at)
 {
 	rp->is_broken = 1;
-	snprintf(rp->trouble, sizeof(rp->trouble), "frame %zu of %zu: %s (byte %zu)", rp->matched + 1,
-		 rp->sent_count, why, at);
+	snprintf(rp->trouble, sizeof(rp->trouble), "frame %zu of %zu: %s (byte %zu)",
+		 rp->matched + 1, rp->sent_count, why, at);
 	return -EPROTO;
 }
 
@@ -206,7 +210,8 @@ static size_t next_sent(const struct replay *rp, size_t from)
 	return from;
 }
 
-/* The first answer behind shot @sent that has its commands and addresses, and was not given before. */
+/* The first answer behind shot @sent that has its commands and addresses, and was not given before.
+ */
 static struct shot *find_answer(struct replay *rp, size_t sent)
 {
 	for (size_t i = sent + 1; i < rp->shot_count; i++) {
@@ -259,10 +264,12 @@ static int replay_send(void *ctx, const uint8_t *frame, size_t frame_len)
 	memcpy(wanted, rp->shot[at].bytes, len);
 	align(rp, frame, frame_len, wanted, len);
 	if (meant_bytes(frame) != len) {
-		return refuse(rp, "it has another length than the captured one", ECAT_ETHERNET_BYTES);
+		return refuse(rp, "it has another length than the captured one",
+			      ECAT_ETHERNET_BYTES);
 	}
 	if (memcmp(wanted, frame, len) != 0) {
-		return refuse(rp, "it differs from the captured one", first_difference(wanted, frame, len));
+		return refuse(rp, "it differs from the captured one",
+			      first_difference(wanted, frame, len));
 	}
 	rp->next = at + 1;
 	rp->matched++;
@@ -270,7 +277,8 @@ static int replay_send(void *ctx, const uint8_t *frame, size_t frame_len)
 	return 0;
 }
 
-static int replay_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadline, mono_t *ret_at)
+static int replay_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadline,
+			  mono_t *ret_at)
 {
 	struct replay *rp = ctx;
 	struct answer *a = &rp->queue[0];

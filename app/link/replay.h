@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Captures (pcapng) as a wire. Replay: what the master sends must be, byte for byte, what was sent when the
- * capture was made; the answers come from the capture, on a virtual clock. Capture: a transport that notes what
- * passes through another one.
+ * Captures (pcapng) as a wire. Replay: what the master sends must be, byte for byte, what was sent
+ * when the capture was made; the answers come from the capture, on a virtual clock. Capture: a
+ * transport that notes what passes through another one.
  */
 #ifndef LINK_REPLAY_H
 #define LINK_REPLAY_H
@@ -21,7 +21,8 @@ enum replay_mask {
 	REPLAY_MASK_SOURCE = 1u << 1, /* the master's MAC address */
 };
 
-/** Load @path. 0; or -errno with one line in @error. Free with replay_destroy(). Context: blocking. */
+/** Load @path. 0; or -errno with one line in @error. Free with replay_destroy(). Context: blocking.
+ */
 int replay_create(const char *path, unsigned mask, struct replay **ret_replay, char *error,
 		  size_t error_bytes);
 void replay_destroy(struct replay *rp);
@@ -29,8 +30,8 @@ void replay_destroy(struct replay *rp);
 /** Time that moves with the frames: an answer comes as long after its frame as it did. */
 struct platform replay_platform(struct replay *rp);
 /**
- * Its destroy does nothing: the replay outlives the line. After a frame that is not the captured one, send()
- * returns -EPROTO for good, and replay_trouble() says which.
+ * Its destroy does nothing: the replay outlives the line. After a frame that is not the captured
+ * one, send() returns -EPROTO for good, and replay_trouble() says which.
  */
 struct transport replay_transport(struct replay *rp);
 
@@ -41,10 +42,11 @@ size_t replay_matched(const struct replay *rp);
 const char *replay_trouble(const struct replay *rp);
 
 /**
- * Wrap @inner (taken over): frames go through it and are noted in @limit_bytes of memory, allocated here; the file is
- * written when the transport is destroyed. When the memory is full, noting stops. RT-safe but for destroy.
+ * Wrap @inner (taken over): frames go through it and are noted in @limit_bytes of memory, allocated
+ * here; the file is written when the transport is destroyed. When the memory is full, noting stops.
+ * RT-safe but for destroy.
  */
-int capture_create(const char *path, size_t limit_bytes, struct platform platform, struct transport inner,
-		   struct transport *ret_transport);
+int capture_create(const char *path, size_t limit_bytes, struct platform platform,
+		   struct transport inner, struct transport *ret_transport);
 
 #endif

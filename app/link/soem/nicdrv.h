@@ -10,7 +10,8 @@
 
 struct line;
 
-/* There is no second port: redundancy is not done in SOEM's layer. Its init function needs a type. */
+/* There is no second port: redundancy is not done in SOEM's layer. Its init function needs a type.
+ */
 typedef struct ecx_redport {
 	struct line *line;
 } ecx_redportt;
@@ -23,7 +24,8 @@ typedef struct ecx_port {
 	int txbuflength[EC_MAXBUF];
 	int bufstat[EC_MAXBUF];
 	uint8 lastidx;
-	uint8 sequence; /* the index byte on the wire: 256 long, so that a late answer is told apart */
+	uint8 sequence; /* the index byte on the wire: 256 long, so that a late answer is told apart
+			 */
 	uint64 retries; /* idempotent frames sent again */
 	/* Named by SOEM's redundant init, which ecdaq does not call. */
 	ec_bufT txbuf2;
@@ -45,8 +47,9 @@ int ecx_outframe_red(ecx_portt *port, uint8 idx);
 /** Send once and wait @timeout us: WKC of the last datagram, or EC_NOFRAME. */
 int ecx_waitinframe(ecx_portt *port, uint8 idx, int timeout);
 /**
- * Send and wait. A frame that may be repeated without harm is sent up to three times, waited for 2, 10
- * and 50 ms, whatever @timeout says; a mailbox write is sent exactly once and waited for with the whole
+ * Send and wait. A frame that may be repeated without harm is sent up to three times, waited for 2,
+ * 10 and 50 ms, whatever @timeout says; a mailbox write is sent exactly once and waited for with
+ * the whole
  * @timeout, 50 ms at least.
  */
 int ecx_srconfirm(ecx_portt *port, uint8 idx, int timeout);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Whatever comes back from the wire. The first byte chooses who meets it: the cyclic exchange, a service
- * transaction, or SOEM's SDO transfer through our NIC layer. Then records follow; each is one frame: raw bytes, or
- * the frame sent last, marked by a slave, with some of its bytes changed.
+ * Whatever comes back from the wire. The first byte chooses who meets it: the cyclic exchange, a
+ * service transaction, or SOEM's SDO transfer through our NIC layer. Then records follow; each is
+ * one frame: raw bytes, or the frame sent last, marked by a slave, with some of its bytes changed.
  */
 #include "oshw.h"
 
@@ -17,7 +17,16 @@
 #include "link/line.h"
 #include "wire/datagram.h"
 
-enum { RAW, CHANGED, RECORD_KINDS, MODES = 3, RUNS = 64, SDO_BYTES = 256, IMAGE_BYTES = 64, OUTPUT_BYTES = 20 };
+enum {
+	RAW,
+	CHANGED,
+	RECORD_KINDS,
+	MODES = 3,
+	RUNS = 64,
+	SDO_BYTES = 256,
+	IMAGE_BYTES = 64,
+	OUTPUT_BYTES = 20
+};
 
 struct wire {
 	const uint8_t *data; /* the input */
@@ -105,10 +114,12 @@ static int wire_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadl
 		w->has_answer = 0;
 		len = own_answer(w, frame);
 	} else if (!w->is_answering && w->left > 0) {
-		len = next_byte(w) % RECORD_KINDS == RAW || w->sent_len > capacity ? raw_frame(w, frame, capacity) :
-										      changed_frame(w, frame);
+		len = next_byte(w) % RECORD_KINDS == RAW || w->sent_len > capacity
+			      ? raw_frame(w, frame, capacity)
+			      : changed_frame(w, frame);
 	}
-	w->now_ns = len < 0 ? (deadline.ns > w->now_ns ? deadline.ns : w->now_ns) : w->now_ns + 10000;
+	w->now_ns =
+		len < 0 ? (deadline.ns > w->now_ns ? deadline.ns : w->now_ns) : w->now_ns + 10000;
 	if (ret_at != NULL) {
 		ret_at->ns = w->now_ns;
 	}
@@ -159,7 +170,8 @@ static void meet_exchange(struct wire *w, struct line *line)
 
 		memcpy(before, image, sizeof(image));
 		res = exchange_run(ex, image, (mono_t){ w->now_ns + 400000 });
-		if (memcmp(before, image, res.status == EXCHANGE_OK ? OUTPUT_BYTES : IMAGE_BYTES) != 0) {
+		if (memcmp(before, image, res.status == EXCHANGE_OK ? OUTPUT_BYTES : IMAGE_BYTES) !=
+		    0) {
 			abort();
 		}
 		if (res.status == EXCHANGE_OK && res.wkc != plan.wkc_expected) {
@@ -200,8 +212,12 @@ static void meet_sdo(struct wire *w, struct line *line)
 	int slave_count = 1;
 	boolean has_error = FALSE;
 	ecx_contextt context = {
-		.port = &port, .slavelist = slaves, .slavecount = &slave_count, .maxslave = 2,
-		.elist = &errors, .ecaterror = &has_error,
+		.port = &port,
+		.slavelist = slaves,
+		.slavecount = &slave_count,
+		.maxslave = 2,
+		.elist = &errors,
+		.ecaterror = &has_error,
 	};
 	uint8_t *value = malloc(SDO_BYTES); /* its end is watched */
 	uint8_t out[SDO_BYTES] = { 0 };
@@ -241,7 +257,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 		.now = wire_now, .tai_ns = wire_tai, .sleep_until = wire_sleep, .ctx = &w
 	};
 	struct transport transport = { .send = wire_send, .receive = wire_receive, .ctx = &w };
-	void (*const meet[MODES])(struct wire *, struct line *) = { meet_exchange, meet_transaction, meet_sdo };
+	void (*const meet[MODES])(struct wire *, struct line *) = { meet_exchange, meet_transaction,
+								    meet_sdo };
 	struct line *line;
 
 	if (line_create(platform, transport, &line) < 0) {

@@ -9,7 +9,15 @@
 #include "wire/datagram.h"
 #include "wire/esc_reg.h"
 
-enum { SETTLE_CYCLES = 400, WATCH_CYCLES = 50, TRANSMIT_NS = 4000, SIGMA_NS = 2000, FEATURES_DC = 0x000c, MAILBOX_START = 0x1000, NOBODY = 0x7777 };
+enum {
+	SETTLE_CYCLES = 400,
+	WATCH_CYCLES = 50,
+	TRANSMIT_NS = 4000,
+	SIGMA_NS = 2000,
+	FEATURES_DC = 0x000c,
+	MAILBOX_START = 0x1000,
+	NOBODY = 0x7777
+};
 
 #define TAI_START_NS (INT64_C(1795000000) * NS_PER_S)
 #define DATA_FOLDER "../shared/data/sii"
@@ -23,7 +31,8 @@ static size_t load_sii(const char *name, uint8_t *image, size_t capacity)
 	FILE *file;
 	size_t len;
 
-	snprintf(path, sizeof(path), "%s/%s.bin", dir != NULL ? dir : ECDAQ_SOURCE_DIR "/" DATA_FOLDER, name);
+	snprintf(path, sizeof(path), "%s/%s.bin",
+		 dir != NULL ? dir : ECDAQ_SOURCE_DIR "/" DATA_FOLDER, name);
 	file = fopen(path, "rb");
 	if (file == NULL) {
 		SKIP("no SII images: set ECDAQ_DATA_DIR to their folder");
@@ -58,9 +67,9 @@ static void make_segment(struct bus_bench *b, const struct bench_spec *spec)
 			slaves[i].features = &clockless;
 		}
 		slaves[i].ppm = spec->ppm[i];
-		slaves[i].clock_start_ns = spec->clock_start_ns[i] != 0 ?
-						   spec->clock_start_ns[i] :
-						   prng_below(&prng, UINT64_C(1) << 52);
+		slaves[i].clock_start_ns = spec->clock_start_ns[i] != 0
+						   ? spec->clock_start_ns[i]
+						   : prng_below(&prng, UINT64_C(1) << 52);
 	}
 	CHECK_EQ(segment_create(slaves, n, 0, &b->segment), 0);
 }
@@ -68,8 +77,9 @@ static void make_segment(struct bus_bench *b, const struct bench_spec *spec)
 /* --- the master's transport: the host's, counted --- */
 
 /*
- * A reference that does not answer: its reads go to an address that nobody has, and an FRMW becomes the write that
- * the others would see. It counts the reference itself as one of them, which is taken back on the way in.
+ * A reference that does not answer: its reads go to an address that nobody has, and an FRMW becomes
+ * the write that the others would see. It counts the reference itself as one of them, which is
+ * taken back on the way in.
  */
 static void mute(uint8_t *frame, size_t frame_len)
 {
@@ -77,7 +87,8 @@ static void mute(uint8_t *frame, size_t frame_len)
 	size_t pos = 0;
 
 	while (ecat_frame_next(frame, frame_len, &pos, &dg) == 1) {
-		if (dg.ado == ESC_REG_DC_SYSTEM_TIME && (dg.cmd == ECAT_CMD_FRMW || dg.cmd == ECAT_CMD_FPRD)) {
+		if (dg.ado == ESC_REG_DC_SYSTEM_TIME &&
+		    (dg.cmd == ECAT_CMD_FRMW || dg.cmd == ECAT_CMD_FPRD)) {
 			put_le16(dg.data - 8, NOBODY);
 		}
 	}
@@ -106,7 +117,8 @@ static void unmute(const struct bus_bench *b, uint8_t *frame, size_t frame_len)
 	while (ecat_frame_next(frame, frame_len, &pos, &dg) == 1) {
 		if (dg.adp == NOBODY) {
 			put_le16(dg.data - 8, bus_plan(b->bus)->dc_reference);
-			put_le16(dg.wkc, (uint16_t)(get_le16(dg.wkc) - (dg.cmd == ECAT_CMD_FRMW ? 1 : 0)));
+			put_le16(dg.wkc,
+				 (uint16_t)(get_le16(dg.wkc) - (dg.cmd == ECAT_CMD_FRMW ? 1 : 0)));
 		}
 	}
 }
@@ -117,11 +129,12 @@ static int counted_send(void *ctx, const uint8_t *frame, size_t frame_len)
 
 	b->frames_sent++;
 	b->mailbox_writes += frame[16] == ECAT_CMD_FPWR && get_le16(frame + 20) == MAILBOX_START;
-	return b->is_reference_mute ? muted_send(b, frame, frame_len) :
-				      b->wire.send(b->wire.ctx, frame, frame_len);
+	return b->is_reference_mute ? muted_send(b, frame, frame_len)
+				    : b->wire.send(b->wire.ctx, frame, frame_len);
 }
 
-static int counted_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadline, mono_t *ret_at)
+static int counted_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadline,
+			   mono_t *ret_at)
 {
 	struct bus_bench *b = ctx;
 	int r = b->wire.receive(b->wire.ctx, frame, capacity, deadline, ret_at);
@@ -215,8 +228,8 @@ int64_t bench_now_ns(const struct bus_bench *b)
 void bench_fault(struct bus_bench *b, const char *line)
 {
 	fault_plan_restart(b->faults, bench_now_ns(b));
-	if (fault_plan_add(b->faults, line, segment_slave_count(b->segment), b->error, sizeof(b->error)) <
-	    0) {
+	if (fault_plan_add(b->faults, line, segment_slave_count(b->segment), b->error,
+			   sizeof(b->error)) < 0) {
 		test_fail(__FILE__, __LINE__, "%s", b->error);
 	}
 }
@@ -237,7 +250,8 @@ static void one_cycle(struct bus_bench *b)
 	int64_t period_ns = b->cfg.cycle_period_ns;
 
 	platform.sleep_until(platform.ctx, b->deadline);
-	b->last = exchange_run(b->ex, b->image, mono_add(b->deadline, (span_t){ period_ns * 4 / 10 }));
+	b->last = exchange_run(b->ex, b->image,
+			       mono_add(b->deadline, (span_t){ period_ns * 4 / 10 }));
 	count_result(b);
 	if (b->last.dc_time_ns > 0) {
 		b->phase_error_ns = fold_ns(b->last.dc_time_ns - period_ns / 2, period_ns);

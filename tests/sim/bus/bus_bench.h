@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A bus on a simulated line of slaves, on virtual time, with a cycle of its own: exchange_run() every period,
- * half a period after SYNC0, by a plain proportional correction. No daemon, no ring.
+ * A bus on a simulated line of slaves, on virtual time, with a cycle of its own: exchange_run()
+ * every period, half a period after SYNC0, by a plain proportional correction. No daemon, no ring.
  */
 #ifndef TESTS_SIM_BUS_BUS_BENCH_H
 #define TESTS_SIM_BUS_BUS_BENCH_H
@@ -17,22 +17,22 @@
 enum { BENCH_SIIS = 8 };
 
 struct bench_spec {
-	unsigned piccolos;              /* boards in line, first on the bus */
-	const char *sii[BENCH_SIIS];    /* then SII-only slaves by file name in the data folder */
+	unsigned piccolos;           /* boards in line, first on the bus */
+	const char *sii[BENCH_SIIS]; /* then SII-only slaves by file name in the data folder */
 	double ppm[LIMIT_SLAVES];
 	double host_ppm;
 	uint64_t seed;
-	uint64_t clockless;             /* bit n: slave n has no distributed clock */
-	int64_t tai_start_ns;           /* 0: 2026 */
+	uint64_t clockless;   /* bit n: slave n has no distributed clock */
+	int64_t tai_start_ns; /* 0: 2026 */
 	uint64_t clock_start_ns[LIMIT_SLAVES];
-	const char *const *settings;    /* of config_set(), NULL at the end */
+	const char *const *settings; /* of config_set(), NULL at the end */
 };
 
 struct bus_bench {
 	struct segment *segment;
 	struct in_process *host;
 	struct fault_plan *faults;
-	struct transport wire;          /* of the host; the master's goes through the bench */
+	struct transport wire; /* of the host; the master's goes through the bench */
 	unsigned frames_sent;
 	unsigned mailbox_writes;
 	int is_reference_mute;
@@ -61,15 +61,16 @@ void bench_destroy(struct bus_bench *b);
 void bench_new_master(struct bus_bench *b);
 
 /* Steps; each returns what the bus said. */
-int bench_find(struct bus_bench *b);   /* scan, compare */
-int bench_map(struct bus_bench *b);    /* and map, clocks */
-int bench_cycle(struct bus_bench *b);  /* exchange begins; runs until the loop stands */
-int bench_to_op(struct bus_bench *b);  /* SYNC0, SAFE-OP, OP */
+int bench_find(struct bus_bench *b);  /* scan, compare */
+int bench_map(struct bus_bench *b);   /* and map, clocks */
+int bench_cycle(struct bus_bench *b); /* exchange begins; runs until the loop stands */
+int bench_to_op(struct bus_bench *b); /* SYNC0, SAFE-OP, OP */
 /** All of it; ends the test with the bus's line on failure. */
 void bench_bring_up(struct bus_bench *b);
 /** @count cycles. */
 void bench_run(struct bus_bench *b, unsigned count);
-/** bus_watch() every 50 cycles until all are in OP; cycles it took, or ends the test after @limit. */
+/** bus_watch() every 50 cycles until all are in OP; cycles it took, or ends the test after @limit.
+ */
 unsigned bench_recover(struct bus_bench *b, unsigned limit);
 /** One look. */
 struct bus_watch_report bench_watch(struct bus_bench *b);

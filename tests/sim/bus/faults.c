@@ -11,7 +11,8 @@
 static unsigned frames_of(uint64_t seed)
 {
 	static const char *const settings[] = { "dc.burst_frames=100", NULL };
-	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 2, .seed = seed, .settings = settings });
+	struct bus_bench *b = bench_create(
+		&(struct bench_spec){ .piccolos = 2, .seed = seed, .settings = settings });
 	unsigned frames;
 
 	CHECK_EQ(bench_find(b), 0);
@@ -29,7 +30,8 @@ static void check_loss(const char *action)
 
 	CHECK(frames > 200);
 	for (unsigned n = 1; n <= frames; n++) {
-		struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 2, .seed = 30, .settings = settings });
+		struct bus_bench *b = bench_create(
+			&(struct bench_spec){ .piccolos = 2, .seed = 30, .settings = settings });
 		size_t count;
 		char line[64];
 		int r;
@@ -41,7 +43,8 @@ static void check_loss(const char *action)
 			r = bus_map(b->bus, b->error);
 		}
 		if (r < 0) {
-			test_fail(__FILE__, __LINE__, "frame %u of %u, %s: %d: %s", n, frames, action, r, b->error);
+			test_fail(__FILE__, __LINE__, "frame %u of %u, %s: %d: %s", n, frames,
+				  action, r, b->error);
 		}
 		bus_channels(b->bus, &count);
 		CHECK_EQ(count, 12);
@@ -74,7 +77,8 @@ TEST(faults, any_single_frame_of_scan_and_mapping_may_be_late)
 TEST(faults, one_frame_in_a_hundred_lost_does_not_keep_the_bus_from_op)
 {
 	for (uint64_t seed = 40; seed < 50; seed++) {
-		struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 2, .seed = seed });
+		struct bus_bench *b =
+			bench_create(&(struct bench_spec){ .piccolos = 2, .seed = seed });
 
 		bench_fault(b, "p=0.01 lose");
 		bench_bring_up(b);
@@ -89,7 +93,8 @@ TEST(faults, one_frame_in_a_hundred_lost_does_not_keep_the_bus_from_op)
 TEST(faults, killed_master_leaves_a_bus_that_the_next_one_takes)
 {
 	for (unsigned wait_ms = 0; wait_ms <= 300; wait_ms += 60) {
-		struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 2, .seed = 50 + wait_ms });
+		struct bus_bench *b =
+			bench_create(&(struct bench_spec){ .piccolos = 2, .seed = 50 + wait_ms });
 		struct platform platform = in_process_platform(b->host);
 
 		bench_bring_up(b);
@@ -179,12 +184,14 @@ TEST(faults, sdo_storm_costs_no_cycle)
 TEST(faults, no_watchdog_trips_on_the_way_to_op)
 {
 	for (uint64_t seed = 0; seed < 50; seed++) {
-		struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 2, .seed = 1000 + seed });
+		struct bus_bench *b =
+			bench_create(&(struct bench_spec){ .piccolos = 2, .seed = 1000 + seed });
 
 		bench_bring_up(b);
 		for (unsigned i = 0; i < 2; i++) {
 			CHECK_EQ(segment_esc(b->segment, i)->reg[ESC_REG_WATCHDOG_COUNTER_PD], 0);
-			CHECK_EQ(get_le16(segment_esc(b->segment, i)->reg + ESC_REG_AL_STATUS_CODE), 0);
+			CHECK_EQ(get_le16(segment_esc(b->segment, i)->reg + ESC_REG_AL_STATUS_CODE),
+				 0);
 		}
 		bench_destroy(b);
 	}
@@ -193,13 +200,15 @@ TEST(faults, no_watchdog_trips_on_the_way_to_op)
 TEST(faults, slave_that_refuses_is_named_with_code_and_text)
 {
 	static const char *const settings[] = { "dc.enable=off", NULL };
-	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 2, .seed = 63, .settings = settings });
+	struct bus_bench *b = bench_create(
+		&(struct bench_spec){ .piccolos = 2, .seed = 63, .settings = settings });
 
 	CHECK_EQ(bench_find(b), 0);
 	CHECK_EQ(bench_map(b), 0);
 	CHECK_EQ(bench_cycle(b), 0);
 	CHECK_EQ(bus_request_state(b->bus, AL_SAFEOP, (span_t){ NS_PER_S }, b->error), -ETIME);
-	CHECK_STR(b->error, "slave 0 (piccolo0): refuses SAFE-OP and is in PRE-OP: AL status code 0x0030, "
-			    "invalid DC SYNC configuration");
+	CHECK_STR(b->error,
+		  "slave 0 (piccolo0): refuses SAFE-OP and is in PRE-OP: AL status code 0x0030, "
+		  "invalid DC SYNC configuration");
 	bench_destroy(b);
 }

@@ -38,8 +38,8 @@ static void watch_for(struct bus_bench *b, unsigned looks)
 
 static void power_cycle(unsigned slaves, unsigned victim, uint64_t seed)
 {
-	struct bus_bench *b = bench_create(&(struct bench_spec){
-		.piccolos = slaves, .ppm = { 80, -60, 40 }, .seed = seed });
+	struct bus_bench *b = bench_create(
+		&(struct bench_spec){ .piccolos = slaves, .ppm = { 80, -60, 40 }, .seed = seed });
 	unsigned cycles;
 
 	bench_bring_up(b);
@@ -88,8 +88,8 @@ TEST(recovery, only_slave_is_power_cycled)
 /* T33 */
 static void cut_and_heal(unsigned slaves, unsigned at, unsigned away_looks, uint64_t seed)
 {
-	struct bus_bench *b = bench_create(&(struct bench_spec){
-		.piccolos = slaves, .ppm = { 80, -60, 40 }, .seed = seed });
+	struct bus_bench *b = bench_create(
+		&(struct bench_spec){ .piccolos = slaves, .ppm = { 80, -60, 40 }, .seed = seed });
 
 	bench_bring_up(b);
 	bench_run(b, 100);
@@ -119,7 +119,8 @@ TEST(recovery, cable_is_pulled_and_put_back_at_every_position)
 /* T17: what is cut off keeps its time; the master does not write it. */
 TEST(recovery, clocks_behind_a_lost_reference_do_not_jump)
 {
-	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 3, .ppm = { 50, -50, 20 }, .seed = 90 });
+	struct bus_bench *b = bench_create(
+		&(struct bench_spec){ .piccolos = 3, .ppm = { 50, -50, 20 }, .seed = 90 });
 	int64_t rate_ns;
 	int64_t before_ns;
 	int64_t t_ns;
@@ -132,8 +133,8 @@ TEST(recovery, clocks_behind_a_lost_reference_do_not_jump)
 	bench_mute_reference(b, 1);
 	bench_run(b, 1000);
 	CHECK_EQ(b->last.dc_time_ns, 0);
-	rate_ns = (int64_t)esc_system_time(segment_esc(b->segment, 2), bench_now_ns(b)) - before_ns -
-		  (bench_now_ns(b) - t_ns);
+	rate_ns = (int64_t)esc_system_time(segment_esc(b->segment, 2), bench_now_ns(b)) -
+		  before_ns - (bench_now_ns(b) - t_ns);
 	CHECK(llabs(rate_ns) < 120000);
 	bench_mute_reference(b, 0);
 	bench_run(b, 2000);

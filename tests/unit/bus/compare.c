@@ -7,7 +7,11 @@
 
 static const struct slave_info found[] = {
 	{ .vendor = 2, .product = 0x04570862, .revision = 0x0258008d, .device = "FB1111-Piccolo" },
-	{ .vendor = 2, .product = 0x0b0c3052, .revision = 0x00110000, .alias = 7, .device = "EL2828" },
+	{ .vendor = 2,
+	  .product = 0x0b0c3052,
+	  .revision = 0x00110000,
+	  .alias = 7,
+	  .device = "EL2828" },
 };
 
 static struct config *make_config(size_t slaves)
@@ -46,7 +50,8 @@ TEST(compare, wrong_slave_is_told_with_both_identities)
 
 	cfg->slave[1].product = 0x11;
 	CHECK_EQ(compare_slaves(cfg, found, 2, error, sizeof(error)), -ENXIO);
-	CHECK_STR(error, "slave 1 is another one: expected vendor 0x00000002 product 0x00000011 revision any, "
+	CHECK_STR(error, "slave 1 is another one: expected vendor 0x00000002 product 0x00000011 "
+			 "revision any, "
 			 "found vendor 0x00000002 product 0x0b0c3052 revision 0x00110000 (EL2828)");
 }
 
@@ -73,7 +78,8 @@ TEST(compare, missing_slave_is_told_by_name_and_count)
 	snprintf(cfg->slave[2].name, sizeof(cfg->slave[2].name), "pump");
 	cfg->slave[2].vendor = 0x21;
 	CHECK_EQ(compare_slaves(cfg, found, 2, error, sizeof(error)), -ENXIO);
-	CHECK_STR(error, "slave 2 pump is missing: 2 found, 3 expected; expected vendor 0x00000021 product any "
+	CHECK_STR(error, "slave 2 pump is missing: 2 found, 3 expected; expected vendor 0x00000021 "
+			 "product any "
 			 "revision any");
 }
 
@@ -84,7 +90,8 @@ TEST(compare, one_too_many_is_told_where_exactly_those_listed_are_wanted)
 
 	cfg->bus_presence = CONFIG_EXACT_SLAVES;
 	CHECK_EQ(compare_slaves(cfg, found, 2, error, sizeof(error)), -ENXIO);
-	CHECK_STR(error, "slave 1 is one too many: 2 found, 1 expected; found vendor 0x00000002 product 0x0b0c3052 "
+	CHECK_STR(error, "slave 1 is one too many: 2 found, 1 expected; found vendor 0x00000002 "
+			 "product 0x0b0c3052 "
 			 "revision 0x00110000 (EL2828)");
 	CHECK_EQ(compare_slaves(cfg, found, 1, error, sizeof(error)), 0);
 }

@@ -1,102 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "bus/exchange.h"
 
-#include "harness/test.h"
-#include "unit/link/fake_wire.h"
-#include "wire/al.h"
-
-enum { DC_REF = 0x1001, DEADLINE_NS = 400000, PERIOD_NS = 1000000 };
-
-struct bench {
-	struct fake_wire wire;
-	struct line *line;
-	struct exchange *ex;
-	uint8_t image[LIMIT_IMAGE_BYTES];
-	int64_t dc_offset_ns;
-	uint16_t lrw_wkc;
-	uint16_t dc_wkc;
-	uint8_t input; /* what the slaves write to every input byte */
-	uint32_t output_bytes;
-};
-
-/* Datagrams by command; inputs get bench->input, FRMW the time of the wire plus an offset. */
-static void play_slaves(struct fake_wire *wire, uint8_t *frame, size_t len)
-{
-	struct bench *b = wire->user;
-	struct ecat_datagram dg;
-	size_t pos = 0;
-
-	frame[6] |= 0x02;
-	while (ecat_frame_next(frame, len, &pos, &dg) == 1) {
-		if (dg.cmd == ECAT_CMD_LRW) {
-			uint32_t from = ecat_logical_address(&dg) & 0xffff;
-
-			for (uint32_t i = 0; i < dg.data_len; i++) {
-				if (from + i >= b->output_bytes) {
-					dg.data[i] = b->input;
-				} else {
-					dg.data[i] ^= 0xff; /* must not come back into the image */
-				}
-			}
-			put_le16(dg.wkc, b->lrw_wkc);
-		} else if (dg.cmd == ECAT_CMD_FRMW || dg.cmd == ECAT_CMD_FPRD) {
-			uint16_t wkc = dg.cmd == ECAT_CMD_FPRD && b->dc_wkc > 1 ? 1 : b->dc_wkc;
-
-			if (wkc > 0) {
-				put_le64(dg.data, (uint64_t)(wire->now_ns + b->dc_offset_ns));
-			}
-			put_le16(dg.wkc, wkc);
-		} else if (dg.cmd == ECAT_CMD_BRD) {
-			put_le16(dg.data, dg.ado == 0x0130 ? AL_OP : 253);
-			dg.data[3] |= dg.ado == 0x092c ? 0x80 : 0;
-			put_le16(frame + (dg.data - frame) - 8, 2);
-			put_le16(dg.wkc, 2);
-		}
-	}
-}
-
-static struct exchange_plan small_plan(void)
-{
-	return (struct exchange_plan){
-		.image_bytes = 28,
-		.output_bytes = 12,
-		.chunk_bytes = { 28 },
-		.chunk_count = 1,
-		.chunk_wkc = { 3 },
-		.wkc_expected = 3,
-		.dc_reference = DC_REF,
-		.slave_count = 1,
-	};
-}
-
-static struct bench *bench_create(const struct exchange_plan *plan)
-{
-	struct bench *b = calloc(1, sizeof(*b));
-
-	b->wire.answer = play_slaves;
-	b->wire.user = b;
-	b->lrw_wkc = 3;
-	b->dc_wkc = 1;
-	b->input = 0x5a;
-	b->dc_offset_ns = INT64_C(800000000000000000);
-	b->output_bytes = plan->output_bytes;
-	CHECK_EQ(line_create(fake_platform(&b->wire), fake_transport(&b->wire), &b->line), 0);
-	CHECK_EQ(exchange_create(plan, b->line, &b->ex), 0);
-	return b;
-}
-
-static void bench_destroy(struct bench *b)
-{
-	exchange_destroy(b->ex);
-	line_destroy(b->line);
-	free(b);
-}
-
-static struct exchange_result run(struct bench *b)
-{
-	b->wire.now_ns = (b->wire.now_ns / PERIOD_NS + 1) * PERIOD_NS;
-	return exchange_run(b->ex, b->image, (mono_t){ b->wire.now_ns + DEADLINE_NS });
-}
+#include "unit/bus/exchange_bench.h"
 
 TEST(exchange, frame_of_28_bytes_with_dc_is_76_bytes_long)
 {
@@ -275,16 +180,16 @@ static void check_thrown_away(size_t at, uint8_t flip, int shorten_by)
 TEST(exchange, damaged_frames_are_foreign_and_an_undamaged_one_is_not)
 {
 	check_thrown_away(0, 0, 0);
-	check_thrown_away(6, 0x02, 0);   /* never passed a slave */
-	check_thrown_away(12, 0x01, 0);  /* not EtherCAT */
-	check_thrown_away(14, 0x01, 0);  /* length of the frame */
-	check_thrown_away(16, 0x01, 0);  /* command */
-	check_thrown_away(18, 0x01, 0);  /* logical address */
-	check_thrown_away(22, 0x01, 0);  /* length of the datagram */
-	check_thrown_away(23, 0x80, 0);  /* no more datagrams */
-	check_thrown_away(57, 0x80, 0);  /* sequence out of this world */
-	check_thrown_away(58, 0x01, 0);  /* another reference clock */
-	check_thrown_away(0, 0, 1);      /* cut */
+	check_thrown_away(6, 0x02, 0);  /* never passed a slave */
+	check_thrown_away(12, 0x01, 0); /* not EtherCAT */
+	check_thrown_away(14, 0x01, 0); /* length of the frame */
+	check_thrown_away(16, 0x01, 0); /* command */
+	check_thrown_away(18, 0x01, 0); /* logical address */
+	check_thrown_away(22, 0x01, 0); /* length of the datagram */
+	check_thrown_away(23, 0x80, 0); /* no more datagrams */
+	check_thrown_away(57, 0x80, 0); /* sequence out of this world */
+	check_thrown_away(58, 0x01, 0); /* another reference clock */
+	check_thrown_away(0, 0, 1);     /* cut */
 	check_thrown_away(0, 0, 62);
 }
 
@@ -396,98 +301,6 @@ TEST(exchange, bus_without_process_data_and_clocks_still_has_a_frame)
 	bench_destroy(b);
 }
 
-/* --- the reference clock --- */
-
-static uint8_t dc_command(const struct bench *b)
-{
-	return b->wire.last_sent.bytes[56];
-}
-
-TEST(exchange, frmw_carries_where_the_reference_should_be)
-{
-	struct exchange_plan plan = small_plan();
-	struct bench *b = bench_create(&plan);
-
-	run(b);
-	CHECK_EQ(dc_command(b), ECAT_CMD_FPRD);
-	run(b);
-	CHECK_EQ(dc_command(b), ECAT_CMD_FRMW);
-	CHECK_EQ(get_le64(b->wire.last_sent.bytes + 66), b->dc_offset_ns + 2 * PERIOD_NS);
-	bench_destroy(b);
-}
-
-TEST(exchange, frmw_stops_when_the_reference_is_gone_and_resumes_with_it)
-{
-	struct exchange_plan plan = small_plan();
-	struct bench *b = bench_create(&plan);
-
-	run(b);
-	run(b);
-	b->dc_wkc = 0;
-	CHECK_EQ(run(b).dc_time_ns, 0);
-	CHECK_EQ(run(b).dc_time_ns, 0);
-	CHECK_EQ(dc_command(b), ECAT_CMD_FPRD);
-	b->dc_wkc = 1;
-	CHECK(run(b).dc_time_ns > 0);
-	run(b);
-	CHECK_EQ(dc_command(b), ECAT_CMD_FRMW);
-	bench_destroy(b);
-}
-
-TEST(exchange, reference_that_returns_with_another_time_is_not_passed_on)
-{
-	struct exchange_plan plan = small_plan();
-	struct bench *b = bench_create(&plan);
-
-	run(b);
-	run(b);
-	b->dc_offset_ns = 0; /* power cycled */
-	for (int i = 0; i < 100; i++) {
-		CHECK_EQ(run(b).dc_time_ns, 0);
-	}
-	CHECK_EQ(dc_command(b), ECAT_CMD_FPRD);
-	b->dc_offset_ns = INT64_C(800000000000000000); /* set again by the service */
-	CHECK(run(b).dc_time_ns > 0);
-	bench_destroy(b);
-}
-
-/* Slaves behind the reference still count when it is gone: the payload comes back as it went. */
-static void answer_without_reference(struct fake_wire *wire, uint8_t *frame, size_t len)
-{
-	struct bench *b = wire->user;
-	struct ecat_datagram dg;
-	uint8_t payload[8];
-	size_t pos = 0;
-
-	memcpy(payload, frame + 66, 8);
-	play_slaves(wire, frame, len);
-	while (ecat_frame_next(frame, len, &pos, &dg) == 1) {
-		if (dg.cmd == ECAT_CMD_FRMW) {
-			memcpy(dg.data, payload, 8);
-			put_le16(dg.wkc, (uint16_t)(b->dc_wkc - 1));
-		} else if (dg.cmd == ECAT_CMD_FPRD) {
-			memset(dg.data, 0, 8);
-			put_le16(dg.wkc, 0);
-		}
-	}
-}
-
-TEST(exchange, payload_that_nobody_overwrote_is_no_time)
-{
-	struct exchange_plan plan = small_plan();
-	struct bench *b = bench_create(&plan);
-
-	b->dc_wkc = 3;
-	run(b);
-	run(b);
-	run(b);
-	b->wire.answer = answer_without_reference;
-	CHECK_EQ(run(b).dc_time_ns, 0);
-	run(b);
-	CHECK_EQ(dc_command(b), ECAT_CMD_FPRD);
-	bench_destroy(b);
-}
-
 /* --- service frames --- */
 
 static void cycle_once(void *ctx, mono_t until)
@@ -513,7 +326,8 @@ TEST(exchange, service_frame_rides_along_and_is_not_foreign)
 	ecat_frame_begin(&fb, frame, source);
 	ecat_frame_add(&fb, ECAT_CMD_BRD, 200, 0, 0x0130, 2);
 	len = ecat_frame_end(&fb);
-	CHECK_EQ(line_transact(b->line, frame, len, answer, sizeof(answer), (span_t){ 1000000 }), len);
+	CHECK_EQ(line_transact(b->line, frame, len, answer, sizeof(answer), (span_t){ 1000000 }),
+		 len);
 	CHECK_EQ(answer[17], 200);
 	CHECK_EQ(run(b).foreign, 0);
 	bench_destroy(b);

@@ -18,7 +18,8 @@ TEST(names, text_becomes_lower_snake_case)
 	check_sanitised("adc", "adc");
 	check_sanitised("", "");
 	check_sanitised("\xff\x80--", "");
-	check_sanitised("0123456789012345678901234567890123456789", "0123456789012345678901234567890");
+	check_sanitised("0123456789012345678901234567890123456789",
+			"0123456789012345678901234567890");
 }
 
 TEST(names, slave_is_named_after_its_device_and_place)
@@ -65,8 +66,10 @@ TEST(names, entries_take_the_pdo_in_front_only_where_they_share_a_name)
 TEST(names, index_and_number_make_the_last_ones_differ)
 {
 	const struct pdo_entry e[] = {
-		entry("Inputs", "Value", 0x6000, 1), entry("Inputs", "Value", 0x6000, 2),
-		entry("Inputs", "Value", 0x6000, 2), entry("Inputs", "Value", 0x6000, 2),
+		entry("Inputs", "Value", 0x6000, 1),
+		entry("Inputs", "Value", 0x6000, 2),
+		entry("Inputs", "Value", 0x6000, 2),
+		entry("Inputs", "Value", 0x6000, 2),
 	};
 	char name[4][PDO_NAME_BYTES];
 

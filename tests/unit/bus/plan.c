@@ -12,14 +12,16 @@ static struct exchange_plan plan_of(uint32_t bytes)
 
 static struct plan_area area_of(uint32_t start, uint32_t end, uint16_t slave, int is_output)
 {
-	return (struct plan_area){ .start = start, .end = end, .slave_pos = slave, .is_output = (uint8_t)is_output };
+	return (struct plan_area){
+		.start = start, .end = end, .slave_pos = slave, .is_output = (uint8_t)is_output
+	};
 }
 
 TEST(plan, lrw_counts_two_for_written_and_one_for_read)
 {
 	struct exchange_plan plan = plan_of(44);
-	const struct plan_area area[] = { area_of(0, 9, 0, 1), area_of(9, 18, 1, 1), area_of(18, 31, 0, 0),
-					  area_of(31, 44, 1, 0) };
+	const struct plan_area area[] = { area_of(0, 9, 0, 1), area_of(9, 18, 1, 1),
+					  area_of(18, 31, 0, 0), area_of(31, 44, 1, 0) };
 	int blocked;
 
 	CHECK_EQ(plan_chunks(&plan, area, 4, &blocked), 0);
@@ -32,7 +34,8 @@ TEST(plan, lrw_counts_two_for_written_and_one_for_read)
 TEST(plan, slaves_that_share_a_byte_count_each)
 {
 	struct exchange_plan plan = plan_of(1);
-	const struct plan_area area[] = { area_of(0, 1, 0, 1), area_of(0, 1, 1, 1), area_of(0, 1, 2, 1) };
+	const struct plan_area area[] = { area_of(0, 1, 0, 1), area_of(0, 1, 1, 1),
+					  area_of(0, 1, 2, 1) };
 	int blocked;
 
 	CHECK_EQ(plan_chunks(&plan, area, 3, &blocked), 0);

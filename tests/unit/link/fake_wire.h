@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A wire for unit tests: virtual time, a queue of frames on their way back, and a list of what was sent.
- * The test's answer function plays the slaves; without it a frame comes back marked, its WKCs 1.
+ * A wire for unit tests: virtual time, a queue of frames on their way back, and a list of what was
+ * sent. The test's answer function plays the slaves; without it a frame comes back marked, its
+ * WKCs 1.
  */
 #ifndef TESTS_UNIT_LINK_FAKE_WIRE_H
 #define TESTS_UNIT_LINK_FAKE_WIRE_H
@@ -27,7 +28,7 @@ struct fake_wire {
 	int64_t now_ns;
 	int64_t travel_ns;
 	unsigned sent;
-	int drop;            /* so many of the next frames are lost */
+	int drop; /* so many of the next frames are lost */
 	int send_error;
 	unsigned slept;
 	struct fake_frame last_sent;
@@ -61,7 +62,8 @@ static inline void fake_pass_slave(uint8_t *frame, size_t len)
 	}
 }
 
-static inline void fake_queue(struct fake_wire *wire, const uint8_t *frame, size_t len, int64_t at_ns)
+static inline void fake_queue(struct fake_wire *wire, const uint8_t *frame, size_t len,
+			      int64_t at_ns)
 {
 	struct fake_frame *ff = &wire->queue[wire->queued];
 
@@ -98,7 +100,8 @@ static inline int fake_send(void *ctx, const uint8_t *frame, size_t len)
 	return 0;
 }
 
-static inline int fake_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadline, mono_t *ret_at)
+static inline int fake_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadline,
+			       mono_t *ret_at)
 {
 	struct fake_wire *wire = ctx;
 	struct fake_frame *ff = &wire->queue[0];

@@ -151,9 +151,11 @@ TEST(line, interface_down_is_reported_after_the_timeout)
 	uint8_t answer[LIMIT_FRAME_BYTES];
 	size_t len = make_frame(frame, ECAT_CMD_BRD, 0, 0, 0);
 
-	CHECK_EQ(line_transact(line, frame, len, answer, sizeof(answer), (span_t){ 2000000 }), -ENETDOWN);
+	CHECK_EQ(line_transact(line, frame, len, answer, sizeof(answer), (span_t){ 2000000 }),
+		 -ENETDOWN);
 	CHECK_EQ(wire.now_ns, 2000000);
-	CHECK_EQ(line_transact(line, frame, 10, answer, sizeof(answer), (span_t){ 2000000 }), -EINVAL);
+	CHECK_EQ(line_transact(line, frame, 10, answer, sizeof(answer), (span_t){ 2000000 }),
+		 -EINVAL);
 	line_destroy(line);
 }
 
@@ -190,7 +192,8 @@ static void one_cycle(void *ctx, mono_t until)
 		ride->deaf--;
 		return;
 	}
-	r = tp->receive(tp->ctx, frame, sizeof(frame), (mono_t){ ride->wire->now_ns + 100000 }, NULL);
+	r = tp->receive(tp->ctx, frame, sizeof(frame), (mono_t){ ride->wire->now_ns + 100000 },
+			NULL);
 	if (r > 0) {
 		line_ride_answer(ride->line, frame, (size_t)r);
 	}
@@ -205,12 +208,14 @@ TEST(line, riding_frame_is_sent_by_the_cycle_and_answered)
 	size_t len = make_frame(frame, ECAT_CMD_FPRD, 9, 0x1001, ESC_REG_AL_STATUS);
 
 	line_ride_begin(ride.line, (struct line_waiter){ one_cycle, &ride });
-	CHECK_EQ(line_transact(ride.line, frame, len, answer, sizeof(answer), (span_t){ 2000000 }), len);
+	CHECK_EQ(line_transact(ride.line, frame, len, answer, sizeof(answer), (span_t){ 2000000 }),
+		 len);
 	CHECK_EQ(ride.taken, 1);
 	CHECK_EQ(ride.cycles, 4);
 	CHECK_EQ(line_ride_is_out(ride.line), 0);
 	line_ride_end(ride.line);
-	CHECK_EQ(line_transact(ride.line, frame, len, answer, sizeof(answer), (span_t){ 2000000 }), len);
+	CHECK_EQ(line_transact(ride.line, frame, len, answer, sizeof(answer), (span_t){ 2000000 }),
+		 len);
 	CHECK_EQ(ride.cycles, 4);
 	line_destroy(ride.line);
 }
@@ -232,7 +237,8 @@ TEST(line, riding_frame_that_is_lost_times_out_and_its_late_answer_harms_nobody)
 	fake_pass_slave(late, len);
 	CHECK_EQ(line_ride_answer(ride.line, late, len), 1);
 	make_frame(frame, ECAT_CMD_FPRD, 10, 0x1001, ESC_REG_AL_STATUS);
-	CHECK_EQ(line_transact(ride.line, frame, len, answer, sizeof(answer), (span_t){ 2000000 }), len);
+	CHECK_EQ(line_transact(ride.line, frame, len, answer, sizeof(answer), (span_t){ 2000000 }),
+		 len);
 	CHECK_EQ(answer[17], 10);
 	line_destroy(ride.line);
 }

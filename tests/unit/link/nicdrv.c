@@ -70,7 +70,8 @@ TEST(nicdrv, silence_ends_after_three_tries)
 	uint16 value = 77;
 
 	nic->wire.drop = 100;
-	CHECK_EQ(ecx_FPRD(&nic->port, 0x1001, ESC_REG_AL_STATUS, 2, &value, EC_TIMEOUTRET3), EC_NOFRAME);
+	CHECK_EQ(ecx_FPRD(&nic->port, 0x1001, ESC_REG_AL_STATUS, 2, &value, EC_TIMEOUTRET3),
+		 EC_NOFRAME);
 	CHECK_EQ(nic->wire.sent, 3);
 	CHECK_EQ(value, 77);
 	CHECK_EQ(nic->wire.now_ns, 62000000);
@@ -86,7 +87,8 @@ TEST(nicdrv, mailbox_write_whose_answer_is_late_is_sent_exactly_once)
 	CHECK_EQ(ecx_FPWR(&nic->port, 0x1001, 0x1000, sizeof(mailbox), mailbox, EC_TIMEOUTRET3), 1);
 	CHECK_EQ(nic->wire.sent, 1);
 	nic->wire.drop = 1;
-	CHECK_EQ(ecx_FPWR(&nic->port, 0x1001, 0x1000, sizeof(mailbox), mailbox, EC_TIMEOUTRET3), EC_NOFRAME);
+	CHECK_EQ(ecx_FPWR(&nic->port, 0x1001, 0x1000, sizeof(mailbox), mailbox, EC_TIMEOUTRET3),
+		 EC_NOFRAME);
 	CHECK_EQ(nic->wire.sent, 2);
 	nic_destroy(nic);
 }

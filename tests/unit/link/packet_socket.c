@@ -13,7 +13,9 @@ TEST(packet_socket, unknown_interface_is_told_with_those_there_are)
 	struct transport transport = { 0 };
 	char error[PACKET_ERROR_BYTES];
 
-	CHECK_EQ(packet_socket_open("nosuchnic0", PACKET_WAIT_AUTO, &transport, error, sizeof(error)), -ENODEV);
+	CHECK_EQ(packet_socket_open("nosuchnic0", PACKET_WAIT_AUTO, &transport, error,
+				    sizeof(error)),
+		 -ENODEV);
 	CHECK(strstr(error, "nosuchnic0") != NULL);
 	CHECK(strstr(error, "lo") != NULL);
 	CHECK(strchr(error, '\n') == NULL);
@@ -25,9 +27,10 @@ TEST(packet_socket, name_that_is_none_is_refused)
 	struct transport transport = { 0 };
 	char error[PACKET_ERROR_BYTES];
 
-	CHECK_EQ(packet_socket_open("", PACKET_WAIT_AUTO, &transport, error, sizeof(error)), -ENODEV);
-	CHECK_EQ(packet_socket_open("an-interface-name-too-long", PACKET_WAIT_AUTO, &transport, error,
-				    sizeof(error)),
+	CHECK_EQ(packet_socket_open("", PACKET_WAIT_AUTO, &transport, error, sizeof(error)),
+		 -ENODEV);
+	CHECK_EQ(packet_socket_open("an-interface-name-too-long", PACKET_WAIT_AUTO, &transport,
+				    error, sizeof(error)),
 		 -ENODEV);
 	CHECK(transport.send == NULL);
 }
@@ -74,8 +77,8 @@ static void check_echo(enum packet_wait wait)
 		mono_t at = { 0 };
 
 		CHECK_EQ(transport.send(transport.ctx, frame, len), 0);
-		CHECK_EQ(transport.receive(transport.ctx, got, sizeof(got), mono_add(before, (span_t){ NS_PER_S }),
-					   &at),
+		CHECK_EQ(transport.receive(transport.ctx, got, sizeof(got),
+					   mono_add(before, (span_t){ NS_PER_S }), &at),
 			 len);
 		CHECK_MEM(got, frame, len);
 		CHECK(at.ns >= before.ns && at.ns <= platform.now(NULL).ns);
@@ -94,7 +97,8 @@ TEST(packet_socket, frame_comes_back_once_when_sleeping)
 	check_echo(PACKET_WAIT_SLEEP);
 }
 
-/* Not before the deadline, and not ticks behind it as a socket's own time-out (T01); generous for a loaded machine. */
+/* Not before the deadline, and not ticks behind it as a socket's own time-out (T01); generous for a
+ * loaded machine. */
 static void check_deadline(enum packet_wait wait)
 {
 	struct platform platform = platform_posix();
@@ -106,7 +110,8 @@ static void check_deadline(enum packet_wait wait)
 		mono_t deadline = mono_add(platform.now(NULL), (span_t){ 300 * NS_PER_US });
 		int64_t late_ns;
 
-		CHECK_EQ(transport.receive(transport.ctx, got, sizeof(got), deadline, NULL), -EAGAIN);
+		CHECK_EQ(transport.receive(transport.ctx, got, sizeof(got), deadline, NULL),
+			 -EAGAIN);
 		late_ns = mono_sub(platform.now(NULL), deadline).ns;
 		CHECK(late_ns >= 0);
 		least_ns = late_ns < least_ns ? late_ns : least_ns;

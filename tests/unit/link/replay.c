@@ -19,7 +19,8 @@ static const char *make_path(void)
 	return path;
 }
 
-static size_t make_frame(uint8_t *frame, uint8_t source_byte, uint8_t idx, uint16_t reg, uint8_t value)
+static size_t make_frame(uint8_t *frame, uint8_t source_byte, uint8_t idx, uint16_t reg,
+			 uint8_t value)
 {
 	const uint8_t source[6] = { source_byte, 1, 1, 1, 1, 1 };
 	struct ecat_frame_builder fb;
@@ -40,7 +41,9 @@ static void make_capture(const char *path)
 	uint8_t frame[LIMIT_FRAME_BYTES];
 	uint8_t answer[LIMIT_FRAME_BYTES];
 
-	CHECK_EQ(capture_create(path, 1 << 16, fake_platform(&wire), fake_transport(&wire), &transport), 0);
+	CHECK_EQ(capture_create(path, 1 << 16, fake_platform(&wire), fake_transport(&wire),
+				&transport),
+		 0);
 	CHECK_EQ(line_create(fake_platform(&wire), transport, &line), 0);
 	for (uint8_t i = 0; i < 3; i++) {
 		size_t len = make_frame(frame, 0x10, i, (uint16_t)(0x100 + i), i);
@@ -109,7 +112,8 @@ TEST(replay, another_byte_ends_the_replay_and_is_told)
 	CHECK_EQ(transact(&st, 0x10, 1, 0x101, 9), -EPROTO);
 	CHECK_EQ(transact(&st, 0x10, 1, 0x101, 1), -EPROTO);
 	CHECK_EQ(replay_matched(st.rp), 1);
-	CHECK_STR(replay_trouble(st.rp), "frame 2 of 3: it differs from the captured one (byte 26)");
+	CHECK_STR(replay_trouble(st.rp),
+		  "frame 2 of 3: it differs from the captured one (byte 26)");
 	stage_done(&st);
 	unlink(path);
 }
@@ -157,8 +161,10 @@ TEST(replay, full_capture_ends_and_stays_readable)
 	uint8_t frame[LIMIT_FRAME_BYTES];
 	char error[128];
 
-	CHECK_EQ(capture_create(path, 10, fake_platform(&wire), fake_transport(&wire), &transport), -EINVAL);
-	CHECK_EQ(capture_create(path, 400, fake_platform(&wire), fake_transport(&wire), &transport), 0);
+	CHECK_EQ(capture_create(path, 10, fake_platform(&wire), fake_transport(&wire), &transport),
+		 -EINVAL);
+	CHECK_EQ(capture_create(path, 400, fake_platform(&wire), fake_transport(&wire), &transport),
+		 0);
 	for (uint8_t i = 0; i < 20; i++) {
 		transport.send(transport.ctx, frame, make_frame(frame, 0x10, i, 0x100, i));
 	}
