@@ -21,6 +21,8 @@ SDK_PREINSTALL += "libyaml-dev:${DISTRO_ARCH} libzstd-dev:${DISTRO_ARCH} zlib1g-
 
 do_bootstrap[dirs] = "${TMPDIR}"
 do_bootstrap[network] = "1"
+# How the mirror is found does not change what it gives.
+do_bootstrap[vardepsexclude] += "apt_sources"
 python do_bootstrap() {
     import shutil
     sdk = d.getVar("SDK_DIR")
