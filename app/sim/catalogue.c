@@ -77,23 +77,6 @@ static const struct esc_features el2889 = {
 	.receive_time_at_power_on = LEFTOVER,
 };
 
-/* Terminals that no capture shows: an ET1200 by its data sheet. */
-static const struct esc_features et1200 = {
-	.type = 0x12,
-	.revision = 0x01,
-	.build = 0x0001,
-	.fmmu_count = 3,
-	.sm_count = 4,
-	.ram_kib = 1,
-	.port_descriptor = 0x0a,
-	.features = 0x00fc,
-	.dc = ESC_DC_64,
-	.has_sync_unit = 1,
-	.is_dc_by_eeprom = 1,
-	.eeprom_bytes_a_read = 8,
-	.receive_time_at_power_on = LEFTOVER,
-};
-
 static const struct esc_features lan9252 = {
 	.type = 0xc0,
 	.revision = 0x02,
@@ -114,7 +97,6 @@ static const struct {
 	const struct esc_features *features;
 } known[] = {
 	{ BECKHOFF, 0x044c2c52, &ek1100 }, { BECKHOFF, 0x03ec3052, &el1004 },
-	{ BECKHOFF, 0x03f03052, &et1200 }, { BECKHOFF, 0x07d43052, &et1200 },
 	{ BECKHOFF, 0x0b0c3052, &el2828 }, { BECKHOFF, 0x0b493052, &el2889 },
 };
 

@@ -1,0 +1,64 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The CoE dictionary that follows from an SII image: identity, SyncManager kinds, PDO assignment
+ * (writable in PRE-OP), PDO mapping (fixed), and the mapped objects themselves, which hold what was
+ * written last.
+ */
+#ifndef SIM_DEVICES_COE_DICTIONARY_H
+#define SIM_DEVICES_COE_DICTIONARY_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "wire/sii.h"
+
+enum { COE_VALUE_BYTES = 64, COE_ASSIGNED_MAX = 32, COE_ASSIGN_FIRST = 0x1c10 };
+
+/* ETG.1000.6, SDO abort codes. */
+enum coe_abort {
+	COE_OK = 0,
+	COE_ABORT_TOGGLE = 0x05030000,
+	COE_ABORT_COMMAND = 0x05040001,
+	COE_ABORT_ACCESS = 0x06010000,
+	COE_ABORT_READ_ONLY = 0x06010002,
+	COE_ABORT_COUNT_NOT_ZERO = 0x06010003,
+	COE_ABORT_NO_OBJECT = 0x06020000,
+	COE_ABORT_NOT_MAPPABLE = 0x06040041,
+	COE_ABORT_TOO_MANY = 0x06040042,
+	COE_ABORT_LENGTH = 0x06070010,
+	COE_ABORT_NO_SUBINDEX = 0x06090011,
+	COE_ABORT_STATE = 0x08000022,
+};
+
+struct coe_value {
+	uint8_t bytes[COE_VALUE_BYTES];
+	size_t len;
+};
+
+struct coe_assignment {
+	uint8_t count;
+	uint16_t pdo[COE_ASSIGNED_MAX];
+};
+
+struct coe_dictionary {
+	const struct sii *sii; /* not taken over */
+	char name[SII_NAME_BYTES];
+	struct coe_assignment assignment[SII_LIMIT_SM];
+	uint64_t entry_value[SII_LIMIT_ENTRIES];
+	uint8_t is_preop; /* assignments can be written */
+};
+
+void coe_dictionary_init(struct coe_dictionary *d, const struct sii *sii, const char *name);
+/** Default assignments, values 0. */
+void coe_dictionary_reset(struct coe_dictionary *d);
+
+/** Value of @index:@subindex. COE_OK or the abort code; @ret untouched then. */
+enum coe_abort coe_dictionary_read(const struct coe_dictionary *d, uint16_t index, uint8_t subindex,
+				   struct coe_value *ret);
+enum coe_abort coe_dictionary_write(struct coe_dictionary *d, uint16_t index, uint8_t subindex,
+				    const uint8_t *bytes, size_t len);
+
+/** Bits that are assigned to SyncManager @sm now. */
+uint32_t coe_dictionary_sm_bits(const struct coe_dictionary *d, size_t sm);
+
+#endif

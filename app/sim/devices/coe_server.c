@@ -1,0 +1,264 @@
+/* SPDX-License-Identifier: MIT */
+#include "sim/devices/coe_server.h"
+
+#include <string.h>
+
+#include "base/bytes.h"
+
+enum coe_service { COE_SDO_REQUEST = 2, COE_SDO_RESPONSE = 3, COE_SDO_INFORMATION = 8 };
+
+enum sdo_command {
+	SDO_SPECIFIER = 0xe0, /* the three bits that say which command it is */
+	SDO_DOWNLOAD = 0x20,
+	SDO_DOWNLOADED = 0x60,
+	SDO_UPLOAD = 0x40,
+	SDO_UPLOAD_SEGMENT = 0x60,
+	SDO_ABORT = 0x80,
+	SDO_COMPLETE_ACCESS = 0x10,
+	SDO_TOGGLE = 0x10,
+	SDO_EXPEDITED = 0x02,
+	SDO_SIZE_INDICATED = 0x01,
+	SDO_LAST_SEGMENT = 0x01,
+};
+
+enum layout {
+	COMMAND_AT = 2, /* behind the CoE header */
+	INDEX_AT = 3,
+	SUBINDEX_AT = 5,
+	DATA_AT = 6,
+	SDO_BYTES = 10,
+	SEGMENT_AT = 3,
+	SEGMENT_MIN = 7,
+	INFO_ERROR = 7,
+	INFO_BYTES = 10,
+};
+
+/* One SDO request, taken apart. */
+struct sdo {
+	uint8_t command;
+	uint16_t index;
+	uint8_t subindex;
+	const uint8_t *data; /* the four bytes, and what follows them */
+	size_t data_len;
+};
+
+static void put_header(uint8_t *answer, uint8_t command, const struct sdo *sdo)
+{
+	memset(answer, 0, SDO_BYTES);
+	put_le16(answer, COE_SDO_RESPONSE << 12);
+	answer[COMMAND_AT] = command;
+	put_le16(answer + INDEX_AT, sdo->index);
+	answer[SUBINDEX_AT] = sdo->subindex;
+}
+
+static size_t answer_abort(uint8_t *answer, const struct sdo *sdo, enum coe_abort code)
+{
+	put_header(answer, SDO_ABORT, sdo);
+	/* Captures: an abort comes as service 2, SDO request. */
+	put_le16(answer, COE_SDO_REQUEST << 12);
+	put_le32(answer + DATA_AT, (uint32_t)code);
+	return SDO_BYTES;
+}
+
+/* --- upload --- */
+
+/* Subindex 0 as 16 bits (if asked for), then the others one behind the other. */
+static enum coe_abort gather(struct coe_server *server, const struct sdo *sdo)
+{
+	struct coe_value v;
+	enum coe_abort code = coe_dictionary_read(&server->dictionary, sdo->index, 0, &v);
+	uint8_t last = v.bytes[0];
+
+	server->upload_len = 0;
+	if (code != COE_OK) {
+		return code;
+	}
+	if (sdo->subindex > 1 || v.len != 1) {
+		return COE_ABORT_ACCESS;
+	}
+	if (sdo->subindex == 0) {
+		put_le16(server->upload, last);
+		server->upload_len = 2;
+	}
+	for (unsigned i = 1; i <= last; i++) {
+		code = coe_dictionary_read(&server->dictionary, sdo->index, (uint8_t)i, &v);
+		if (code != COE_OK) {
+			continue; /* a gap in the object */
+		}
+		if (server->upload_len + v.len > COE_UPLOAD_BYTES) {
+			return COE_ABORT_LENGTH;
+		}
+		memcpy(server->upload + server->upload_len, v.bytes, v.len);
+		server->upload_len += v.len;
+	}
+	return COE_OK;
+}
+
+static enum coe_abort fetch(struct coe_server *server, const struct sdo *sdo)
+{
+	struct coe_value v;
+	enum coe_abort code;
+
+	if (sdo->command & SDO_COMPLETE_ACCESS) {
+		return gather(server, sdo);
+	}
+	code = coe_dictionary_read(&server->dictionary, sdo->index, sdo->subindex, &v);
+	if (code == COE_OK) {
+		memcpy(server->upload, v.bytes, v.len);
+		server->upload_len = v.len;
+	}
+	return code;
+}
+
+static size_t upload(struct coe_server *server, const struct sdo *sdo, uint8_t *answer,
+		     size_t capacity)
+{
+	enum coe_abort code = fetch(server, sdo);
+	uint8_t access = sdo->command & SDO_COMPLETE_ACCESS;
+	size_t now;
+
+	server->upload_pos = 0;
+	server->toggle = 0;
+	if (code != COE_OK) {
+		server->upload_len = 0;
+		return answer_abort(answer, sdo, code);
+	}
+	if (server->upload_len > 0 && server->upload_len <= 4) {
+		put_header(answer,
+			   (uint8_t)(SDO_UPLOAD | access | SDO_EXPEDITED | SDO_SIZE_INDICATED |
+				     (4 - server->upload_len) << 2),
+			   sdo);
+		memcpy(answer + DATA_AT, server->upload, server->upload_len);
+		server->upload_pos = server->upload_len;
+		return SDO_BYTES;
+	}
+	put_header(answer, (uint8_t)(SDO_UPLOAD | access | SDO_SIZE_INDICATED), sdo);
+	put_le32(answer + DATA_AT, (uint32_t)server->upload_len);
+	now = server->upload_len < capacity - SDO_BYTES ? server->upload_len : capacity - SDO_BYTES;
+	memcpy(answer + SDO_BYTES, server->upload, now);
+	server->upload_pos = now;
+	return SDO_BYTES + now;
+}
+
+static size_t upload_segment(struct coe_server *server, const struct sdo *sdo, uint8_t *answer,
+			     size_t capacity)
+{
+	size_t left = server->upload_len - server->upload_pos;
+	size_t now = left < capacity - SEGMENT_AT ? left : capacity - SEGMENT_AT;
+	uint8_t command = sdo->command & SDO_TOGGLE;
+
+	if (left == 0) {
+		return answer_abort(answer, sdo, COE_ABORT_COMMAND);
+	}
+	if (command != server->toggle) {
+		return answer_abort(answer, sdo, COE_ABORT_TOGGLE);
+	}
+	server->toggle ^= SDO_TOGGLE;
+	memset(answer, 0, SEGMENT_AT + SEGMENT_MIN);
+	put_le16(answer, COE_SDO_RESPONSE << 12);
+	memcpy(answer + SEGMENT_AT, server->upload + server->upload_pos, now);
+	server->upload_pos += now;
+	command |= server->upload_pos == server->upload_len ? SDO_LAST_SEGMENT : 0;
+	/* A short segment is filled up, and says by how much. */
+	command |= (uint8_t)(now < SEGMENT_MIN ? (SEGMENT_MIN - now) << 1 : 0);
+	answer[COMMAND_AT] = command;
+	return SEGMENT_AT + (now < SEGMENT_MIN ? SEGMENT_MIN : now);
+}
+
+/* --- download --- */
+
+/* An assignment as a whole: its count, and the PDOs from there. */
+static enum coe_abort write_all(struct coe_dictionary *d, const struct sdo *sdo,
+				const uint8_t *bytes, size_t len)
+{
+	uint8_t none = 0;
+	uint8_t count;
+	enum coe_abort code;
+
+	if (sdo->subindex != 0 || len < 1) {
+		return COE_ABORT_ACCESS;
+	}
+	count = bytes[0];
+	if (len < 2 + 2u * count && count > 0) {
+		return COE_ABORT_LENGTH;
+	}
+	code = coe_dictionary_write(d, sdo->index, 0, &none, 1);
+	for (unsigned i = 0; code == COE_OK && i < count; i++) {
+		code = coe_dictionary_write(d, sdo->index, (uint8_t)(i + 1), bytes + 2 + 2 * i, 2);
+	}
+	return code == COE_OK ? coe_dictionary_write(d, sdo->index, 0, &count, 1) : code;
+}
+
+static size_t download(struct coe_server *server, const struct sdo *sdo, uint8_t *answer)
+{
+	const uint8_t *bytes = sdo->data;
+	size_t len = 4;
+	enum coe_abort code;
+
+	if (sdo->command & SDO_EXPEDITED) {
+		len = sdo->command & SDO_SIZE_INDICATED ? 4u - (sdo->command >> 2 & 3u) : 4;
+	} else {
+		len = get_le32(bytes);
+		bytes += 4;
+		if (len > sdo->data_len - 4) {
+			/* What does not fit one mailbox would come in segments. */
+			return answer_abort(answer, sdo, COE_ABORT_COMMAND);
+		}
+	}
+	if (sdo->command & SDO_COMPLETE_ACCESS) {
+		code = write_all(&server->dictionary, sdo, bytes, len);
+	} else {
+		code = coe_dictionary_write(&server->dictionary, sdo->index, sdo->subindex, bytes,
+					    len);
+	}
+	if (code != COE_OK) {
+		return answer_abort(answer, sdo, code);
+	}
+	put_header(answer, SDO_DOWNLOADED | (sdo->command & SDO_COMPLETE_ACCESS), sdo);
+	return SDO_BYTES;
+}
+
+static size_t refuse_information(const uint8_t *request, uint8_t *answer)
+{
+	memset(answer, 0, INFO_BYTES);
+	memcpy(answer, request, 2);
+	answer[2] = INFO_ERROR;
+	put_le32(answer + 6, (uint32_t)COE_ABORT_ACCESS);
+	return INFO_BYTES;
+}
+
+size_t coe_server_answer(struct coe_server *server, const uint8_t *request, size_t request_len,
+			 uint8_t *answer, size_t capacity)
+{
+	struct sdo sdo = { .command = 0 };
+	unsigned service;
+
+	if (request_len < 2 || capacity < SDO_BYTES) {
+		return 0;
+	}
+	service = get_le16(request) >> 12;
+	if (service == COE_SDO_INFORMATION) {
+		return refuse_information(request, answer);
+	}
+	if (service != COE_SDO_REQUEST || request_len < SDO_BYTES) {
+		return 0;
+	}
+	sdo.command = request[COMMAND_AT];
+	sdo.index = get_le16(request + INDEX_AT);
+	sdo.subindex = request[SUBINDEX_AT];
+	sdo.data = request + DATA_AT;
+	sdo.data_len = request_len - DATA_AT;
+	switch (sdo.command & SDO_SPECIFIER) {
+	case SDO_DOWNLOAD:
+		return download(server, &sdo, answer);
+	case SDO_UPLOAD:
+		return upload(server, &sdo, answer, capacity);
+	case SDO_UPLOAD_SEGMENT:
+		return upload_segment(server, &sdo, answer, capacity);
+	case SDO_ABORT:
+		server->upload_len = server->upload_pos = 0;
+		return 0;
+	default: /* three bits of the wire */
+		return answer_abort(answer, &sdo, COE_ABORT_COMMAND);
+	}
+}
