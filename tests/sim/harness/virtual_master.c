@@ -2,7 +2,6 @@
 #include "sim/harness/virtual_master.h"
 
 #include <errno.h>
-#include <ftw.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
@@ -10,11 +9,11 @@
 #include "harness/test.h"
 #include "image/image.h"
 #include "sim/harness/rt_guard.h"
+#include "sim/harness/run_dir.h"
 
 enum {
 	SERVICE_CYCLES = 10, /* the service loop runs once in so many cycles */
 	REPLY_CYCLES = 2000, /* an answer has to come within so many */
-	DIRS_MAX = 8,        /* run directories of one program at a time */
 };
 
 #define FNV_START UINT64_C(0xcbf29ce484222325)
@@ -246,53 +245,6 @@ static void configure(struct virtual_master *vm, const char *const *settings)
 	CHECK_EQ(config_check(&vm->cfg, error, sizeof(error)), 0);
 }
 
-static int forget_file(const char *path, const struct stat *st, int kind, struct FTW *ftw)
-{
-	(void)st;
-	(void)kind;
-	(void)ftw;
-	return remove(path);
-}
-
-/* A test that fails ends the program: its run directories are memory and must not stay. */
-static char dirs[DIRS_MAX][sizeof(((struct virtual_master *)0)->dir)];
-
-static void forget_dirs(void)
-{
-	for (size_t i = 0; i < DIRS_MAX; i++) {
-		if (dirs[i][0] != '\0') {
-			nftw(dirs[i], forget_file, 8, FTW_DEPTH | FTW_PHYS);
-			dirs[i][0] = '\0';
-		}
-	}
-}
-
-static void note_dir(const char *dir)
-{
-	static int is_registered;
-
-	if (!is_registered) {
-		is_registered = 1;
-		atexit(forget_dirs);
-	}
-	for (size_t i = 0; i < DIRS_MAX; i++) {
-		if (dirs[i][0] == '\0') {
-			snprintf(dirs[i], sizeof(dirs[i]), "%s", dir);
-			return;
-		}
-	}
-}
-
-static void forget_dir(const char *dir)
-{
-	nftw(dir, forget_file, 8, FTW_DEPTH | FTW_PHYS);
-	for (size_t i = 0; i < DIRS_MAX; i++) {
-		if (strcmp(dirs[i], dir) == 0) {
-			dirs[i][0] = '\0';
-		}
-	}
-}
-
 void virtual_master_init(struct virtual_master *vm, struct virtual_bench *bench,
 			 const char *const *settings)
 {
@@ -313,9 +265,7 @@ void virtual_master_init(struct virtual_master *vm, struct virtual_bench *bench,
 
 	memset(vm, 0, sizeof(*vm));
 	vm->bench = bench;
-	snprintf(vm->dir, sizeof(vm->dir), "/dev/shm/ecdaq-sim-XXXXXX");
-	CHECK(mkdtemp(vm->dir) != NULL);
-	note_dir(vm->dir);
+	run_dir_make(vm->dir, sizeof(vm->dir));
 	configure(vm, settings);
 	bench->scope.period_ns = vm->cfg.cycle_period_ns;
 	virtual_master_forget(vm);
@@ -330,7 +280,7 @@ void virtual_master_kill(struct virtual_master *vm)
 	vm->samples = NULL;
 	session_destroy(vm->session);
 	vm->session = NULL;
-	forget_dir(vm->dir);
+	run_dir_remove(vm->dir);
 }
 
 int virtual_master_bring_up(struct virtual_master *vm)
