@@ -290,6 +290,10 @@ int main(int argc, char **argv)
 	if (configure(&arguments, &pg.cfg) < 0 || find_paths(&pg) < 0) {
 		return STATUS_CONFIG;
 	}
+	if (!pg.cfg.record_enable) {
+		fputs("ecdaq-record: record.enable is off, there is nothing to do\n", stderr);
+		return STATUS_OK;
+	}
 	pg.config_text = read_text(pg.cfg.path);
 	if (pg.config_text == NULL) {
 		fprintf(stderr, "ecdaq-record: %s\n", strerror(ENOMEM));
