@@ -89,14 +89,12 @@ static size_t put_entry(struct channel *ch, const struct slave_info *slave,
 }
 
 int channels_add(struct slave_info *slave, const struct pdo_entry *entry, size_t entry_count,
-		 const struct channels_place *place, struct channel *channel, size_t *count,
-		 size_t capacity)
+		 const struct channels_place *place, struct channels_table *table)
 {
 	struct channels_place at = *place;
-	size_t n = *count;
-	char (*name)[PDO_NAME_BYTES];
+	size_t n = table->count;
+	char (*name)[PDO_NAME_BYTES] = calloc(entry_count + 1, sizeof(*name));
 
-	name = calloc(entry_count + 1, sizeof(*name));
 	if (name == NULL) {
 		return -ENOMEM;
 	}
@@ -109,18 +107,19 @@ int channels_add(struct slave_info *slave, const struct pdo_entry *entry, size_t
 		size_t put = 0;
 
 		if (e->index != 0 && e->bit_len != 0) {
-			if (n + (e->bit_len + PIECE_BITS - 1) / PIECE_BITS > capacity) {
+			if (n + (e->bit_len + PIECE_BITS - 1) / PIECE_BITS > table->capacity) {
 				free(name);
 				return -E2BIG;
 			}
-			put = put_entry(&channel[n], slave, e, name[i], at.bit_offset[e->sm]);
-			apply_meaning(slave, &channel[n], n);
+			put = put_entry(&table->channel[n], slave, e, name[i],
+					at.bit_offset[e->sm]);
+			apply_meaning(slave, &table->channel[n], n);
 		}
 		n += put;
 		at.bit_offset[e->sm] += e->bit_len;
 		*(e->is_output ? &slave->output_bits : &slave->input_bits) += e->bit_len;
 	}
-	*count = n;
+	table->count = n;
 	free(name);
 	return 0;
 }

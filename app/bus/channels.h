@@ -16,12 +16,18 @@ struct channels_place {
 	uint32_t bit_offset[CHANNELS_SM];
 };
 
+/* The channel table while it grows. */
+struct channels_table {
+	struct channel *channel;
+	size_t count;
+	size_t capacity;
+};
+
 /**
- * Append the channels of @slave to @channel (which holds *count of @capacity); sets its
- * counter_channel and bits. 0 or -E2BIG (*count untouched).
+ * Append the channels of @slave to @table; sets its counter_channel and bits. 0, -ENOMEM or -E2BIG
+ * (the count is untouched then).
  */
 int channels_add(struct slave_info *slave, const struct pdo_entry *entry, size_t entry_count,
-		 const struct channels_place *place, struct channel *channel, size_t *count,
-		 size_t capacity);
+		 const struct channels_place *place, struct channels_table *table);
 
 #endif

@@ -91,7 +91,7 @@ static int read_latched(struct bus *bus, size_t pos, uint64_t *ret_local_ns)
 		return bus_fail_slave(bus, pos, -EIO, "its receive times (0x0900) cannot be read");
 	}
 	for (unsigned i = 0; i < DC_PORTS; i++) {
-		sl->clock.time_ns[i] = get_le32(times + 4 * i);
+		sl->clock.time_ns[i] = get_le32(times + 4 * (size_t)i);
 	}
 	if (sl->clock.kind != CLOCK_SYSTEM_TIME) {
 		return 0;
@@ -158,7 +158,7 @@ static int solve(struct bus *bus)
 
 static int set_clocks(struct bus *bus)
 {
-	uint64_t local_ns[LIMIT_SLAVES];
+	uint64_t local_ns[LIMIT_SLAVES] = { 0 };
 	int64_t latched_ns;
 	int r = latch(bus, &latched_ns);
 

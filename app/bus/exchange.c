@@ -9,7 +9,6 @@
 #include "base/bytes.h"
 #include "bus/exchange_dc.h"
 #include "bus/exchange_frame.h"
-#include "wire/datagram.h"
 
 enum {
 	HISTORY = 256, /* exchanges whose frames are remembered, to tell a late one from a doubled

@@ -122,16 +122,16 @@ static int is_dc_command(uint8_t cmd)
 int exchange_frame_matches(const struct exchange_frame *ef, uint8_t *frame, size_t frame_len,
 			   uint16_t *ret_sequence)
 {
-	uint8_t *dc = ef->dc != 0 && ef->dc < frame_len ? &frame[ef->dc] : NULL;
-	uint8_t kept = dc != NULL ? *dc : 0;
+	int has_dc = ef->dc != 0 && ef->dc < frame_len && is_dc_command(frame[ef->dc]);
+	uint8_t kept = has_dc ? frame[ef->dc] : 0;
 	int is_match;
 
-	if (dc != NULL && is_dc_command(kept)) {
-		*dc = ef->bytes[ef->dc];
+	if (has_dc) {
+		frame[ef->dc] = ef->bytes[ef->dc];
 	}
 	is_match = echo_matches(ef->bytes, frame, frame_len, ECHO_INDEX_ANY);
-	if (dc != NULL) {
-		*dc = kept;
+	if (has_dc) {
+		frame[ef->dc] = kept;
 	}
 	if (!is_match) {
 		return 0;

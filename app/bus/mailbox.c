@@ -63,6 +63,7 @@ static int patience_us(const struct bus *bus, size_t pos)
 	return bus->slave[pos].step != RECOVERY_NONE ? FAST_US : EC_TIMEOUTRXM;
 }
 
+/* NOLINTNEXTLINE(readability-function-size): the promise of bus.h */
 int bus_sdo_read(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t subindex,
 		 uint8_t *ret_data, size_t *len, uint32_t *ret_abort)
 {
@@ -88,6 +89,7 @@ int bus_sdo_read(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t su
 	return r;
 }
 
+/* NOLINTNEXTLINE(readability-function-size): the promise of bus.h */
 int bus_sdo_write(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t subindex,
 		  const uint8_t *data, size_t len, uint32_t *ret_abort)
 {

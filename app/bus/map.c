@@ -107,10 +107,16 @@ static int check_mapped(struct bus *bus, size_t pos)
 	return 0;
 }
 
+/* The image while it is laid out. */
+struct layout {
+	const uint8_t *image; /* what SOEM's places count from */
+	struct plan_area area[PLAN_AREAS];
+	size_t area_count;
+};
+
 /* Where the slave's SMs of one direction begin, and the areas they take. */
-static void place_direction(const struct bus *bus, size_t pos, const uint8_t *image, int is_output,
-			    struct channels_place *place, struct plan_area *area,
-			    size_t *area_count)
+static void place_direction(const struct bus *bus, size_t pos, int is_output, struct layout *lay,
+			    struct channels_place *place)
 {
 	const ec_slavet *soem = &bus->soem_slave[soem_index(pos)];
 	const uint8_t *base = is_output ? soem->outputs : soem->inputs;
@@ -121,7 +127,7 @@ static void place_direction(const struct bus *bus, size_t pos, const uint8_t *im
 	if (bits == 0) {
 		return;
 	}
-	at = (uint32_t)(base - image);
+	at = (uint32_t)(base - lay->image);
 	for (unsigned n = 0; n < EC_MAXSM; n++) {
 		uint32_t bytes = etohs(soem->SM[n].SMlength);
 
@@ -129,7 +135,7 @@ static void place_direction(const struct bus *bus, size_t pos, const uint8_t *im
 			continue;
 		}
 		place->bit_offset[n] = at * 8 + start_bit;
-		area[(*area_count)++] = (struct plan_area){
+		lay->area[lay->area_count++] = (struct plan_area){
 			.start = at,
 			.end = bits < 8 ? at + bytes_of(start_bit + bits) : at + bytes,
 			.slave_pos = (uint16_t)pos,
@@ -140,9 +146,10 @@ static void place_direction(const struct bus *bus, size_t pos, const uint8_t *im
 	}
 }
 
-static int build_channels(struct bus *bus, const uint8_t *image, struct plan_area *area,
-			  size_t *area_count)
+static int build_channels(struct bus *bus, struct layout *lay)
 {
+	struct channels_table table = { .channel = bus->channel, .capacity = LIMIT_CHANNELS };
+
 	for (size_t i = 0; i < bus->slave_count; i++) {
 		struct bus_slave *sl = &bus->slave[i];
 		struct channels_place place = { 0 };
@@ -151,16 +158,17 @@ static int build_channels(struct bus *bus, const uint8_t *image, struct plan_are
 		if (r < 0) {
 			return r;
 		}
-		place_direction(bus, i, image, 1, &place, area, area_count);
-		place_direction(bus, i, image, 0, &place, area, area_count);
+		place_direction(bus, i, 1, lay, &place);
+		place_direction(bus, i, 0, lay, &place);
 		r = channels_add(&sl->info, &bus->pdo[sl->pdo_first], sl->pdo_count, &place,
-				 bus->channel, &bus->channel_count, LIMIT_CHANNELS);
+				 &table);
 		if (r < 0) {
 			return bus_fail_slave(bus, i, r,
 					      "more channels than LIMIT_CHANNELS (%d) with it",
 					      LIMIT_CHANNELS);
 		}
 	}
+	bus->channel_count = table.count;
 	return 0;
 }
 
@@ -270,8 +278,7 @@ static int read_all(struct bus *bus)
 int bus_map(struct bus *bus, char *error)
 {
 	static const uint8_t image[LIMIT_IMAGE_BYTES]; /* SOEM only computes places in it */
-	struct plan_area area[PLAN_AREAS];
-	size_t area_count = 0;
+	struct layout lay = { .image = image };
 	int r;
 
 	bus->error = error;
@@ -280,9 +287,9 @@ int bus_map(struct bus *bus, char *error)
 		return r;
 	}
 	ecx_config_map_group(&bus->context, (void *)(uintptr_t)image, 0);
-	r = build_channels(bus, image, area, &area_count);
+	r = build_channels(bus, &lay);
 	if (r >= 0) {
-		r = build_plan(bus, area, area_count);
+		r = build_plan(bus, lay.area, lay.area_count);
 	}
 	for (size_t i = 0; i < bus->slave_count && r >= 0; i++) {
 		r = set_watchdog(bus, i);

@@ -130,7 +130,7 @@ static void poll_pause(struct bus *bus)
 /* An error of the past must not be taken for a refusal: acknowledge it, in the state it left. */
 static int acknowledge_errors(struct bus *bus, mono_t give_up)
 {
-	struct al_reading al[LIMIT_SLAVES];
+	struct al_reading al[LIMIT_SLAVES] = { 0 };
 
 	for (;;) {
 		unsigned errors = 0;
@@ -154,7 +154,7 @@ static int acknowledge_errors(struct bus *bus, mono_t give_up)
 
 static int wait_for(struct bus *bus, enum al_state state, mono_t give_up)
 {
-	struct al_reading al[LIMIT_SLAVES];
+	struct al_reading al[LIMIT_SLAVES] = { 0 };
 	uint8_t taken[LIMIT_SLAVES] = { 0 };
 
 	for (;;) {

@@ -130,8 +130,8 @@ static void show(const struct bus_slave *sl, const struct look *look, struct sla
 	for (unsigned i = 0; i < ESC_PORTS; i++) {
 		if (look->wkc[LOOK_RX_ERRORS] > 0) {
 			atomic_store_explicit(&page->rx_errors[i],
-					      (uint32_t)look->rx_errors[2 * i] +
-						      look->rx_errors[2 * i + 1],
+					      (uint32_t)look->rx_errors[2 * (size_t)i] +
+						      look->rx_errors[2 * (size_t)i + 1],
 					      memory_order_relaxed);
 		}
 		if (look->wkc[LOOK_LOST_LINKS] > 0) {

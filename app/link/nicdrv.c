@@ -6,7 +6,7 @@
  */
 #include "oshw.h"
 
-#include <arpa/inet.h>
+#include <netinet/in.h>
 #include <string.h>
 
 #include "base/bytes.h"

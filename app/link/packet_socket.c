@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 #include "link/packet_socket.h"
 
-#include <arpa/inet.h>
 #include <errno.h>
 #include <linux/if_packet.h>
 #include <net/if.h>
-#include <net/if_arp.h>
+#include <netinet/in.h>
 #include <poll.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -16,7 +15,6 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "base/limits.h"
 #include "wire/datagram.h"
 
 #ifndef PACKET_IGNORE_OUTGOING

@@ -47,31 +47,46 @@ struct replay {
 
 /* --- loading --- */
 
+static int file_bytes(FILE *file, size_t *ret_len)
+{
+	long len;
+
+	if (fseek(file, 0, SEEK_END) != 0) {
+		return -EIO;
+	}
+	len = ftell(file);
+	if (len < 0 || fseek(file, 0, SEEK_SET) != 0) {
+		return -EIO;
+	}
+	*ret_len = (size_t)len;
+	return 0;
+}
+
 static int file_load(const char *path, uint8_t **ret_bytes, size_t *ret_len)
 {
 	FILE *file = fopen(path, "rb");
 	uint8_t *bytes = NULL;
-	long len;
-	int r = -EIO;
+	size_t len = 0;
+	int r;
 
 	if (file == NULL) {
 		return -errno;
 	}
-	if (fseek(file, 0, SEEK_END) == 0 && (len = ftell(file)) >= 0 &&
-	    fseek(file, 0, SEEK_SET) == 0) {
-		bytes = malloc((size_t)len + 1);
+	r = file_bytes(file, &len);
+	if (r == 0) {
+		bytes = malloc(len + 1);
 		r = bytes == NULL ? -ENOMEM : 0;
-		if (r == 0 && fread(bytes, 1, (size_t)len, file) != (size_t)len) {
-			r = -EIO;
-		}
-		*ret_len = (size_t)len;
 	}
-	fclose(file);
+	if (r == 0 && fread(bytes, 1, len, file) != len) {
+		r = -EIO;
+	}
+	(void)fclose(file);
 	if (r < 0) {
 		free(bytes);
 		return r;
 	}
 	*ret_bytes = bytes;
+	*ret_len = len;
 	return 0;
 }
 

@@ -3,7 +3,6 @@
 #include "base/bytes.h"
 #include "harness/test.h"
 #include "sim/bus/bus_bench.h"
-#include "wire/esc_reg.h"
 
 enum { LIMIT_CYCLES = 6000 };
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* SOEM's base functions on our NIC layer. */
-#include "oshw.h"
+#include "nicdrv.h"
 
 #include "ethercatbase.h"
 

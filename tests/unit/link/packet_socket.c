@@ -4,7 +4,6 @@
 
 #include <errno.h>
 
-#include "base/bytes.h"
 #include "harness/test.h"
 #include "wire/datagram.h"
 
