@@ -5,19 +5,20 @@
 
 #include "wire/sii.h"
 
-enum { BECKHOFF = 0x00000002, PDI_LAN9252 = 0x80 };
+enum vendor { VENDOR_BECKHOFF = 0x00000002, VENDOR_MICROCHIP = 0x00000009 };
 
-/* "hoff", "Verl": what receive times hold that no frame has ever set. */
-#define LEFTOVER                                                                                   \
-	{                                                                                          \
-		0, 0x66666f68, 0, 0x6c726556                                                       \
-	}
+enum { PDI_LAN9252 = 0x80 };
+
+/* "hoff" and "Verl": what receive times hold that no frame has ever set (captures). */
+#define TEXT_HOFF 0x66666f68u
+#define TEXT_VERL 0x6c726556u
 
 /*
- * What captures of the real devices say of their ESCs: types, ports and feature words as 0x0000 to 0x0008 gave
- * them, counts of FMMUs and SMs and the kind of clock by which registers gave a working counter (SPECNOTES).
+ * What captures of real devices say of their ESCs: types, ports and feature words as 0x0000 to 0x0008
+ * gave them, counts of FMMUs and SMs and the kind of clock by which registers gave a working
+ * counter (SPECNOTES).
  */
-static const struct esc_features ek1100 = {
+static const struct esc_features coupler = {
 	.type = 0x11,
 	.build = 0x0003,
 	.fmmu_count = 8,
@@ -29,10 +30,27 @@ static const struct esc_features ek1100 = {
 	.has_sync_unit = 1,
 	.is_dc_by_eeprom = 1,
 	.eeprom_bytes_a_read = 8,
-	.receive_time_at_power_on = LEFTOVER,
+	.receive_time_at_power_on = { 0, TEXT_HOFF, 0, TEXT_VERL },
 };
 
-static const struct esc_features el1004 = {
+/* A terminal with an ET1100: as the coupler, but E-bus. */
+static const struct esc_features et1100_terminal = {
+	.type = 0x11,
+	.build = 0x0003,
+	.fmmu_count = 8,
+	.sm_count = 8,
+	.ram_kib = 8,
+	.port_descriptor = 0x0a,
+	.features = 0x00fc,
+	.dc = ESC_DC_64,
+	.has_sync_unit = 1,
+	.is_dc_by_eeprom = 1,
+	.eeprom_bytes_a_read = 8,
+	.receive_time_at_power_on = { 0, TEXT_HOFF, 0, TEXT_VERL },
+};
+
+/* EL1004, EL2828, EL3004: an ET1200 of the newer kind. */
+static const struct esc_features et1200_terminal = {
 	.type = 0x12,
 	.revision = 0x01,
 	.build = 0x0001,
@@ -41,29 +59,17 @@ static const struct esc_features el1004 = {
 	.ram_kib = 1,
 	.port_descriptor = 0x4a, /* E-bus */
 	.features = 0x01fc,
-	.dc = ESC_DC_RECEIVE_TIMES,
+	.dc = ESC_DC_64,
+	.has_sync_unit = 1,
+	.is_dc_by_eeprom = 1,
+	.has_open_bits = 1,
 	.eeprom_bytes_a_read = 8,
 	.eeprom_status = 0x0010,
-	.receive_time_at_power_on = LEFTOVER,
+	.receive_time_at_power_on = { 0, TEXT_HOFF, 0, TEXT_VERL },
 };
 
-static const struct esc_features el2828 = {
-	.type = 0x12,
-	.revision = 0x01,
-	.build = 0x0001,
-	.fmmu_count = 3,
-	.sm_count = 4,
-	.ram_kib = 1,
-	.port_descriptor = 0x4a,
-	.features = 0x01fc,
-	.dc = ESC_DC_RECEIVE_TIMES,
-	.eeprom_bytes_a_read = 8,
-	.eeprom_status = 0x0010,
-	.receive_time_at_power_on = LEFTOVER,
-};
-
-/* It has its system time although its EEPROM leaves both DC units off. */
-static const struct esc_features el2889 = {
+/* EL2889: of the older kind; it has its system time although its EEPROM leaves both DC units off. */
+static const struct esc_features et1200_old_terminal = {
 	.type = 0x12,
 	.build = 0x0001,
 	.fmmu_count = 3,
@@ -74,7 +80,7 @@ static const struct esc_features el2889 = {
 	.dc = ESC_DC_64,
 	.has_sync_unit = 1,
 	.eeprom_bytes_a_read = 8,
-	.receive_time_at_power_on = LEFTOVER,
+	.receive_time_at_power_on = { 0, TEXT_HOFF, 0, TEXT_VERL },
 };
 
 static const struct esc_features lan9252 = {
@@ -87,6 +93,7 @@ static const struct esc_features lan9252 = {
 	.features = 0x01cc,
 	.dc = ESC_DC_64,
 	.has_sync_unit = 1,
+	.has_open_bits = 1,
 	.eeprom_bytes_a_read = 4,
 	.has_long_eeprom = 1,
 };
@@ -96,8 +103,18 @@ static const struct {
 	uint32_t product;
 	const struct esc_features *features;
 } known[] = {
-	{ BECKHOFF, 0x044c2c52, &ek1100 }, { BECKHOFF, 0x03ec3052, &el1004 },
-	{ BECKHOFF, 0x0b0c3052, &el2828 }, { BECKHOFF, 0x0b493052, &el2889 },
+	{ VENDOR_BECKHOFF, 0x044c2c52, &coupler },             /* EK1100 */
+	{ VENDOR_BECKHOFF, 0x077a2c52, &coupler },             /* EK1914 */
+	{ VENDOR_BECKHOFF, 0x03ec3052, &et1200_terminal },     /* EL1004 */
+	{ VENDOR_BECKHOFF, 0x03f03052, &et1200_terminal },     /* EL1008: not captured */
+	{ VENDOR_BECKHOFF, 0x07d43052, &et1200_terminal },     /* EL2004: not captured */
+	{ VENDOR_BECKHOFF, 0x0b0c3052, &et1200_terminal },     /* EL2828 */
+	{ VENDOR_BECKHOFF, 0x0b493052, &et1200_old_terminal }, /* EL2889 */
+	{ VENDOR_BECKHOFF, 0x0bbc3052, &et1200_terminal },     /* EL3004 */
+	{ VENDOR_BECKHOFF, 0x0c843052, &et1100_terminal },     /* EL3204: not captured */
+	{ VENDOR_BECKHOFF, 0x0fa23052, &et1100_terminal },     /* EL4002: not captured */
+	{ VENDOR_BECKHOFF, 0x1afe3052, &et1100_terminal },     /* EL6910 */
+	{ VENDOR_MICROCHIP, 0x00009252, &lan9252 },
 };
 
 const struct esc_features *catalogue_features(uint32_t vendor, uint32_t product)
@@ -115,16 +132,22 @@ static const struct esc_features *features_of(const struct sii *sii)
 	const struct esc_features *features = catalogue_features(sii->vendor, sii->product);
 	int is_unknown = features == &esc_et1100;
 
-	/* A LAN9252 tells itself by its PDI. */
+	/* Whoever made the device: a LAN9252 tells itself by its PDI. */
 	return is_unknown && (sii->pdi_control & 0xff) >= PDI_LAN9252 ? &lan9252 : features;
 }
 
-/* Terminals touch each other (captures: 590 to 600 ns and 310 ns round the tail); others have PHYs and a cable. */
+/*
+ * Terminals touch each other (captures: 300 to 310 ns round the last two, 590 to 600 ns round three);
+ * others have PHYs and a cable.
+ */
 static void set_delays(struct segment_slave_spec *spec, int is_terminal)
 {
 	spec->wire_ns = is_terminal ? 5 : 260;
 	spec->processing_ns = is_terminal ? 150 : 330;
 	spec->forwarding_ns = is_terminal ? 140 : 300;
+	if (spec->features == &coupler) {
+		spec->processing_ns = 140;
+	}
 }
 
 int catalogue_sii_slave(const uint8_t *sii, size_t sii_bytes, int position,
@@ -147,9 +170,6 @@ int catalogue_sii_slave(const uint8_t *sii, size_t sii_bytes, int position,
 		.parent = position - 1,
 		.parent_port = 1,
 	};
-	set_delays(ret_spec, parsed.vendor == BECKHOFF);
-	if (ret_spec->features == &ek1100) {
-		ret_spec->processing_ns = 140;
-	}
+	set_delays(ret_spec, parsed.vendor == VENDOR_BECKHOFF);
 	return 0;
 }
