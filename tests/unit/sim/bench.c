@@ -201,4 +201,8 @@ void bench_wait(struct bench *b, int64_t span_ns)
 {
 	b->now_ns += span_ns;
 	segment_advance(b->segment, b->now_ns);
+	for (size_t i = 0; i < segment_slave_count(b->segment); i++) {
+		/* The segment does not know what a test has done at the PDI. */
+		esc_advance(segment_esc(b->segment, i), b->now_ns);
+	}
 }
