@@ -52,6 +52,7 @@ int cycle_create(const struct cycle_spec *spec, struct cycle **ret_cycle, char *
 		return r;
 	}
 	outputs_choose(&cy->outputs, cy->image, 0);
+	cy->was_fail_safe = 1;
 	*ret_cycle = cy;
 	return 0;
 }

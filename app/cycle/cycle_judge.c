@@ -49,6 +49,9 @@ void cycle_skip(struct cycle *cy, uint64_t count)
 	cy->sample = kept;
 	cy->sample.cycle += count;
 	cy->deadline = mono_add(cy->deadline, (span_t){ (int64_t)count * cy->period.ns });
+	if (cy->phase != CYCLE_OP) {
+		return; /* nothing is controlled yet */
+	}
 	if (cy->spec.cfg->cycle_overrun == CONFIG_OVERRUN_FAIL_SAFE) {
 		cy->is_latched_safe = 1;
 	} else if (cy->spec.cfg->cycle_overrun == CONFIG_OVERRUN_STOP) {

@@ -59,14 +59,18 @@ static struct dc_servo_result jump(struct dc_servo *servo, int64_t error_ns)
 	};
 }
 
-/* Lock is won by the smoothed error, which one wild frame does not move, and lost by the raw one. */
+/*
+ * Lock is won by the smoothed error, which one wild frame does not move; it is lost, and never won, by
+ * raw errors that are large most of the time: noise without a clock behind it smooths to nothing, too.
+ */
 static void judge(struct dc_servo *servo, int64_t error_ns)
 {
 	const struct dc_servo_spec *spec = &servo->spec;
+	int is_wild = llabs(error_ns) > spec->unlock_limit_ns;
+	int is_near = fabs(servo->filtered_ns) < (double)spec->lock_limit_ns;
 
-	servo->in_window =
-		leak(servo->in_window, fabs(servo->filtered_ns) < (double)spec->lock_limit_ns);
-	servo->out_window = leak(servo->out_window, llabs(error_ns) > spec->unlock_limit_ns);
+	servo->in_window = leak(servo->in_window, is_near && !is_wild);
+	servo->out_window = leak(servo->out_window, is_wild);
 	if (servo->state != DC_LOCKED && servo->in_window >= spec->lock_cycles) {
 		servo->state = DC_LOCKED;
 		servo->out_window = 0;

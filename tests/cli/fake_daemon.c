@@ -186,6 +186,7 @@ int main(int argc, char **argv)
 	puts("ready");
 	fflush(stdout);
 	live(&f);
+	f.page->bus_state_at_stop = f.page->bus_state;
 	f.page->bus_state = BUS_STOPPED;
 	fake_emit(&f, EVENT_STOPPED, EVENT_NO_SLAVE, (int64_t)f.cycle, 0);
 	ring_destroy(f.samples);

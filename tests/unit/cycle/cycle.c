@@ -441,3 +441,43 @@ TEST(cycle, events_of_one_kind_are_limited_but_the_counters_are_not)
 	CHECK_EQ(stats.frames_late, 500);
 	CHECK(count >= 20 && count <= 40);
 }
+
+static unsigned count_events(enum event_id id)
+{
+	struct event ev;
+	uint64_t lost;
+	unsigned count = 0;
+
+	while (ring_read(event_reader, &ev, &lost) == RING_OK) {
+		count += ev.id == id;
+	}
+	return count;
+}
+
+TEST(cycle, going_to_fail_safe_is_an_event_only_when_outputs_were_live)
+{
+	start_in_op();
+	CHECK_EQ(count_events(EVENT_OUTPUT_FAIL_SAFE), 0);
+	cycle_phase_set(cy, CYCLE_SAFE);
+	steps(3);
+	CHECK_EQ(count_events(EVENT_OUTPUT_FAIL_SAFE), 1);
+}
+
+TEST(cycle, the_overrun_policy_counts_in_op_only)
+{
+	cfg.cycle_overrun = CONFIG_OVERRUN_FAIL_SAFE;
+	start();
+	world.late_ns = 3 * PERIOD_NS;
+	steps(500);
+	cycle_phase_set(cy, CYCLE_OP);
+	board_begin(&board);
+	board_put(&board, 0, 1);
+	board_commit(&board);
+	steps(3);
+	CHECK_EQ(world.seen_output & 1, 1);
+	world.late_ns = 3 * PERIOD_NS;
+	steps(2);
+	CHECK_EQ(world.seen_output & 1, 0);
+	CHECK_EQ(count_events(EVENT_OUTPUT_FAIL_SAFE), 1);
+	cfg.cycle_overrun = CONFIG_OVERRUN_COUNT;
+}

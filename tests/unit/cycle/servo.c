@@ -144,3 +144,15 @@ TEST(dc_servo, corrections_never_exceed_the_slew_after_the_first_jump)
 		CHECK(llabs(turn(&p).correction_ns) <= spec.slew_ns + 1);
 	}
 }
+
+TEST(dc_servo, a_reference_time_that_is_pure_noise_is_never_locked_to)
+{
+	struct prng prng = { 5 };
+	struct dc_servo servo;
+
+	dc_servo_init(&servo, &spec);
+	for (unsigned i = 0; i < 20000; i++) {
+		dc_servo_update(&servo, (int64_t)prng_below(&prng, 1000000000), 0);
+		CHECK_EQ(servo.state, DC_ACQUIRING);
+	}
+}
