@@ -9,8 +9,7 @@ void check_init(struct check *check, const struct config *cfg, const struct slav
 	check->slave_count = slave_count;
 	for (size_t i = 0; i < slave_count; i++) {
 		int32_t channel = slaves[i].counter_channel;
-		int is_oneshot = i < cfg->slave_count &&
-				 cfg->slave[i].mode == CONFIG_MODE_ONESHOT;
+		int is_oneshot = i < cfg->slave_count && cfg->slave[i].mode == CONFIG_MODE_ONESHOT;
 
 		check->slave[i] = (struct check_slave){
 			.counter = channel >= 0 ? &channels[channel] : NULL,
@@ -29,8 +28,8 @@ void check_restart(struct check *check)
 static int counter_is_right(const struct check_slave *s, uint64_t seen, uint64_t cycle,
 			    uint64_t *ret_expected)
 {
-	uint64_t mask = s->counter->bit_len >= 64 ? UINT64_MAX
-						  : (UINT64_C(1) << s->counter->bit_len) - 1;
+	uint64_t mask =
+		s->counter->bit_len >= 64 ? UINT64_MAX : (UINT64_C(1) << s->counter->bit_len) - 1;
 	uint64_t edges = s->is_oneshot ? 1 : cycle - s->last_cycle;
 
 	*ret_expected = (s->last + edges) & mask;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Is the sample of each slave good? It is, if its frame was fresh and its conversion counter went on by
- * as many as there were SYNC0 edges since the last fresh one. Context: cycle thread, RT-safe.
+ * Is the sample of each slave good? It is, if its frame was fresh and its conversion counter went
+ * on by as many as there were SYNC0 edges since the last fresh one. Context: cycle thread, RT-safe.
  */
 #ifndef CYCLE_CHECK_H
 #define CYCLE_CHECK_H
@@ -38,7 +38,8 @@ void check_init(struct check *check, const struct config *cfg, const struct slav
 /** Take the next fresh sample as it is: entering OP, or after one that was wrong. */
 void check_restart(struct check *check);
 /**
- * Judge a fresh image of @cycle. Returns a bit for each bad slave; the first of them is described in
+ * Judge a fresh image of @cycle. Returns a bit for each bad slave; the first of them is described
+ * in
  * @ret_fault.
  */
 uint64_t check_image(struct check *check, const uint8_t *image, uint64_t cycle,

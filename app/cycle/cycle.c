@@ -9,12 +9,12 @@
 #include "cycle/cycle_inside.h"
 
 enum {
-	STACK_BYTES = 64 * 1024,     /* touched before the first cycle */
-	FAULT_CHECK_CYCLES = 64,     /* how often the thread's page faults are read */
-	EVENT_WINDOW_CYCLES = 1000,  /* in so many cycles ... */
-	EVENT_WINDOW_LIMIT = 20,     /* ... at most so many events of one kind */
-	SETTLE_SHARE = 20,           /* slaves have a 20th of the period to put their inputs in place */
-	RIDE_PERCENT = 85,           /* service frames until then */
+	STACK_BYTES = 64 * 1024,    /* touched before the first cycle */
+	FAULT_CHECK_CYCLES = 64,    /* how often the thread's page faults are read */
+	EVENT_WINDOW_CYCLES = 1000, /* in so many cycles ... */
+	EVENT_WINDOW_LIMIT = 20,    /* ... at most so many events of one kind */
+	SETTLE_SHARE = 20, /* slaves have a 20th of the period to put their inputs in place */
+	RIDE_PERCENT = 85, /* service frames until then */
 };
 
 int cycle_create(const struct cycle_spec *spec, struct cycle **ret_cycle, char *error,
@@ -138,7 +138,7 @@ static mono_t wake(struct cycle *cy)
 	histogram_add(&cy->spec.stats->wake_latency, mono_sub(now, cy->deadline).ns);
 	/* Later than the next SYNC0: the edges in between are lost to this master. */
 	cycle_skip(cy, numbering_skipped(cy->period.ns, cy->set_point_ns,
-					  mono_sub(now, cy->deadline).ns));
+					 mono_sub(now, cy->deadline).ns));
 	return now;
 }
 
@@ -146,8 +146,8 @@ static mono_t wake(struct cycle *cy)
 
 static mono_t receive_deadline(const struct cycle *cy, mono_t now)
 {
-	int64_t share_ns = (int64_t)((double)cy->period.ns *
-				     cy->spec.cfg->cycle_receive_percent / 100.0);
+	int64_t share_ns =
+		(int64_t)((double)cy->period.ns * cy->spec.cfg->cycle_receive_percent / 100.0);
 	mono_t wanted = mono_add(now, (span_t){ share_ns });
 	mono_t last = mono_add(cy->deadline, (span_t){ cy->period.ns * 9 / 10 });
 	mono_t least = mono_add(now, (span_t){ cy->period.ns / 10 });

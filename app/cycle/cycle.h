@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * One millisecond (DESIGN 3): wake, send and wait, servo, check, outputs, sample. cycle_step() is one
- * cycle; cycle_run() repeats it until cycle_stop(). After cycle_create() nothing here allocates,
- * locks, logs, opens or blocks but the platform's sleep and the transport.
+ * One millisecond (DESIGN 3): wake, send and wait, servo, check, outputs, sample. cycle_step() is
+ * one cycle; cycle_run() repeats it until cycle_stop(). After cycle_create() nothing here
+ * allocates, locks, logs, opens or blocks but the platform's sleep and the transport.
  */
 #ifndef CYCLE_CYCLE_H
 #define CYCLE_CYCLE_H
@@ -45,14 +45,15 @@ void cycle_destroy(struct cycle *cycle);
 
 /** One cycle. Context: the cycle thread. */
 void cycle_step(struct cycle *cycle);
-/** Steps until cycle_stop(); touches its stack first and counts its own page faults. 0 or -errno. */
+/** Steps until cycle_stop(); touches its stack first and counts its own page faults. 0 or -errno.
+ */
 int cycle_run(struct cycle *cycle);
 /** Ask cycle_run() to return after the step it is in. Context: any, also a signal handler. */
 void cycle_stop(struct cycle *cycle);
 
 /*
- * What the bus is in, as the service thread knows it. Outputs are real only in CYCLE_OP, samples are
- * judged only in CYCLE_OP.
+ * What the bus is in, as the service thread knows it. Outputs are real only in CYCLE_OP, samples
+ * are judged only in CYCLE_OP.
  */
 enum cycle_phase {
 	CYCLE_CLOCKS, /* exchange and servo only */
@@ -67,7 +68,8 @@ void cycle_phase_set(struct cycle *cycle, enum cycle_phase phase);
 struct event;
 void cycle_emit(struct cycle *cycle, struct event *ev);
 
-/** The newest frame's DC time and the host time at which it was sent. 0 or -EAGAIN. Context: any. */
+/** The newest frame's DC time and the host time at which it was sent. 0 or -EAGAIN. Context: any.
+ */
 int cycle_dc_now(const struct cycle *cycle, int64_t *ret_dc_ns);
 
 /** Which n-th output @channel is (its place on the boards); -ENOENT for an input. */

@@ -10,10 +10,11 @@ static void watch_wkc(struct cycle *cy, const struct exchange_result *res)
 		cy->sample.flags |= SAMPLE_WKC_LOW;
 		if (cy->wkc_low_in_row++ == 0) {
 			cycle_note(cy, EVENT_WKC_LOW, (int64_t)cy->sample.cycle, res->wkc,
-			     res->wkc_expected);
+				   res->wkc_expected);
 		}
 	} else if (res->status == EXCHANGE_OK && cy->wkc_low_in_row > 0) {
-		cycle_note(cy, EVENT_WKC_OK, (int64_t)cy->sample.cycle, res->wkc, cy->wkc_low_in_row);
+		cycle_note(cy, EVENT_WKC_OK, (int64_t)cy->sample.cycle, res->wkc,
+			   cy->wkc_low_in_row);
 		cy->wkc_low_in_row = 0;
 	}
 }
@@ -30,7 +31,8 @@ void cycle_count_frames(struct cycle *cy, const struct exchange_result *res)
 		cy->lost_in_row++;
 		/* Of a long row the first and then each power of two is enough. */
 		if ((cy->lost_in_row & (cy->lost_in_row - 1)) == 0) {
-			cycle_note(cy, EVENT_FRAME_LOST, (int64_t)cy->sample.cycle, cy->lost_in_row, 0);
+			cycle_note(cy, EVENT_FRAME_LOST, (int64_t)cy->sample.cycle, cy->lost_in_row,
+				   0);
 		}
 	} else {
 		cy->lost_in_row = 0;
@@ -103,7 +105,8 @@ int64_t cycle_follow(struct cycle *cy, const struct exchange_result *res)
 	}
 	if (cy->servo.state == DC_LOCKED) {
 		if (before != DC_LOCKED) {
-			cycle_note(cy, EVENT_DC_LOCKED, (int64_t)cy->sample.cycle, servo.error_ns, 0);
+			cycle_note(cy, EVENT_DC_LOCKED, (int64_t)cy->sample.cycle, servo.error_ns,
+				   0);
 		}
 		if (st->dc_lock_ns == 0) {
 			SET(st->dc_lock_ns,
@@ -119,11 +122,11 @@ int64_t cycle_follow(struct cycle *cy, const struct exchange_result *res)
 		cy->sample.flags |= SAMPLE_DC_UNLOCKED;
 		if (before == DC_LOCKED) {
 			ADD(st->dc_unlocks, 1);
-			cycle_note(cy, EVENT_DC_UNLOCKED, (int64_t)cy->sample.cycle, servo.error_ns, 0);
+			cycle_note(cy, EVENT_DC_UNLOCKED, (int64_t)cy->sample.cycle, servo.error_ns,
+				   0);
 		}
 	}
 	SET(st->dc_state, cy->servo.state);
-	SET(st->correction_ppb,
-	    (int64_t)(cy->servo.integral_ns * 1e9 / (double)cy->period.ns));
+	SET(st->correction_ppb, (int64_t)(cy->servo.integral_ns * 1e9 / (double)cy->period.ns));
 	return servo.correction_ns;
 }

@@ -14,10 +14,10 @@
 
 /* The statistics have one writer: no read-modify-write is needed. */
 #define ADD(field, n)                                                                              \
-	atomic_store_explicit(&(field), atomic_load_explicit(&(field), memory_order_relaxed) + (n), \
+	atomic_store_explicit(&(field),                                                            \
+			      atomic_load_explicit(&(field), memory_order_relaxed) + (n),          \
 			      memory_order_relaxed)
 #define SET(field, v) atomic_store_explicit(&(field), (v), memory_order_relaxed)
-
 
 struct event_gate {
 	uint64_t window;
@@ -39,18 +39,18 @@ struct cycle {
 	enum cycle_phase phase;
 	int has_started;
 	int was_fail_safe;
-	int is_latched_safe;         /* overrun policy fail_safe */
+	int is_latched_safe; /* overrun policy fail_safe */
 	unsigned lost_in_row;
 	unsigned wkc_low_in_row;
 	uint64_t steps;
 	long faults_at_start;
 	struct event_gate gate[EVENT_COUNT];
 	int result;
-	_Atomic int stop;            /* [any] */
-	_Atomic int wanted_phase;    /* [service] */
-	_Atomic uint64_t dc_sequence;/* [cycle] odd: the pair below is being written */
-	_Atomic int64_t dc_ns;       /* [cycle] */
-	_Atomic int64_t dc_mono_ns;  /* [cycle] */
+	_Atomic int stop;             /* [any] */
+	_Atomic int wanted_phase;     /* [service] */
+	_Atomic uint64_t dc_sequence; /* [cycle] odd: the pair below is being written */
+	_Atomic int64_t dc_ns;        /* [cycle] */
+	_Atomic int64_t dc_mono_ns;   /* [cycle] */
 };
 
 /* Push an event of this cycle without a slave; arguments are clamped to int32. */
@@ -68,11 +68,12 @@ int64_t cycle_follow(struct cycle *cy, const struct exchange_result *res);
 /** The mask of all slaves. */
 uint64_t cycle_all_slaves(const struct cycle *cy);
 void cycle_push_sample(struct cycle *cy);
-/** The next @count edges passed while the master was late: each gets a sample with the last known inputs. */
+/** The next @count edges passed while the master was late: each gets a sample with the last known
+ * inputs. */
 void cycle_skip(struct cycle *cy, uint64_t count);
 /**
- * Which SYNC0 edge the frame's inputs belong to, by the DC time at which it passed. 1 if it was in its
- * window; 0 if it passed while the slaves were still putting the edge's inputs in place.
+ * Which SYNC0 edge the frame's inputs belong to, by the DC time at which it passed. 1 if it was in
+ * its window; 0 if it passed while the slaves were still putting the edge's inputs in place.
  */
 int cycle_place(struct cycle *cy, const struct exchange_result *res);
 /** Is each slave's sample good? Flags and counters say so. */

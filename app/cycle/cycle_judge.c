@@ -5,8 +5,7 @@
 
 uint64_t cycle_all_slaves(const struct cycle *cy)
 {
-	return cy->spec.slave_count >= 64 ? UINT64_MAX
-					  : (UINT64_C(1) << cy->spec.slave_count) - 1;
+	return cy->spec.slave_count >= 64 ? UINT64_MAX : (UINT64_C(1) << cy->spec.slave_count) - 1;
 }
 
 void cycle_push_sample(struct cycle *cy)
@@ -27,7 +26,8 @@ void cycle_skip(struct cycle *cy, uint64_t count)
 	ADD(cy->spec.stats->cycles_skipped, count);
 	cycle_note(cy, EVENT_OVERRUN, (int64_t)kept.cycle, (int64_t)count, kept.wake_latency_ns);
 	if (count > NUMBERING_SKIP_LIMIT) {
-		cycle_note(cy, EVENT_NUMBERING_JUMP, (int64_t)(kept.cycle + count), (int64_t)count, 0);
+		cycle_note(cy, EVENT_NUMBERING_JUMP, (int64_t)(kept.cycle + count), (int64_t)count,
+			   0);
 	} else {
 		for (uint64_t i = 0; i < count; i++) {
 			cy->sample.cycle = kept.cycle + i;

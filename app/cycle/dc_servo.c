@@ -11,9 +11,9 @@
 #define FILTER_SHARE (1.0 / 16.0)
 
 enum {
-	LOSS_CYCLES = 200,  /* so long out of the window, far off or without a measurement is lost */
-	LEAK_CYCLES = 2,    /* what one cycle in the wrong place takes back */
-	CLAMP_LIMITS = 5,   /* one frame counts for at most so many lock limits */
+	LOSS_CYCLES = 200, /* so long out of the window, far off or without a measurement is lost */
+	LEAK_CYCLES = 2,   /* what one cycle in the wrong place takes back */
+	CLAMP_LIMITS = 5,  /* one frame counts for at most so many lock limits */
 };
 
 void dc_servo_init(struct dc_servo *servo, const struct dc_servo_spec *spec)
@@ -60,8 +60,9 @@ static struct dc_servo_result jump(struct dc_servo *servo, int64_t error_ns)
 }
 
 /*
- * Lock is won by the smoothed error, which one wild frame does not move; it is lost, and never won, by
- * raw errors that are large most of the time: noise without a clock behind it smooths to nothing, too.
+ * Lock is won by the smoothed error, which one wild frame does not move; it is lost, and never won,
+ * by raw errors that are large most of the time: noise without a clock behind it smooths to
+ * nothing, too.
  */
 static void judge(struct dc_servo *servo, int64_t error_ns)
 {
@@ -84,7 +85,8 @@ struct dc_servo_result dc_servo_update(struct dc_servo *servo, int64_t frame_dc_
 				       int64_t send_latency_ns)
 {
 	const struct dc_servo_spec *spec = &servo->spec;
-	int64_t error_ns = fold_ns(frame_dc_ns - send_latency_ns - spec->set_point_ns, spec->period_ns);
+	int64_t error_ns =
+		fold_ns(frame_dc_ns - send_latency_ns - spec->set_point_ns, spec->period_ns);
 	double clamp_ns = (double)(CLAMP_LIMITS * spec->lock_limit_ns);
 	double used_ns = clamp((double)error_ns, clamp_ns);
 	double integral_limit_ns = INTEGRAL_LIMIT_PPM * 1e-6 * (double)spec->period_ns;

@@ -10,8 +10,10 @@
 #include <stdint.h>
 
 enum {
-	NUMBERING_SKIP_LIMIT = 1000, /* skipped cycles that get a sample each; above, the numbers jump */
-	NUMBERING_REBASE_CYCLES = 100, /* so many frames off the grid in a row: the reference has changed */
+	NUMBERING_SKIP_LIMIT = 1000,   /* skipped cycles that get a sample each; above, the numbers
+					  jump */
+	NUMBERING_REBASE_CYCLES = 100, /* so many frames off the grid in a row: the reference has
+					  changed */
 };
 
 struct numbering {

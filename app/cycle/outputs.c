@@ -18,7 +18,8 @@ static int refuse(char *error, size_t error_bytes, const struct config *cfg,
 		  const struct config_output *wanted, const char *why)
 {
 	snprintf(error, error_bytes, "%s:%d: outputs: %s: %s",
-		 cfg->path[0] != '\0' ? cfg->path : "configuration", wanted->line, wanted->channel, why);
+		 cfg->path[0] != '\0' ? cfg->path : "configuration", wanted->line, wanted->channel,
+		 why);
 	return -EINVAL;
 }
 

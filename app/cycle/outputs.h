@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What goes out: for each output channel, the newest value its owner has put on its board, within its
- * limits; its fail-safe value while there is none, while the bus is not in OP, or when the owner has
- * been silent for too long. Context of outputs_choose(): cycle thread, RT-safe.
+ * What goes out: for each output channel, the newest value its owner has put on its board, within
+ * its limits; its fail-safe value while there is none, while the bus is not in OP, or when the
+ * owner has been silent for too long. Context of outputs_choose(): cycle thread, RT-safe.
  */
 #ifndef CYCLE_OUTPUTS_H
 #define CYCLE_OUTPUTS_H
@@ -29,7 +29,7 @@ struct output {
 struct outputs {
 	struct board *board[CYCLE_WRITERS];
 	struct board_set set[CYCLE_WRITERS];
-	uint64_t answered[CYCLE_WRITERS];     /* sequence of the last set that was answered */
+	uint64_t answered[CYCLE_WRITERS]; /* sequence of the last set that was answered */
 	uint64_t beat[CYCLE_WRITERS];
 	uint64_t silent_cycles[CYCLE_WRITERS];
 	struct output output[BOARD_OUTPUTS];

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Values in the process image, through their channel: raw bits, typed numbers, physical numbers. A
- * channel's bits must lie inside the image (image_channel_fits); the rest assumes it. Context: any, RT-safe.
+ * channel's bits must lie inside the image (image_channel_fits); the rest assumes it. Context: any,
+ * RT-safe.
  */
 #ifndef IMAGE_IMAGE_H
 #define IMAGE_IMAGE_H
@@ -23,8 +24,8 @@ double image_raw_to_physical(const struct channel *ch, uint64_t raw);
 double image_get_physical(const uint8_t *image, const struct channel *ch);
 
 /**
- * The raw bits for @physical, rounded to nearest. 0; -ERANGE if the type cannot hold it; -EINVAL for a NaN
- * (ret untouched on failure).
+ * The raw bits for @physical, rounded to nearest. 0; -ERANGE if the type cannot hold it; -EINVAL
+ * for a NaN (ret untouched on failure).
  */
 int image_physical_to_raw(const struct channel *ch, double physical, uint64_t *ret_raw);
 

@@ -20,7 +20,13 @@
 #include "sim/segment.h"
 #include "sim/wire_socket.h"
 
-enum { PIECE_BYTES = 96, SII_PATH_BYTES = 1024, CATCH_UP_NS = 1000000, HELD_MAX = 64, FRAME_BYTES = 1600 };
+enum {
+	PIECE_BYTES = 96,
+	SII_PATH_BYTES = 1024,
+	CATCH_UP_NS = 1000000,
+	HELD_MAX = 64,
+	FRAME_BYTES = 1600
+};
 
 /* A frame that a fault holds back. */
 struct held {
@@ -121,7 +127,8 @@ static int list_slaves(struct simulation *sim, char names[LIMIT_SLAVES][PIECE_BY
 
 		if (n == LIMIT_SLAVES || len == 0 || len >= PIECE_BYTES ||
 		    memchr(text, '/', len) != NULL) {
-			return sim_complain("--slaves: a list of at most 64 names is NAME,NAME,...");
+			return sim_complain(
+				"--slaves: a list of at most 64 names is NAME,NAME,...");
 		}
 		snprintf(names[n++], PIECE_BYTES, "%.*s", (int)len, text);
 		text += len + (text[len] == ',');
@@ -143,7 +150,8 @@ static int set_crystals(const struct simulation *sim, struct segment_slave_spec 
 			specs[i].ppm = strtod(text, &end);
 			if (end == text || (*end != ',' && *end != '\0') || specs[i].ppm < -1000 ||
 			    specs[i].ppm > 1000) {
-				return sim_complain("--ppm: numbers from -1000 to 1000, with commas");
+				return sim_complain(
+					"--ppm: numbers from -1000 to 1000, with commas");
 			}
 			text = *end == ',' ? end + 1 : end;
 		}
@@ -319,7 +327,8 @@ static int serve(struct simulation *sim)
 				 strerror(-n));
 			return sim_complain(line);
 		}
-		/* Nobody asks: let the slaves live on meanwhile, so that no frame has to wait for them. */
+		/* Nobody asks: let the slaves live on meanwhile, so that no frame has to wait for
+		 * them. */
 		segment_advance(sim->segment, wire_socket_now_ns());
 		if (sim->control_fd >= 0) {
 			control_serve(sim->control_fd, sim->faults,

@@ -11,7 +11,8 @@ static const char usage_text[] =
 	"A simulated EtherCAT segment on a network interface.\n"
 	"\n"
 	"  --interface NIC    where the master is: a veth, a tap, a real NIC\n"
-	"  --slaves WHAT      1 to 64: so many FB1111+Piccolo slaves (default 2); or names in order, of\n"
+	"  --slaves WHAT      1 to 64: so many FB1111+Piccolo slaves (default 2); or names in "
+	"order, of\n"
 	"                     SII images in --sii: ek1100,el2828; fb1111_piccolo is built in\n"
 	"  --sii DIR          folder of SII images NAME.bin\n"
 	"  --ppm A,B,...      crystals of the slaves, ppm (default: seeded, +-50)\n"
@@ -39,7 +40,8 @@ static int number_of(const char *text, const char *what, long low, long high, lo
 	long v = strtol(text, &end, 0);
 
 	if (end == text || *end != '\0' || v < low || v > high) {
-		snprintf(line, sizeof(line), "%s: '%.40s' is not %ld to %ld", what, text, low, high);
+		snprintf(line, sizeof(line), "%s: '%.40s' is not %ld to %ld", what, text, low,
+			 high);
 		return sim_complain(line);
 	}
 	*ret = v;
@@ -141,4 +143,3 @@ void sim_options_read(int argc, char **argv, struct sim_options *opt)
 		exit(2);
 	}
 }
-

@@ -21,7 +21,8 @@ struct sim_options {
 	int cpu;
 };
 
-/** Fill @opt over its defaults; ends the program on --help, --version (0) and on wrong options (2). */
+/** Fill @opt over its defaults; ends the program on --help, --version (0) and on wrong options (2).
+ */
 void sim_options_read(int argc, char **argv, struct sim_options *opt);
 
 /** "ecdaq-sim: WHAT" on stderr. Returns -1. */

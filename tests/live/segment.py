@@ -75,7 +75,9 @@ class Namespace:
 class Segment:
     """The programs, each started and ended by pid."""
 
-    def __init__(self, folder: Path, slaves: str = "2", settings: dict[str, str] | None = None) -> None:
+    def __init__(
+        self, folder: Path, slaves: str = "2", settings: dict[str, str] | None = None
+    ) -> None:
         self.folder = folder
         self.slaves = slaves
         self.record_dir = folder / "record"

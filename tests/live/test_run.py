@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
 from segment import BIN, ROOT, Segment, recorded, wait_for
 
 PERIOD_NS = 1_000_000
@@ -78,24 +77,34 @@ def test_a_minute_at_one_millisecond_loses_and_invents_nothing(
     both = good[0].keys() & good[1].keys()
     assert len(both) >= summary["samples_good"] // 2 - 10
     # The same instant: both slaves stamped their sample with the SYNC0 edge of the cycle.
-    assert all(good[0][k].sample_time == good[1][k].sample_time == good[0][k].dc_time_ns for k in both)
+    assert all(
+        good[0][k].sample_time == good[1][k].sample_time == good[0][k].dc_time_ns for k in both
+    )
 
 
 def check_values(samples: dict[int, Any]) -> None:
     """The counter went on by as many as the cycle; the ADC holds the 1 Hz sine of the generator."""
     numbers = sorted(samples)
     for before, after in zip(numbers, numbers[1:], strict=False):
-        assert (samples[after].counter - samples[before].counter) % 65536 == (after - before) % 65536
-    time_s = np.array([(samples[k].dc_time_ns - samples[numbers[0]].dc_time_ns) / 1e9 for k in numbers])
+        assert (samples[after].counter - samples[before].counter) % 65536 == (
+            after - before
+        ) % 65536
+    time_s = np.array(
+        [(samples[k].dc_time_ns - samples[numbers[0]].dc_time_ns) / 1e9 for k in numbers]
+    )
     volt = np.array([samples[k].adc for k in numbers]) * 3.3 / 4095
     frequency, amplitude, offset = fit_sine(time_s, volt)
-    print(f"sine: {frequency:.4f} Hz, {amplitude:.4f} V around {offset:.4f} V, {len(numbers)} samples")
+    print(
+        f"sine: {frequency:.4f} Hz, {amplitude:.4f} V around {offset:.4f} V, {len(numbers)} samples"
+    )
     assert abs(frequency - 1.0) < 0.001
     assert abs(amplitude - 0.5) < 0.005
     assert abs(offset - 1.0) < 0.005
 
 
-def test_a_recorder_killed_for_ten_seconds_misses_no_cycle(make_segment: Callable[..., Segment]) -> None:
+def test_a_recorder_killed_for_ten_seconds_misses_no_cycle(
+    make_segment: Callable[..., Segment],
+) -> None:
     segment = make_segment()
     segment.start_all()
     wait_for("a recording", lambda: segment.status().get("recorded_cycles", 0) > 1000, 30)
@@ -118,8 +127,14 @@ def test_a_stopped_reader_of_the_ring_changes_nothing_for_the_cycle(
     """Half the time with a reader, half with it stopped, in one run; counts are compared, not times."""
     segment = make_segment()
     segment.start_all()
-    segment.start("watch", str(BIN / "ecdaq"), "--run-dir", str(segment.run_dir), "watch",
-                  f"{PICCOLOS[0]}.adc")
+    segment.start(
+        "watch",
+        str(BIN / "ecdaq"),
+        "--run-dir",
+        str(segment.run_dir),
+        "watch",
+        f"{PICCOLOS[0]}.adc",
+    )
     before = segment.status()
     with_reader = segment.wait_for_cycles(5_000, 60)
     segment.send("watch", signal.SIGSTOP)
@@ -166,14 +181,39 @@ def test_an_output_set_by_the_operator_is_on_the_wire_in_the_cycle_it_is_told(
 
 def test_build_sh_run_ends_with_one_json_line(tmp_path: Path) -> None:
     got = subprocess.run(
-        [str(ROOT / "build.sh"), "run", "--seconds", "5", "--slaves", "3", "--json",
-         "--record", str(tmp_path / "record")],
-        capture_output=True, text=True, timeout=300, check=False,
+        [
+            str(ROOT / "build.sh"),
+            "run",
+            "--seconds",
+            "5",
+            "--slaves",
+            "3",
+            "--json",
+            "--record",
+            str(tmp_path / "record"),
+        ],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
     )
     assert got.returncode == 0, got.stderr
     line = json.loads(got.stdout.strip().splitlines()[-1])
-    for key in ("state", "slaves", "cycles", "frames_lost", "frames_late", "overruns", "samples_good",
-                "samples_bad", "dc_lock_ms", "page_faults", "recording", "recorded_cycles", "recorded_gaps"):
+    for key in (
+        "state",
+        "slaves",
+        "cycles",
+        "frames_lost",
+        "frames_late",
+        "overruns",
+        "samples_good",
+        "samples_bad",
+        "dc_lock_ms",
+        "page_faults",
+        "recording",
+        "recorded_cycles",
+        "recorded_gaps",
+    ):
         assert key in line
     for key in ("wake_latency_ns", "round_trip_ns", "phase_ns"):
         assert set(line[key]) >= {"p50", "p99", "p999", "max"}
@@ -187,7 +227,10 @@ def test_build_sh_run_ends_with_one_json_line(tmp_path: Path) -> None:
 def test_ctrl_c_ends_the_run_in_order(tmp_path: Path) -> None:
     process = subprocess.Popen(
         [str(ROOT / "build.sh"), "run", "--record", str(tmp_path / "record")],
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
     )
     try:
         record = tmp_path / "record"

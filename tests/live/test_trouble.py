@@ -9,7 +9,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-
 from segment import BIN, Segment, wait_for
 
 
@@ -26,19 +25,30 @@ def only_line(got: subprocess.CompletedProcess[str]) -> str:
     return lines[-1]
 
 
-def test_a_nic_that_is_not_there_is_named_with_those_that_are(make_segment: Callable[..., Segment]) -> None:
+def test_a_nic_that_is_not_there_is_named_with_those_that_are(
+    make_segment: Callable[..., Segment],
+) -> None:
     segment = make_segment(settings={"bus.interface": "eth77"})
     line = only_line(run_daemon(segment))
     assert "eth77" in line and "ecat0" in line
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="needs root to give rights away")
-def test_without_the_right_to_raw_sockets_the_line_names_it(make_segment: Callable[..., Segment]) -> None:
+def test_without_the_right_to_raw_sockets_the_line_names_it(
+    make_segment: Callable[..., Segment],
+) -> None:
     segment = make_segment()
     segment.run_dir.chmod(0o777)
     got = segment.space.run(
-        "setpriv", "--reuid", "65534", "--clear-groups", "--inh-caps=-all", "--bounding-set=-all",
-        str(BIN / "ecdaqd"), *segment.options(), check=False,
+        "setpriv",
+        "--reuid",
+        "65534",
+        "--clear-groups",
+        "--inh-caps=-all",
+        "--bounding-set=-all",
+        str(BIN / "ecdaqd"),
+        *segment.options(),
+        check=False,
     )
     assert "CAP_NET_RAW" in only_line(got)
 
@@ -61,7 +71,9 @@ def configured(segment: Segment, slaves: list[dict[str, str]]) -> Path:
 PICCOLO = {"vendor": "0x00000002", "product": "0x04570862", "revision": "0x0258008d"}
 
 
-def test_a_wrong_slave_is_named_by_position_and_identity(make_segment: Callable[..., Segment]) -> None:
+def test_a_wrong_slave_is_named_by_position_and_identity(
+    make_segment: Callable[..., Segment],
+) -> None:
     segment = make_segment()
     segment.start_sim()
     file = configured(segment, [PICCOLO, PICCOLO | {"product": "0x0afe1234"}])
@@ -71,7 +83,9 @@ def test_a_wrong_slave_is_named_by_position_and_identity(make_segment: Callable[
 
 
 @pytest.mark.parametrize("wanted", [1, 3])
-def test_a_slave_too_many_or_too_few_is_said(make_segment: Callable[..., Segment], wanted: int) -> None:
+def test_a_slave_too_many_or_too_few_is_said(
+    make_segment: Callable[..., Segment], wanted: int
+) -> None:
     segment = make_segment()
     segment.start_sim()
     file = configured(segment, [PICCOLO] * wanted)
@@ -79,7 +93,9 @@ def test_a_slave_too_many_or_too_few_is_said(make_segment: Callable[..., Segment
     assert "2" in line and str(wanted) in line
 
 
-def test_a_second_instance_is_refused_and_the_first_goes_on(make_segment: Callable[..., Segment]) -> None:
+def test_a_second_instance_is_refused_and_the_first_goes_on(
+    make_segment: Callable[..., Segment],
+) -> None:
     segment = make_segment()
     segment.start_all()
     line = only_line(run_daemon(segment))
@@ -87,7 +103,9 @@ def test_a_second_instance_is_refused_and_the_first_goes_on(make_segment: Callab
     assert segment.wait_for_cycles(1000, 30)["state"] == "OP"
 
 
-def test_an_sdo_the_slave_refuses_is_an_error_with_its_abort_code(make_segment: Callable[..., Segment]) -> None:
+def test_an_sdo_the_slave_refuses_is_an_error_with_its_abort_code(
+    make_segment: Callable[..., Segment],
+) -> None:
     segment = make_segment()
     segment.start_sim()
     file = segment.folder / "ecdaq.yaml"
@@ -99,12 +117,16 @@ def test_an_sdo_the_slave_refuses_is_an_error_with_its_abort_code(make_segment: 
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="needs root to mount a small file system")
-def test_a_full_disk_stops_the_recording_and_never_the_cycle(make_segment: Callable[..., Segment]) -> None:
+def test_a_full_disk_stops_the_recording_and_never_the_cycle(
+    make_segment: Callable[..., Segment],
+) -> None:
     segment = make_segment(settings={"record.reserve": "1MiB", "record.compression": "0"})
     segment.record_dir.mkdir()
     segment.space.run("mount", "-t", "tmpfs", "-o", "size=3m", "none", str(segment.record_dir))
     segment.start_all()
-    wait_for("the alarm", lambda: "disk" in segment.status().get("recorder", {}).get("state", ""), 60)
+    wait_for(
+        "the alarm", lambda: "disk" in segment.status().get("recorder", {}).get("state", ""), 60
+    )
     after = segment.wait_for_cycles(2000, 30)
     assert after["state"] == "OP"
     assert after["samples_bad_unexplained"] == 0

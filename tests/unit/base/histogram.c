@@ -40,9 +40,10 @@ TEST(histogram, values_beyond_the_last_bucket_are_kept_in_it)
 {
 	histogram_clear(&h);
 	histogram_add(&h, INT64_MAX / 2);
-	CHECK_EQ(histogram_percentile(&h, 990000), INT64_MAX / 2 < histogram_bucket_floor(HISTOGRAM_BUCKETS) - 1
-							   ? INT64_MAX / 2
-							   : histogram_bucket_floor(HISTOGRAM_BUCKETS) - 1);
+	CHECK_EQ(histogram_percentile(&h, 990000),
+		 INT64_MAX / 2 < histogram_bucket_floor(HISTOGRAM_BUCKETS) - 1
+			 ? INT64_MAX / 2
+			 : histogram_bucket_floor(HISTOGRAM_BUCKETS) - 1);
 	histogram_add(&h, 0);
 	CHECK_EQ(histogram_percentile(&h, 500000), 0);
 }

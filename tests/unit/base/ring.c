@@ -110,7 +110,8 @@ TEST(ring, a_write_through_a_readers_map_faults)
 		_exit(0);
 	}
 	CHECK_EQ(waitpid(pid, &status, 0), pid);
-	/* A sanitizer turns the signal into an exit code of its own; only 0 would mean it was written. */
+	/* A sanitizer turns the signal into an exit code of its own; only 0 would mean it was
+	 * written. */
 	CHECK(WIFSIGNALED(status) || WEXITSTATUS(status) != 0);
 	CHECK_STR(ring_meta(reader, &bytes), "hello");
 	ring_reader_destroy(reader);

@@ -14,10 +14,10 @@ enum { IMAGE_BYTES = 5, OUTPUT_BYTES = 1 };
 
 static struct {
 	mono_t now;
-	int64_t late_ns;          /* of the next wake */
+	int64_t late_ns; /* of the next wake */
 	uint16_t counter[2];
 	enum exchange_status status;
-	int64_t dc_offset_ns;     /* DC time minus host time */
+	int64_t dc_offset_ns; /* DC time minus host time */
 	int64_t transit_ns;
 	unsigned late;
 	unsigned doubled;
@@ -95,7 +95,11 @@ static int world_sleep(void *ctx, mono_t deadline)
 }
 
 static const struct channel channels[] = {
-	{ .name = "a.led", .direction = CHANNEL_OUTPUT, .type = CHANNEL_BOOL, .bit_len = 1, .scale = 1 },
+	{ .name = "a.led",
+	  .direction = CHANNEL_OUTPUT,
+	  .type = CHANNEL_BOOL,
+	  .bit_len = 1,
+	  .scale = 1 },
 	{ .name = "a.counter", .type = CHANNEL_UINT, .bit_len = 16, .bit_offset = 8, .scale = 1 },
 	{ .name = "b.counter", .type = CHANNEL_UINT, .bit_len = 16, .bit_offset = 24, .scale = 1 },
 };
@@ -114,8 +118,12 @@ static struct ring *make_ring(const char *kind, uint32_t payload_bytes, struct r
 {
 	struct ring *ring;
 	char path[64];
-	struct ring_spec spec = { .path = path, .kind = kind, .payload_bytes = payload_bytes,
-				  .slot_count = 8192, .period_ns = PERIOD_NS, .file_mode = 0600 };
+	struct ring_spec spec = { .path = path,
+				  .kind = kind,
+				  .payload_bytes = payload_bytes,
+				  .slot_count = 8192,
+				  .period_ns = PERIOD_NS,
+				  .file_mode = 0600 };
 
 	snprintf(path, sizeof(path), "/dev/shm/ecdaq-test-%s-%d", kind, (int)getpid());
 	CHECK_EQ(ring_create(&spec, &ring), 0);
@@ -144,8 +152,11 @@ static void start(void)
 	cfg.dc_slew_ns = 20000;
 	cfg.dc_kp = 0.02;
 	cfg.dc_ki = 0.0001;
-	plan = (struct exchange_plan){ .image_bytes = IMAGE_BYTES, .output_bytes = OUTPUT_BYTES,
-				       .chunk_count = 1, .wkc_expected = 4, .slave_count = 2,
+	plan = (struct exchange_plan){ .image_bytes = IMAGE_BYTES,
+				       .output_bytes = OUTPUT_BYTES,
+				       .chunk_count = 1,
+				       .wkc_expected = 4,
+				       .slave_count = 2,
 				       .dc_reference = 0x1001 };
 	board_init(&board);
 	samples = make_ring("sample", sizeof(struct sample_header) + IMAGE_BYTES, &reader);
@@ -389,8 +400,12 @@ TEST(cycle, an_output_goes_out_in_op_only_and_is_answered_with_its_cycle)
 TEST(cycle, an_output_that_is_not_there_is_one_clear_line)
 {
 	char error[256] = "";
-	struct cycle_spec spec = { .cfg = &cfg, .plan = &plan, .channels = channels,
-				   .channel_count = 3, .slaves = slaves, .slave_count = 2 };
+	struct cycle_spec spec = { .cfg = &cfg,
+				   .plan = &plan,
+				   .channels = channels,
+				   .channel_count = 3,
+				   .slaves = slaves,
+				   .slave_count = 2 };
 
 	start();
 	cfg.output_count = 1;
@@ -408,8 +423,9 @@ TEST(cycle, a_silent_owner_loses_its_output_after_its_timeout_in_cycles)
 	unsigned cycles = 0;
 
 	cfg.output_count = 1;
-	cfg.output[0] = (struct config_output){ .channel = "a.led", .min = 0, .max = 1,
-						.timeout_ns = 20 * PERIOD_NS };
+	cfg.output[0] = (struct config_output){
+		.channel = "a.led", .min = 0, .max = 1, .timeout_ns = 20 * PERIOD_NS
+	};
 	start();
 	cfg.output_count = 0;
 	steps(300);

@@ -32,7 +32,8 @@ struct plant {
 
 static struct dc_servo_result turn(struct plant *p)
 {
-	int64_t late = p->latency_ns > 0 ? (int64_t)prng_below(&p->prng, (uint64_t)p->latency_ns) : 0;
+	int64_t late =
+		p->latency_ns > 0 ? (int64_t)prng_below(&p->prng, (uint64_t)p->latency_ns) : 0;
 	struct dc_servo_result r = dc_servo_update(&p->servo, (int64_t)p->host_ns + late, late);
 
 	p->host_ns += (double)(PERIOD_NS + r.correction_ns) * (1.0 + p->ppm * 1e-6);
@@ -41,7 +42,9 @@ static struct dc_servo_result turn(struct plant *p)
 
 static struct plant make_plant(uint64_t seed, double start_ns, double ppm, int64_t latency_ns)
 {
-	struct plant p = { .prng = { seed }, .host_ns = start_ns, .ppm = ppm, .latency_ns = latency_ns };
+	struct plant p = {
+		.prng = { seed }, .host_ns = start_ns, .ppm = ppm, .latency_ns = latency_ns
+	};
 
 	dc_servo_init(&p.servo, &spec);
 	return p;

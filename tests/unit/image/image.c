@@ -23,8 +23,8 @@ TEST(image, what_is_set_is_got_and_no_other_bit_moves)
 
 	for (int round = 0; round < 20000; round++) {
 		unsigned bit_len = 1 + (unsigned)prng_below(&prng, 64);
-		struct channel ch = make(CHANNEL_UINT, (uint32_t)prng_below(&prng, 128 - bit_len + 1),
-					 bit_len);
+		struct channel ch =
+			make(CHANNEL_UINT, (uint32_t)prng_below(&prng, 128 - bit_len + 1), bit_len);
 		uint64_t mask = bit_len == 64 ? UINT64_MAX : (UINT64_C(1) << bit_len) - 1;
 		uint64_t raw = prng_next(&prng);
 		uint8_t before[16];
