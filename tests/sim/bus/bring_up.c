@@ -188,6 +188,25 @@ TEST(bring_up, mixed_line_packs_bits_and_bytes)
 	bench_destroy(b);
 }
 
+TEST(bring_up, many_kinds_of_real_images_stand_in_one_line)
+{
+	struct bus_bench *b = bench_create(&(struct bench_spec){
+		.piccolos = 1,
+		.sii = { "ek1100", "el1008", "el2004", "el3204", "el4002", "el2521-0000", "akd" },
+		.seed = 21 });
+	size_t count;
+
+	bench_bring_up(b);
+	bench_run(b, 100);
+	CHECK_EQ(b->last.status, EXCHANGE_OK);
+	bus_slaves(b->bus, &count);
+	CHECK_EQ(count, 8);
+	CHECK_EQ(bench_watch(b).is_all_op, 1);
+	CHECK_EQ(bench_channel(b, "el2004_3.channel_3_output")->direction, CHANNEL_OUTPUT);
+	CHECK_EQ(bench_stop(b), 0);
+	bench_destroy(b);
+}
+
 TEST(bring_up, slave_that_says_coe_answers_or_is_an_error)
 {
 	struct bus_bench *b = bench_create(&(struct bench_spec){ .sii = { "akd" }, .seed = 7 });
@@ -210,6 +229,7 @@ TEST(bring_up, slave_without_clock_between_two_with_clocks_is_no_obstacle)
 	struct bus_bench *b =
 		bench_create(&(struct bench_spec){ .sii = { "el1008", "el1008", "el1008" },
 						   .clockless = 1u << 1,
+						   .clocked = 1u << 0 | 1u << 2,
 						   .ppm = { 100, 0, -100 },
 						   .seed = 8 });
 	const struct slave_info *slaves;

@@ -66,6 +66,9 @@ static void make_segment(struct bus_bench *b, const struct bench_spec *spec)
 		if ((spec->clockless >> i & 1) != 0) {
 			slaves[i].features = &clockless;
 		}
+		if ((spec->clocked >> i & 1) != 0) {
+			slaves[i].features = &esc_et1100;
+		}
 		slaves[i].ppm = spec->ppm[i];
 		slaves[i].clock_start_ns = spec->clock_start_ns[i] != 0
 						   ? spec->clock_start_ns[i]

@@ -23,6 +23,7 @@ struct bench_spec {
 	double host_ppm;
 	uint64_t seed;
 	uint64_t clockless;   /* bit n: slave n has no distributed clock */
+	uint64_t clocked;     /* bit n: slave n has an ET1100's */
 	int64_t tai_start_ns; /* 0: 2026 */
 	uint64_t clock_start_ns[LIMIT_SLAVES];
 	const char *const *settings; /* of config_set(), NULL at the end */
