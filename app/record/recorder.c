@@ -206,15 +206,18 @@ static void note_tai_offset(struct sample_feed *samples)
 	}
 }
 
-/* Events go where samples go; one that comes while no file is open opens it. Returns how many were
- * taken. */
-static int take_events(struct recorder *rec)
+enum events_until {
+	EVENTS_UNTIL_SAMPLE, /* a backlog of samples is read: later events wait for their time */
+	EVENTS_ALL,          /* all samples are read; an event may open a file, too */
+};
+
+/* Events go where samples go. Returns how many were taken. */
+static int take_events(struct recorder *rec, enum events_until until)
 {
 	struct event_mark mark = event_mark(rec);
 	struct event ev;
 	uint64_t sequence;
 	uint64_t lost;
-
 	int taken = 0;
 
 	if (sink_state(rec->sink) != SINK_READY) {
@@ -230,7 +233,8 @@ static int take_events(struct recorder *rec)
 		if (!got) {
 			break;
 		}
-		if (sample_feed_event(rec->samples, &ev, sequence) < 0) {
+		if ((until == EVENTS_UNTIL_SAMPLE && sample_feed_is_behind(rec->samples, &ev)) ||
+		    sample_feed_event(rec->samples, &ev, sequence) < 0) {
 			event_feed_unread(rec->events);
 			break;
 		}
@@ -243,7 +247,7 @@ static int end_session(struct recorder *rec, const char *reason)
 {
 	int r;
 
-	while (take_events(rec) == EVENTS_A_STEP) {
+	while (take_events(rec, EVENTS_ALL) == EVENTS_A_STEP) {
 	}
 	r = sink_end_session(rec->sink, reason);
 	if (r < 0) {
@@ -265,10 +269,10 @@ static enum recorder_result follow(struct recorder *rec)
 
 	switch (sample_feed_read(rec->samples, SAMPLES_A_STEP)) {
 	case SAMPLE_FEED_MORE:
-		(void)take_events(rec);
+		(void)take_events(rec, EVENTS_UNTIL_SAMPLE);
 		return RECORDER_BUSY;
 	case SAMPLE_FEED_EMPTY:
-		(void)take_events(rec);
+		(void)take_events(rec, EVENTS_ALL);
 		if (is_gone && sink_state(rec->sink) == SINK_READY &&
 		    end_session(rec, "producer gone") == 0) {
 			return RECORDER_ENDED;

@@ -10,6 +10,8 @@
 #include "base/clock.h"
 #include "base/timemap.h"
 
+#define EVENT_LEAD_NS (100 * NS_PER_MS)
+
 enum time_base {
 	TIME_UNKNOWN,
 	TIME_DC,     /* the samples' DC time */
@@ -317,11 +319,19 @@ enum sample_feed_result sample_feed_read(struct sample_feed *s, unsigned most)
 	return SAMPLE_FEED_MORE;
 }
 
+int sample_feed_is_behind(const struct sample_feed *s, const struct event *ev)
+{
+	return timemap_tai_to_utc_ns(s->map, ev->tai_ns) > s->utc_ns;
+}
+
 int sample_feed_event(struct sample_feed *s, const struct event *ev, uint64_t sequence)
 {
 	int64_t utc_ns = timemap_tai_to_utc_ns(s->map, ev->tai_ns);
 	char text[256];
-	int r = sink_open_file(s->sink, s->next_cycle, utc_ns);
+	/* The next sample's SYNC0 may be a little older than the event: its time must not be pushed
+	 * up. */
+	int64_t start_ns = s->utc_ns != 0 ? s->utc_ns : utc_ns - EVENT_LEAD_NS;
+	int r = sink_open_file(s->sink, s->next_cycle, start_ns);
 
 	event_format(ev, text, sizeof(text));
 	return r < 0 ? r

@@ -37,6 +37,8 @@ enum sample_feed_result sample_feed_read(struct sample_feed *s, unsigned most);
 /** Read again from where the sink says: what it had is partly lost. */
 void sample_feed_rewind(struct sample_feed *s);
 
+/** 1 if the samples read so far are older than @ev. */
+int sample_feed_is_behind(const struct sample_feed *s, const struct event *ev);
 /** Give an event of the master to the sink, with text and time. 0 or -errno. */
 int sample_feed_event(struct sample_feed *s, const struct event *ev, uint64_t sequence);
 

@@ -12,6 +12,7 @@
 #include "base/event.h"
 #include "harness/test.h"
 #include "record/file_io.h"
+#include "record/messages.h"
 #include "record/store.h"
 
 static mono_t bench_now(void *ctx)
@@ -207,6 +208,7 @@ void bench_push(struct bench *b, uint64_t first, uint64_t count)
 		};
 		uint8_t image[BENCH_IMAGE_BYTES];
 
+		b->newest_tai_ns = h.wake_tai_ns;
 		put_le32(image, (uint32_t)cycle);
 		ring_push(b->ring, &h, sizeof(h), image, sizeof(image));
 	}
@@ -216,6 +218,7 @@ void bench_push_event(struct bench *b, uint64_t number)
 {
 	const struct event ev = { .id = EVENT_OUTPUT_SET,
 				  .mono_ns = (int64_t)(b->session * 1000 + number),
+				  .tai_ns = b->newest_tai_ns + 300000,
 				  .value = (int64_t)number,
 				  .slave_pos = 0 };
 
@@ -270,9 +273,31 @@ int bench_stop(struct bench *b)
 	return r;
 }
 
-static void read_one(const char *path, struct track *t)
+struct reading {
+	struct track track;
+	int has_even_times;
+	int64_t offset_ns; /* log time of cycle 0; 0: not known yet */
+};
+
+static void read_item(void *ctx, const struct mcap_item *item)
 {
-	const struct mcap_visitor visitor = { .item = track_visit, .ctx = t };
+	struct reading *r = ctx;
+	uint64_t cycle;
+
+	track_item(&r->track, item);
+	if (r->has_even_times && item->kind == MCAP_ITEM_MESSAGE &&
+	    item->id == r->track.cycle_channel &&
+	    messages_decode_cycle(item->data, item->data_len, &cycle) == 0) {
+		int64_t offset_ns = (int64_t)(item->log_time_ns - cycle * 1000000);
+
+		r->offset_ns = r->offset_ns != 0 ? r->offset_ns : offset_ns;
+		CHECK_EQ(offset_ns, r->offset_ns);
+	}
+}
+
+static void read_one(const char *path, struct reading *reading)
+{
+	const struct mcap_visitor visitor = { .item = read_item, .ctx = reading };
 	struct mcap_source source;
 	struct mcap_scan *scan;
 	int fd = open(path, O_RDONLY | O_CLOEXEC);
@@ -287,20 +312,20 @@ static void read_one(const char *path, struct track *t)
 struct track bench_read(struct bench *b, unsigned *ret_finished, unsigned *ret_parts)
 {
 	struct store_entry *entries;
-	struct track t;
+	struct reading reading = { .has_even_times = b->has_even_times };
 	size_t count;
 
 	*ret_finished = 0;
 	*ret_parts = 0;
-	track_init(&t);
+	track_init(&reading.track);
 	CHECK_EQ(store_list(b->dir, &entries, &count), 0);
 	for (size_t i = 0; i < count; i++) {
 		char path[2 * BENCH_PATH_BYTES];
 
 		*(entries[i].is_part ? ret_parts : ret_finished) += 1;
 		CHECK_EQ(store_path(b->dir, entries[i].name, path, sizeof(path)), 0);
-		read_one(path, &t);
+		read_one(path, &reading);
 	}
 	free(entries);
-	return t;
+	return reading.track;
 }

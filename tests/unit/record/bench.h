@@ -24,7 +24,9 @@ struct bench {
 	struct ring *events;
 	uint64_t session;
 	int64_t now_ns;
-	int64_t tai_step_ns; /* the host's clock was set by this much */
+	int64_t tai_step_ns;   /* the host's clock was set by this much */
+	int64_t newest_tai_ns; /* of the newest sample */
+	int has_even_times;    /* bench_read() CHECKs that log times go on evenly over all files */
 	struct recorder_options options;
 	struct recorder *recorder;
 	struct record_seam seam;
