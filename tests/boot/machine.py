@@ -92,7 +92,7 @@ class Machine:
         command += ["-drive", "file=disk.img,if=none,format=raw,id=disk"]
         command += ["-device", "virtio-blk-pci,drive=disk", "-device", "virtio-rng-pci"]
         command += ["-netdev", f"user,id=lan,hostfwd=tcp:127.0.0.1:{self.port}-:22"]
-        command += ["-device", "virtio-net-pci,netdev=lan", "-serial", f"file:{log}"]
+        command += ["-device", "virtio-net-pci,netdev=lan,romfile=", "-serial", f"file:{log}"]
         self.process = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,

@@ -89,5 +89,5 @@ echo "-- ssh -p $port -i $vm/key operator@127.0.0.1    (end: Ctrl-a x)" >&2
 exec "$here/qemu.sh" "$vm" qemu-system-aarch64 -M virt,gic-version=3 -cpu cortex-a72 -smp 2 -m 1024 \
 	$timing -nographic -no-reboot -kernel vmlinux -append "$(cat "$image/$name.cmdline")" \
 	-drive file=disk.img,if=none,format=raw,id=disk -device virtio-blk-pci,drive=disk \
-	-netdev "user,id=lan,hostfwd=tcp:127.0.0.1:$port-:22" -device virtio-net-pci,netdev=lan \
+	-netdev "user,id=lan,hostfwd=tcp:127.0.0.1:$port-:22" -device virtio-net-pci,netdev=lan,romfile= \
 	-device virtio-rng-pci "$@"

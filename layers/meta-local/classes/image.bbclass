@@ -8,6 +8,7 @@ WORKDIR = "${TMPDIR}/work/${DISTRO}-${DISTRO_ARCH}/${PN}-${MACHINE}"
 STAMP = "${STAMPS_DIR}/${PN}-${MACHINE}"
 IMAGE_FULLNAME = "${PN}-${DISTRO}-${MACHINE}"
 IMAGE_ROOTFS = "${WORKDIR}/rootfs"
+KERNEL_IMAGE ?= "${IMAGE_FULLNAME}-vmlinux"
 KERNEL_IMAGE_PKG ??= "${@'linux-image-' + d.getVar('KERNEL_NAME') if d.getVar('KERNEL_NAME') else ''}"
 IMAGE_INSTALL += "${KERNEL_IMAGE_PKG}"
 IMAGE_BOOT_FILES ??= ""
@@ -41,6 +42,9 @@ python do_rootfs_base() {
         ["mmdebstrap", "--mode=root", "--variant=essential", "--format=tar",
          "--architectures=" + d.getVar("DISTRO_ARCH"),
          "--include=" + ",".join(d.getVar("IMAGE_PREINSTALL").split()), *options,
+         # Host keys made here would be thrown away, and emulated they take a minute.
+         "--essential-hook=mkdir -p $1/etc/ssh && cd $1/etc/ssh && "
+         "touch ssh_host_rsa_key ssh_host_ecdsa_key ssh_host_ed25519_key",
          "--aptopt=APT::Install-Recommends \"false\"", "--aptopt=Acquire::Retries \"3\"",
          suite, os.path.join(d.getVar("WORKDIR"), "base", "base.tar"), *sources],
         log=open(d.getVar("BB_LOGFILE"), "a"))

@@ -16,3 +16,6 @@ rm -rf "$root"/var/log/* "$root"/var/cache/* "$root"/var/lib/apt/lists/* "$root"
 rm -f "$root"/var/lib/dpkg/*-old "$root"/etc/*- "$root"/etc/apt/sources.list
 rm -rf "$root"/etc/apt/sources.list.d/* "$root"/var/backups/*
 find "$root/usr/share/doc" -type d -empty -delete
+
+# Nothing has to be brought up to date at first boot.
+touch "$root/etc/.updated" "$root/var/.updated"
