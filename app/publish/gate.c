@@ -1,0 +1,309 @@
+/* SPDX-License-Identifier: MIT */
+#include "publish/gate.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "image/image.h"
+
+struct commander {
+	uint64_t sender; /* 0: free */
+	uint64_t last_id;
+	int has_id;
+	double tokens; /* commands it may send now */
+	int64_t refilled_ns;
+};
+
+struct gate {
+	const struct config *cfg;
+	struct commander commander[GATE_COMMANDERS];
+	uint64_t setter[BOARD_OUTPUTS];
+};
+
+struct gate *gate_create(const struct config *cfg)
+{
+	struct gate *gate = calloc(1, sizeof(*gate));
+
+	if (gate != NULL) {
+		gate->cfg = cfg;
+	}
+	return gate;
+}
+
+void gate_destroy(struct gate *gate)
+{
+	free(gate);
+}
+
+__attribute__((format(printf, 3, 4))) static int refuse(char *reason, int error, const char *format,
+							...)
+{
+	va_list args;
+
+	va_start(args, format);
+	vsnprintf(reason, GATE_REASON_BYTES, format, args);
+	va_end(args);
+	return error;
+}
+
+const struct config_output *gate_rules(const struct config *cfg, const char *name)
+{
+	for (size_t i = 0; i < cfg->output_count; i++) {
+		if (strcmp(cfg->output[i].channel, name) == 0) {
+			return &cfg->output[i];
+		}
+	}
+	return NULL;
+}
+
+int64_t gate_lease_ns(const struct config *cfg)
+{
+	int64_t lease_ns = NS_PER_S;
+
+	for (size_t i = 0; i < cfg->output_count; i++) {
+		int64_t half_ns = cfg->output[i].timeout_ns / 2;
+
+		if (half_ns > 0 && half_ns < lease_ns) {
+			lease_ns = half_ns;
+		}
+	}
+	return lease_ns < 20 * NS_PER_MS ? 20 * NS_PER_MS : lease_ns;
+}
+
+static struct commander *find(struct gate *gate, uint64_t sender)
+{
+	for (size_t i = 0; i < GATE_COMMANDERS; i++) {
+		if (gate->commander[i].sender == sender) {
+			return &gate->commander[i];
+		}
+	}
+	return NULL;
+}
+
+static struct commander *admit(struct gate *gate, uint64_t sender, int64_t now_ns)
+{
+	struct commander *c = find(gate, sender);
+
+	if (c == NULL) {
+		c = find(gate, 0);
+		if (c != NULL) {
+			*c = (struct commander){ .sender = sender,
+						 .tokens = gate->cfg->dds_command_rate,
+						 .refilled_ns = now_ns };
+		}
+	}
+	return c;
+}
+
+void gate_forget(struct gate *gate, uint64_t sender)
+{
+	struct commander *c = sender == 0 ? NULL : find(gate, sender);
+
+	if (c != NULL) {
+		*c = (struct commander){ .sender = 0 };
+	}
+	for (unsigned i = 0; i < BOARD_OUTPUTS; i++) {
+		if (gate->setter[i] == sender) {
+			gate->setter[i] = 0;
+		}
+	}
+}
+
+void gate_note_set(struct gate *gate, unsigned output, uint64_t sender)
+{
+	gate->setter[output] = sender;
+}
+
+uint64_t gate_setter(const struct gate *gate, unsigned output)
+{
+	return gate->setter[output];
+}
+
+/* A bucket of one second's worth. */
+static int is_too_often(struct commander *c, uint32_t rate, int64_t now_ns)
+{
+	c->tokens += (double)(now_ns - c->refilled_ns) * rate / 1e9;
+	c->refilled_ns = now_ns;
+	if (c->tokens > rate) {
+		c->tokens = rate;
+	}
+	if (c->tokens < 1) {
+		return 1;
+	}
+	c->tokens -= 1;
+	return 0;
+}
+
+static int check_order(struct commander *c, const struct gate_command *cmd,
+		       const struct gate_view *view, char *reason)
+{
+	if (c->has_id && cmd->id == c->last_id) {
+		return refuse(reason, -EALREADY, "id %" PRIu64 " came before: doubled", cmd->id);
+	}
+	if (c->has_id && cmd->id < c->last_id) {
+		return refuse(reason, -ESTALE, "id %" PRIu64 " is older than %" PRIu64 ": stale",
+			      cmd->id, c->last_id);
+	}
+	c->has_id = 1;
+	c->last_id = cmd->id;
+	if (cmd->session != 0 && cmd->session != view->table->meta->session) {
+		return refuse(reason, -ESTALE, "meant for session %" PRIu64 ", not for this: stale",
+			      cmd->session);
+	}
+	if (cmd->not_after_cycle != 0 && view->cycle >= cmd->not_after_cycle) {
+		return refuse(reason, -ESTALE,
+			      "not after cycle %" PRIu64 ", it is %" PRIu64 ": stale",
+			      cmd->not_after_cycle, view->cycle);
+	}
+	return 0;
+}
+
+static unsigned output_index(const struct slave_table *table, uint32_t channel)
+{
+	unsigned output = 0;
+
+	for (uint32_t i = 0; i < channel; i++) {
+		output += table->channels[i].direction == CHANNEL_OUTPUT;
+	}
+	return output;
+}
+
+static int check_range(const struct channel *ch, const struct config_output *rules, uint64_t raw,
+		       char *reason)
+{
+	double physical;
+
+	if (ch->bit_len < 64 && raw >> ch->bit_len != 0) {
+		return refuse(reason, -ERANGE, "%s: %" PRIu64 " does not fit in %u bits", ch->name,
+			      raw, ch->bit_len);
+	}
+	physical = image_raw_to_physical(ch, raw);
+	/* A NaN is in no range. */
+	if (!(physical >= rules->min && physical <= rules->max)) {
+		return refuse(reason, -ERANGE, "%s: %g is outside %g to %g (outputs[])", ch->name,
+			      physical, rules->min, rules->max);
+	}
+	return 0;
+}
+
+static const char *owner_of(const struct config_output *rules)
+{
+	return rules == NULL || rules->owner == CONFIG_OWNER_LOCAL ? "local" : "program";
+}
+
+static int check_item(const struct gate *gate, const struct gate_command *cmd, uint32_t i,
+		      const struct slave_table *table, struct gate_item *ret_item, char *reason)
+{
+	int index =
+		image_channel_find(table->channels, table->meta->channel_count, cmd->channel[i]);
+	const struct config_output *rules = gate_rules(gate->cfg, cmd->channel[i]);
+	const struct channel *ch;
+	uint64_t raw;
+	int r;
+
+	if (index < 0 || table->channels[index].direction != CHANNEL_OUTPUT) {
+		return refuse(reason, -ENOENT, "%.*s: %s", GATE_NAME_BYTES, cmd->channel[i],
+			      index < 0 ? "no such channel" : "is an input");
+	}
+	ch = &table->channels[index];
+	if (rules == NULL || rules->owner != CONFIG_OWNER_REMOTE) {
+		return refuse(reason, -EPERM, "%s: owned by %s, not remote (outputs[].owner)",
+			      ch->name, owner_of(rules));
+	}
+	if (cmd->is_raw) {
+		raw = cmd->raw[i];
+	} else {
+		r = image_physical_to_raw(ch, cmd->values[i], &raw);
+		if (r < 0) {
+			return refuse(reason, -ERANGE, "%s: %g cannot be held by the channel",
+				      ch->name, cmd->values[i]);
+		}
+	}
+	r = check_range(ch, rules, raw, reason);
+	if (r == 0) {
+		*ret_item = (struct gate_item){ .output = output_index(table, (uint32_t)index),
+						.raw = raw };
+		if (ret_item->output >= BOARD_OUTPUTS) {
+			return refuse(reason, -ENOENT, "%s: beyond the board", ch->name);
+		}
+	}
+	return r;
+}
+
+static int check_shape(const struct gate_command *cmd, char *reason)
+{
+	if (cmd->count == 0 || cmd->count > GATE_ITEMS) {
+		return refuse(reason, -EINVAL, "%u channels in one command: 1 to %d are taken",
+			      cmd->count, GATE_ITEMS);
+	}
+	if ((cmd->is_raw ? cmd->raw_count : cmd->value_count) != cmd->count) {
+		return refuse(reason, -EINVAL, "%u channels and %u %s", cmd->count,
+			      cmd->is_raw ? cmd->raw_count : cmd->value_count,
+			      cmd->is_raw ? "raw" : "values");
+	}
+	for (uint32_t i = 0; i < cmd->count; i++) {
+		if (cmd->channel[i] == NULL) {
+			return refuse(reason, -EINVAL, "a channel without a name");
+		}
+		for (uint32_t j = 0; j < i; j++) {
+			if (strcmp(cmd->channel[i], cmd->channel[j]) == 0) {
+				return refuse(reason, -EINVAL, "%.*s: twice in one command",
+					      GATE_NAME_BYTES, cmd->channel[i]);
+			}
+		}
+	}
+	return 0;
+}
+
+int gate_check(struct gate *gate, const struct gate_command *cmd, const struct gate_view *view,
+	       struct gate_item *ret_items, char *reason)
+{
+	struct commander *commander;
+	int r;
+
+	if (!gate->cfg->dds_allow_insecure_commands) {
+		return refuse(
+			reason, -EPERM,
+			"commands are off without DDS Security (dds.allow_insecure_commands)");
+	}
+	commander = admit(gate, cmd->sender, view->now_ns);
+	if (commander == NULL) {
+		return refuse(reason, -EUSERS, "more than %d commanders", GATE_COMMANDERS);
+	}
+	if (is_too_often(commander, gate->cfg->dds_command_rate, view->now_ns)) {
+		return refuse(reason, -EAGAIN, "more than %u commands a second (dds.command_rate)",
+			      gate->cfg->dds_command_rate);
+	}
+	r = check_shape(cmd, reason);
+	if (r < 0) {
+		return r;
+	}
+	if (view->table == NULL || !view->is_op) {
+		return refuse(reason, -EAGAIN, "the bus is not in OP");
+	}
+	r = check_order(commander, cmd, view, reason);
+	for (uint32_t i = 0; r == 0 && i < cmd->count; i++) {
+		r = check_item(gate, cmd, i, view->table, &ret_items[i], reason);
+	}
+	return r;
+}
+
+int gate_has_timeout(const struct slave_table *table, const struct config *cfg, unsigned output)
+{
+	unsigned n = 0;
+
+	for (uint32_t i = 0; i < table->meta->channel_count; i++) {
+		if (table->channels[i].direction == CHANNEL_OUTPUT && n++ == output) {
+			const struct config_output *rules =
+				gate_rules(cfg, table->channels[i].name);
+
+			return rules != NULL && rules->timeout_ns > 0;
+		}
+	}
+	return 0;
+}

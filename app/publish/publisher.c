@@ -1,0 +1,284 @@
+/* SPDX-License-Identifier: MIT */
+#include "publish/publisher.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/timex.h>
+#include <time.h>
+
+#include "base/clock.h"
+#include "base/status.h"
+#include "publish/commands.h"
+#include "publish/domain.h"
+#include "publish/events.h"
+#include "publish/samples.h"
+#include "publish/state.h"
+#include "publish/topics.h"
+
+#define LOOK_NS (NS_PER_S / 10) /* for rings and pages */
+#define FLIGHT_LOOK_NS (200 * NS_PER_US)
+enum { SAMPLES_A_STEP = 64, LOOKS_A_STATUS = 10 };
+
+struct publisher {
+	const struct config *cfg;
+	struct topics topics;
+	dds_entity_t waitset;
+	struct commands *commands;
+	struct events events;
+	char ring_path[CONFIG_PATH_BYTES];
+	char status_path[CONFIG_PATH_BYTES];
+	const struct status_page *page; /* NULL: none */
+	struct ring_reader *ring;       /* NULL: none */
+	struct samples *samples;        /* NULL: no master, or the ring is done with */
+	struct samples_counts counts;
+	int had_ring;
+	int64_t looked_ns;
+	unsigned looks;
+};
+
+static int64_t now_ns(void)
+{
+	struct timespec now;
+
+	clock_gettime(CLOCK_MONOTONIC, &now);
+	return now.tv_sec * NS_PER_S + now.tv_nsec;
+}
+
+static int find_paths(struct publisher *p)
+{
+	int r = config_run_path(p->cfg, CONFIG_RUN_SAMPLES, p->ring_path, sizeof(p->ring_path));
+
+	r = r < 0 ? r
+		  : config_run_path(p->cfg, CONFIG_RUN_EVENTS, p->events.path,
+				    sizeof(p->events.path));
+	return r < 0 ? r
+		     : config_run_path(p->cfg, CONFIG_RUN_STATUS, p->status_path,
+				       sizeof(p->status_path));
+}
+
+static void look_at_page(struct publisher *p)
+{
+	status_unmap(p->page, sizeof(*p->page));
+	p->page = status_open(p->status_path, STATUS_MAGIC, sizeof(*p->page));
+}
+
+static int check_interface(struct publisher *p, char *error, size_t error_bytes)
+{
+	char ethercat[sizeof(p->page->interface) + 1] = "";
+
+	if (p->page != NULL) {
+		snprintf(ethercat, sizeof(ethercat), "%.*s", (int)sizeof(p->page->interface),
+			 p->page->interface);
+	}
+	return domain_check_interface(p->cfg, ethercat, error, error_bytes);
+}
+
+static int open_topics(struct publisher *p, char *error, size_t error_bytes)
+{
+	dds_listener_t *listener = commands_listener(p->commands);
+	int r = listener == NULL ? -ENOMEM
+				 : topics_open(&p->topics, p->cfg, listener, error, error_bytes);
+
+	dds_delete_listener(listener);
+	if (r < 0) {
+		return r;
+	}
+	p->waitset = dds_create_waitset(p->topics.participant);
+	dds_set_status_mask(p->topics.command,
+			    DDS_DATA_AVAILABLE_STATUS | DDS_LIVELINESS_CHANGED_STATUS);
+	if (p->waitset < 0 || dds_waitset_attach(p->waitset, p->topics.command, 1) < 0) {
+		snprintf(error, error_bytes, "DDS: no waitset is to be had");
+		return -EIO;
+	}
+	state_put_idl(&p->topics);
+	return 0;
+}
+
+int publisher_create(const struct config *cfg, struct publisher **ret_publisher, char *error,
+		     size_t error_bytes)
+{
+	struct publisher *p = calloc(1, sizeof(*p));
+	int r;
+
+	snprintf(error, error_bytes, "%s", strerror(ENOMEM));
+	if (p == NULL) {
+		return -ENOMEM;
+	}
+	p->cfg = cfg;
+	p->looked_ns = INT64_MIN / 2;
+	r = find_paths(p);
+	if (r < 0) {
+		snprintf(error, error_bytes, "runtime.run_dir: %s", strerror(-r));
+	} else {
+		look_at_page(p);
+		r = check_interface(p, error, error_bytes);
+	}
+	r = r < 0 ? r : commands_create(cfg, &p->commands);
+	r = r < 0 ? r : open_topics(p, error, error_bytes);
+	if (r < 0) {
+		publisher_destroy(p);
+		return r;
+	}
+	*ret_publisher = p;
+	return 0;
+}
+
+static void end_session(struct publisher *p)
+{
+	if (p->samples != NULL) {
+		fprintf(stderr, "ecdaq-dds: session %" PRIu64 " ended\n",
+			samples_table(p->samples)->meta->session);
+		samples_destroy(p->samples);
+		p->samples = NULL;
+	}
+}
+
+void publisher_destroy(struct publisher *p)
+{
+	if (p == NULL) {
+		return;
+	}
+	end_session(p);
+	topics_close(&p->topics); /* no listener is called from here on */
+	commands_destroy(p->commands);
+	events_close(&p->events);
+	ring_reader_destroy(p->ring);
+	status_unmap(p->page, sizeof(*p->page));
+	free(p);
+}
+
+static void begin_session(struct publisher *p)
+{
+	int r = ring_reader_open(p->ring_path, &p->ring);
+
+	if (r == 0) {
+		/* What was before our start is in the recording; of a new master we publish all. */
+		if (p->had_ring) {
+			ring_seek(p->ring, ring_oldest(p->ring));
+		}
+		p->had_ring = 1;
+		r = samples_create(p->ring, p->cfg, &p->topics, &p->counts, &p->samples);
+	}
+	if (r == 0) {
+		r = state_put_channels(&p->topics, p->cfg, samples_table(p->samples));
+	}
+	if (r == 0) {
+		fprintf(stderr, "ecdaq-dds: publishing session %" PRIu64 " in domain %u on %s\n",
+			samples_table(p->samples)->meta->session, p->cfg->dds_domain,
+			p->cfg->dds_interface);
+	} else if (r != -ENOENT) {
+		fprintf(stderr, "ecdaq-dds: %s: %s\n", p->ring_path,
+			r == -EPROTO ? "not a sample ring of this version" : strerror(-r));
+	}
+}
+
+static void follow_ring(struct publisher *p)
+{
+	if (p->ring != NULL && ring_cursor(p->ring) >= ring_newest(p->ring) &&
+	    (ring_is_replaced(p->ring) || ring_is_orphaned(p->ring))) {
+		end_session(p);
+	}
+	if (p->ring != NULL && p->samples == NULL && ring_is_replaced(p->ring)) {
+		ring_reader_destroy(p->ring);
+		p->ring = NULL;
+	}
+	if (p->ring == NULL) {
+		begin_session(p);
+	}
+}
+
+static void tell_state(struct publisher *p)
+{
+	struct state_view view = {
+		.page = p->page,
+		.table = p->samples == NULL ? NULL : samples_table(p->samples),
+		.samples = p->counts,
+		.commands = commands_counts(p->commands),
+	};
+	struct timex t = { .modes = 0 };
+
+	state_put_status(&p->topics, &view);
+	if (p->samples != NULL && adjtimex(&t) >= 0) {
+		samples_note_tai_offset(p->samples, t.tai);
+	}
+}
+
+static int look(struct publisher *p, int64_t now, char *error, size_t error_bytes)
+{
+	p->looked_ns = now;
+	look_at_page(p);
+	follow_ring(p);
+	events_follow(&p->events);
+	commands_follow(p->commands);
+	if (p->looks++ % LOOKS_A_STATUS == 0) {
+		tell_state(p);
+	}
+	return p->page == NULL                                     ? 0
+	       : check_interface(p, error, error_bytes) == -EINVAL ? -EINVAL
+								   : 0;
+}
+
+static int is_op(const struct publisher *p, const struct slave_table *table)
+{
+	return p->page != NULL && table != NULL && p->page->session == table->meta->session &&
+	       atomic_load_explicit(&p->page->bus_state, memory_order_relaxed) == BUS_OP;
+}
+
+static int publish(struct publisher *p)
+{
+	enum samples_result result = SAMPLES_EMPTY;
+	struct timemap_state map;
+
+	if (p->samples == NULL) {
+		return 0;
+	}
+	result = samples_step(p->samples, SAMPLES_A_STEP);
+	if (samples_timemap_news(p->samples, &map)) {
+		state_put_timemap(&p->topics, samples_table(p->samples)->meta->session, &map);
+	}
+	if (result == SAMPLES_ENDED) {
+		end_session(p);
+	}
+	return result == SAMPLES_MORE;
+}
+
+static void wait_for_news(const struct publisher *p, int is_in_flight)
+{
+	/* Data that waits while a command is on its way would end the wait at once. */
+	struct timespec pause = { .tv_nsec = FLIGHT_LOOK_NS };
+
+	if (is_in_flight) {
+		nanosleep(&pause, NULL);
+	} else {
+		(void)dds_waitset_wait(p->waitset, NULL, 0, p->cfg->cycle_period_ns / 2);
+	}
+}
+
+int publisher_step(struct publisher *publisher, char *error, size_t error_bytes)
+{
+	struct publisher *p = publisher;
+	int64_t now = now_ns();
+	struct gate_view view = { .now_ns = now };
+	int has_more;
+	int is_in_flight;
+	int r = now - p->looked_ns >= LOOK_NS ? look(p, now, error, error_bytes) : 0;
+
+	if (r < 0) {
+		return r;
+	}
+	has_more = publish(p);
+	if (p->samples != NULL) {
+		view.table = samples_table(p->samples);
+		view.cycle = samples_cycle(p->samples);
+		view.is_op = is_op(p, view.table);
+	}
+	is_in_flight = commands_step(p->commands, &p->topics, &view);
+	events_step(&p->events, &p->topics, p->samples);
+	if (!has_more) {
+		wait_for_news(p, is_in_flight);
+	}
+	return 0;
+}

@@ -1,0 +1,321 @@
+# SPDX-License-Identifier: MIT
+"""The connection to an appliance."""
+
+from __future__ import annotations
+
+import os
+import re
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from types import TracebackType
+
+from cyclonedds.core import Policy, Qos, ReadCondition, WaitSet
+from cyclonedds.core import InstanceState, SampleState, ViewState
+from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.pub import DataWriter
+from cyclonedds.sub import DataReader
+from cyclonedds.topic import Topic
+from cyclonedds.util import duration
+
+from ecdaq.idl_types import BlockV1, ChannelsV1, CommandV1, EventV1, IdlV1, ReplyV1, SampleV1
+from ecdaq.idl_types import StatusV1, TimeMapV1
+from ecdaq.series import Gaps
+
+ANY = ViewState.Any | InstanceState.Any | SampleState.Any
+TAKE_AT_ONCE = 4096
+
+
+class LinkError(Exception):
+    """What was asked of the appliance did not come."""
+
+
+class Refused(LinkError):
+    """A command was refused; the text says why."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One variable of a slave."""
+
+    name: str
+    unit: str
+    type: str
+    slave: int
+    place: int  # in values and raw of the slave's samples
+    is_output: bool
+    scale: float
+    offset: float
+    owner: str
+    timeout_s: float
+
+    @property
+    def entry(self) -> str:
+        """The name behind the slave's: "adc" of "piccolo0.adc"."""
+        return self.name.rpartition(".")[2]
+
+
+class Channels:
+    """The channel table of one session."""
+
+    def __init__(self, message: ChannelsV1) -> None:
+        self.session: int = message.session
+        self.period_ns: int = message.period_ns
+        self.slave_names: list[str] = list(message.slave_name)
+        self.command_lease_ns: int = message.command_lease_ns
+        self.are_commands_on: bool = message.are_commands_on
+        self.all: list[Channel] = []
+        places: dict[int, int] = {}
+        for i, name in enumerate(message.name):
+            slave = message.slave[i]
+            place = places.get(slave, 0)
+            places[slave] = place + 1
+            self.all.append(
+                Channel(
+                    name=name,
+                    unit=message.unit[i],
+                    type=message.type[i],
+                    slave=slave,
+                    place=place,
+                    is_output=message.is_output[i],
+                    scale=message.scale[i],
+                    offset=message.offset[i],
+                    owner=message.owner[i],
+                    timeout_s=message.timeout_ns[i] / 1e9,
+                )
+            )
+
+    def of_slave(self, slave: int) -> list[Channel]:
+        return [c for c in self.all if c.slave == slave]
+
+    def __getitem__(self, name: str) -> Channel:
+        for channel in self.all:
+            if channel.name == name:
+                return channel
+        raise KeyError(name)
+
+    def __iter__(self) -> Iterator[Channel]:
+        return iter(self.all)
+
+    def __len__(self) -> int:
+        return len(self.all)
+
+
+def domain_config(interface: str, multicast: bool, peers: list[str], tag: str) -> str:
+    """The same configuration as ecdaq-dds makes for itself."""
+    for word in [interface, tag, *peers]:
+        if not re.fullmatch(r"[A-Za-z0-9._:-]*", word):
+            raise ValueError(f"{word!r} is no name")
+    is_loopback = interface == "lo"
+    found = (["localhost"] if is_loopback else []) + peers
+    return (
+        f'<General><Interfaces><NetworkInterface name="{interface}" presence_required="false"/>'
+        f"</Interfaces><AllowMulticast>{str(multicast and not is_loopback).lower()}"
+        "</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>"
+        "<MaxAutoParticipantIndex>99</MaxAutoParticipantIndex>"
+        + (f"<Tag>{tag}</Tag>" if tag else "")
+        + ("<Peers>" + "".join(f'<Peer Address="{p}"/>' for p in found) + "</Peers>" if found else "")
+        + "</Discovery>"
+    )
+
+
+def connect(
+    interface: str,
+    *,
+    domain: int = 0,
+    multicast: bool = True,
+    peers: list[str] | None = None,
+    tag: str = "",
+    commander: str = "",
+) -> Link:
+    """Join the appliance's DDS domain on @interface, and on no other."""
+    return Link(domain, domain_config(interface, multicast, peers or [], tag), commander)
+
+
+class Link:
+    """A participant of our own with readers for all that ecdaq-dds publishes, made when asked for."""
+
+    def __init__(self, domain: int, config: str, commander: str = "") -> None:
+        self.domain = Domain(domain, config)
+        self.participant = DomainParticipant(domain)
+        self.gaps = Gaps()
+        self.commander = commander or f"{os.uname().nodename}-{os.getpid()}"
+        self._last_id = 0
+        self._readers: dict[str, DataReader] = {}
+        self._writer: DataWriter | None = None
+        self._channels: Channels | None = None
+        self._newest_cycle = 0
+
+    def __enter__(self) -> Link:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Leave the domain. What a commander of ours set goes back to fail-safe."""
+        self._readers.clear()
+        self._writer = None
+        del self.participant
+        del self.domain
+
+    def reader(self, topic: str, kind: type, *, is_state: bool = False) -> DataReader:
+        """The reader of @topic: RELIABLE, KEEP_ALL; of a state: TRANSIENT_LOCAL, KEEP_LAST 1."""
+        if topic not in self._readers:
+            qos = Qos(
+                Policy.Reliability.Reliable(duration(milliseconds=100)),
+                Policy.Durability.TransientLocal if is_state else Policy.Durability.Volatile,
+                Policy.History.KeepLast(1) if is_state else Policy.History.KeepAll,
+            )
+            found = Topic(self.participant, topic, kind)
+            self._readers[topic] = DataReader(self.participant, found, qos=qos)
+        return self._readers[topic]
+
+    def _take(self, reader: DataReader, seconds: float) -> list:
+        """What is there, or comes first, within @seconds; invalid (disposed) ones left out."""
+        waitset = WaitSet(self.participant)
+        condition = ReadCondition(reader, ANY)
+        waitset.attach(condition)
+        if seconds > 0:
+            waitset.wait(duration(seconds=seconds))
+        taken = reader.take(N=TAKE_AT_ONCE)
+        return [m for m in taken if m.sample_info.valid_data]
+
+    def _newest(self, topic: str, kind: type, seconds: float) -> object:
+        reader = self.reader(topic, kind, is_state=True)
+        end = time.monotonic() + seconds
+        while True:
+            found = [m for m in reader.read(N=16) if m.sample_info.valid_data]
+            if found:
+                return found[-1]
+            left = end - time.monotonic()
+            if left <= 0:
+                raise LinkError(f"no {topic} within {seconds:g} s: is ecdaq-dds there?")
+            waitset = WaitSet(self.participant)
+            waitset.attach(ReadCondition(reader, ANY))
+            waitset.wait(duration(seconds=left))
+
+    def channels(self, seconds: float = 10) -> Channels:
+        """The channel table of the master that runs now."""
+        message = self._newest("ecdaq/channels", ChannelsV1, seconds)
+        assert isinstance(message, ChannelsV1)
+        if self._channels is None or self._channels.session != message.session:
+            self._channels = Channels(message)
+        return self._channels
+
+    def status(self, seconds: float = 10) -> StatusV1:
+        message = self._newest("ecdaq/status", StatusV1, seconds)
+        assert isinstance(message, StatusV1)
+        return message
+
+    def timemap(self, seconds: float = 10) -> TimeMapV1:
+        message = self._newest("ecdaq/timemap", TimeMapV1, seconds)
+        assert isinstance(message, TimeMapV1)
+        return message
+
+    def idl(self, seconds: float = 10) -> str:
+        """The IDL text of what is published."""
+        message = self._newest("ecdaq/idl", IdlV1, seconds)
+        assert isinstance(message, IdlV1)
+        return message.text
+
+    def subscribe(
+        self, seconds: float | None = None, slave: int | None = None
+    ) -> Iterator[SampleV1]:
+        """Samples as they come, gaps counted in .gaps; for @seconds, or for ever."""
+        reader = self.reader("ecdaq/sample", SampleV1)
+        end = None if seconds is None else time.monotonic() + seconds
+        while end is None or time.monotonic() < end:
+            left = 1.0 if end is None else min(1.0, max(0.001, end - time.monotonic()))
+            for sample in self._take(reader, left):
+                self.gaps.take(sample)
+                self._newest_cycle = sample.cycle
+                if slave is None or sample.slave == slave:
+                    yield sample
+
+    def blocks(self, seconds: float | None = None) -> Iterator[BlockV1]:
+        """Blocks as they come; gaps are not counted."""
+        reader = self.reader("ecdaq/block", BlockV1)
+        end = None if seconds is None else time.monotonic() + seconds
+        while end is None or time.monotonic() < end:
+            left = 1.0 if end is None else min(1.0, max(0.001, end - time.monotonic()))
+            yield from self._take(reader, left)
+
+    def events(self, seconds: float) -> list[EventV1]:
+        """Events that came since the last call, or come first within @seconds."""
+        return self._take(self.reader("ecdaq/event", EventV1), seconds)
+
+    # Commands
+
+    def _command_writer(self) -> DataWriter:
+        if self._writer is None:
+            lease_ns = self.channels().command_lease_ns
+            qos = Qos(
+                Policy.Reliability.Reliable(duration(milliseconds=100)),
+                Policy.History.KeepLast(1),
+                Policy.Lifespan(duration(seconds=1)),
+                Policy.Liveliness.Automatic(lease_ns),
+            )
+            topic = Topic(self.participant, "ecdaq/command", CommandV1)
+            self.reader("ecdaq/reply", ReplyV1)
+            self._writer = DataWriter(self.participant, topic, qos=qos)
+            self._wait_for_match(self._writer)
+        return self._writer
+
+    def _wait_for_match(self, writer: DataWriter, seconds: float = 10) -> None:
+        end = time.monotonic() + seconds
+        replies = self._readers["ecdaq/reply"]
+        while not (writer.get_matched_subscriptions() and replies.get_matched_publications()):
+            if time.monotonic() > end:
+                raise LinkError("nobody takes commands here")
+            time.sleep(0.01)
+
+    def send(self, values: Mapping[str, float], *, raw: bool = False, not_after_cycle: int = 0,
+             session: int = 0, message_id: int | None = None) -> int:
+        """Send a command and do not wait for its answer; the command's id."""
+        writer = self._command_writer()
+        if message_id is None:
+            self._last_id += 1
+            message_id = self._last_id
+        writer.write(
+            CommandV1(
+                commander=self.commander,
+                id=message_id,
+                session=session,
+                not_after_cycle=not_after_cycle,
+                is_raw=raw,
+                channel=list(values),
+                values=[] if raw else [float(v) for v in values.values()],
+                raw=[int(v) for v in values.values()] if raw else [],
+            )
+        )
+        return message_id
+
+    def replies(self, seconds: float) -> list[ReplyV1]:
+        """Answers to our commands that came, or come first within @seconds."""
+        taken = self._take(self.reader("ecdaq/reply", ReplyV1), seconds)
+        return [r for r in taken if r.commander == self.commander]
+
+    def command(self, values: Mapping[str, float], *, raw: bool = False, not_after_cycle: int = 0,
+                session: int = 0, seconds: float = 2) -> int:
+        """Set outputs, all in one cycle or none; the cycle whose frame carried them. Or Refused.
+
+        What is set holds while this link lives and the appliance hears of it; then outputs with a
+        time-out go to their fail-safe values.
+        """
+        number = self.send(
+            values, raw=raw, not_after_cycle=not_after_cycle, session=session
+        )
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0:
+            for reply in self.replies(left):
+                if reply.id == number and reply.is_accepted:
+                    return reply.cycle
+                if reply.id == number:
+                    raise Refused(reply.reason)
+        raise LinkError(f"no answer within {seconds:g} s")

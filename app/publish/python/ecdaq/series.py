@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: MIT
+"""Samples kept: gaps counted, columns for numpy and pandas."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol
+
+if TYPE_CHECKING:
+    from ecdaq.link import Channels
+
+
+class Sampled(Protocol):
+    """What a sample of any origin has."""
+
+    slave: int
+    session: int
+    cycle: int
+    dc_time_ns: int
+    utc_ns: int
+    flags: int
+    is_good: bool
+    adc: float
+    counter: int
+    sample_time_ns: int
+    values: Any
+    raw: Any
+
+
+@dataclass
+class Gaps:
+    """Cycles that did not come, for each slave; a new session of the master is no gap."""
+
+    gaps: int = 0
+    missing: int = 0
+    doubled: int = 0
+    spans: list[tuple[int, int, int]] = field(default_factory=list)  # slave, first, count
+    newest: dict[int, tuple[int, int]] = field(default_factory=dict)
+
+    def take(self, sample: Sampled) -> int:
+        """Count one sample; how many cycles are missing before it."""
+        session, cycle = self.newest.get(sample.slave, (sample.session, sample.cycle - 1))
+        if session != sample.session:
+            cycle = sample.cycle - 1
+        missing = sample.cycle - cycle - 1
+        if missing < 0:
+            self.doubled += 1
+            return 0
+        if missing > 0:
+            self.gaps += 1
+            self.missing += missing
+            self.spans.append((sample.slave, cycle + 1, missing))
+        self.newest[sample.slave] = (sample.session, sample.cycle)
+        return missing
+
+
+class Series:
+    """The samples of one slave."""
+
+    def __init__(self, slave: int, channels: Channels | None = None) -> None:
+        self.slave = slave
+        self.channels = channels
+        self.samples: list[Sampled] = []
+
+    def extend(self, samples: Iterable[Sampled]) -> None:
+        self.samples += [s for s in samples if s.slave == self.slave]
+
+    def columns(self) -> dict[str, list[Any]]:
+        """One list for each thing; channels by the name behind the dot, where they are known."""
+        found: dict[str, list[Any]] = {
+            name: [getattr(s, name) for s in self.samples]
+            for name in ("cycle", "dc_time_ns", "utc_ns", "flags", "is_good")
+        }
+        names = [c.entry for c in self.channels.of_slave(self.slave)] if self.channels else []
+        for place, name in enumerate(names):
+            if name == "sample_time":  # more than a double holds exactly
+                found[name] = [s.raw[place] for s in self.samples]
+            else:
+                found[name] = [s.values[place] for s in self.samples]
+        return found
+
+    def to_numpy(self) -> dict[str, Any]:
+        import numpy as np
+
+        return {name: np.asarray(column) for name, column in self.columns().items()}
+
+    def to_pandas(self) -> Any:
+        """A DataFrame with UTC as its index."""
+        import pandas as pd
+
+        frame = pd.DataFrame(self.columns())
+        frame.index = pd.to_datetime(frame.pop("utc_ns"), unit="ns", utc=True)
+        return frame

@@ -1,0 +1,308 @@
+/* SPDX-License-Identifier: MIT */
+#include "publish/samples.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "ecdaq.h"
+#include "image/image.h"
+#include "publish/mapped_time.h"
+
+/* One slave's messages; their sequences point to memory of ours. */
+struct slave_out {
+	ecdaq_SampleV1 sample;
+	ecdaq_BlockV1 block;
+	double *values;
+	uint64_t *raw;
+	uint64_t *cycle;
+	int64_t *dc_time_ns;
+	int64_t *utc_ns;
+	uint32_t *flags;
+	bool *is_good;
+	double *adc;
+	uint64_t *counter;
+	int64_t *sample_time_ns;
+	double *block_values;
+	uint64_t *block_raw;
+};
+
+struct samples {
+	struct ring_reader *ring;
+	const struct topics *topics;
+	struct samples_counts *counts;
+	struct slave_table table;
+	struct mapped_time *time;
+	uint32_t block_cycles;
+	uint8_t *payload;
+	uint64_t cycle;
+	int64_t utc_ns;
+	struct slave_out *out;
+};
+
+/* The generated sequences differ in type only. */
+#define SEQUENCE_SET(sequence, buffer, n)                                                          \
+	do {                                                                                       \
+		(sequence)._buffer = (buffer);                                                     \
+		(sequence)._length = (uint32_t)(n);                                                \
+		(sequence)._maximum = (uint32_t)(n);                                               \
+		(sequence)._release = false;                                                       \
+	} while (0)
+
+static int make_out(struct slave_out *out, const struct slave_view *view, uint32_t cycles,
+		    uint64_t session)
+{
+	size_t n = view->count > 0 ? view->count : 1;
+	size_t k = cycles > 0 ? cycles : 1;
+
+	out->values = calloc(n, sizeof(double));
+	out->raw = calloc(n, sizeof(uint64_t));
+	out->cycle = calloc(k, sizeof(uint64_t));
+	out->dc_time_ns = calloc(k, sizeof(int64_t));
+	out->utc_ns = calloc(k, sizeof(int64_t));
+	out->flags = calloc(k, sizeof(uint32_t));
+	out->is_good = calloc(k, sizeof(bool));
+	out->adc = calloc(k, sizeof(double));
+	out->counter = calloc(k, sizeof(uint64_t));
+	out->sample_time_ns = calloc(k, sizeof(int64_t));
+	out->block_values = calloc(n * k, sizeof(double));
+	out->block_raw = calloc(n * k, sizeof(uint64_t));
+	if (out->values == NULL || out->raw == NULL || out->cycle == NULL ||
+	    out->dc_time_ns == NULL || out->utc_ns == NULL || out->flags == NULL ||
+	    out->is_good == NULL || out->adc == NULL || out->counter == NULL ||
+	    out->sample_time_ns == NULL || out->block_values == NULL || out->block_raw == NULL) {
+		return -ENOMEM;
+	}
+	out->sample.slave = view->info->slave_pos;
+	out->sample.session = session;
+	SEQUENCE_SET(out->sample.values, out->values, view->count);
+	SEQUENCE_SET(out->sample.raw, out->raw, view->count);
+	out->block.slave = view->info->slave_pos;
+	out->block.session = session;
+	out->block.channel_count = view->count;
+	return 0;
+}
+
+static void free_out(struct slave_out *out)
+{
+	free(out->values);
+	free(out->raw);
+	free(out->cycle);
+	free(out->dc_time_ns);
+	free(out->utc_ns);
+	free(out->flags);
+	free(out->is_good);
+	free(out->adc);
+	free(out->counter);
+	free(out->sample_time_ns);
+	free(out->block_values);
+	free(out->block_raw);
+}
+
+static int make_all(struct samples *s)
+{
+	const struct sample_meta *meta = s->table.meta;
+
+	s->time = mapped_time_create(meta);
+	s->payload = malloc(ring_payload_bytes(s->ring));
+	s->out = calloc(meta->slave_count > 0 ? meta->slave_count : 1, sizeof(*s->out));
+	if (s->time == NULL || s->payload == NULL || s->out == NULL) {
+		return -ENOMEM;
+	}
+	for (uint32_t i = 0; i < meta->slave_count; i++) {
+		int r = make_out(&s->out[i], &s->table.view[i], s->block_cycles, meta->session);
+
+		if (r < 0) {
+			return r;
+		}
+	}
+	return 0;
+}
+
+int samples_create(struct ring_reader *ring, const struct config *cfg, const struct topics *topics,
+		   struct samples_counts *counts, struct samples **ret_samples)
+{
+	struct samples *s = calloc(1, sizeof(*s));
+	size_t meta_bytes;
+	const void *meta = ring_meta(ring, &meta_bytes);
+	int r;
+
+	if (s == NULL) {
+		return -ENOMEM;
+	}
+	s->ring = ring;
+	s->topics = topics;
+	s->counts = counts;
+	s->block_cycles = cfg->dds_block_cycles;
+	r = strcmp(ring_kind(ring), "sample") == 0 ? slave_table_read(&s->table, meta, meta_bytes)
+						   : -EPROTO;
+	if (r == 0 &&
+	    ring_payload_bytes(ring) < sizeof(struct sample_header) + s->table.meta->image_bytes) {
+		r = -EPROTO;
+	}
+	r = r < 0 ? r : make_all(s);
+	if (r < 0) {
+		samples_destroy(s);
+		return r;
+	}
+	*ret_samples = s;
+	return 0;
+}
+
+static void put(struct samples *s, dds_entity_t writer, const void *message)
+{
+	s->counts->failed += topics_write(writer, message, s->utc_ns) < 0;
+}
+
+static void flush_block(struct samples *s, struct slave_out *out)
+{
+	ecdaq_BlockV1 *b = &out->block;
+	uint32_t n = b->count;
+
+	if (n == 0) {
+		return;
+	}
+	SEQUENCE_SET(b->cycle, out->cycle, n);
+	SEQUENCE_SET(b->dc_time_ns, out->dc_time_ns, n);
+	SEQUENCE_SET(b->utc_ns, out->utc_ns, n);
+	SEQUENCE_SET(b->flags, out->flags, n);
+	SEQUENCE_SET(b->is_good, out->is_good, n);
+	SEQUENCE_SET(b->adc, out->adc, n);
+	SEQUENCE_SET(b->counter, out->counter, n);
+	SEQUENCE_SET(b->sample_time_ns, out->sample_time_ns, n);
+	SEQUENCE_SET(b->values, out->block_values, n * b->channel_count);
+	SEQUENCE_SET(b->raw, out->block_raw, n * b->channel_count);
+	put(s, s->topics->block, b);
+	b->count = 0;
+}
+
+void samples_destroy(struct samples *s)
+{
+	if (s == NULL) {
+		return;
+	}
+	for (uint32_t i = 0; s->out != NULL && i < s->table.meta->slave_count; i++) {
+		flush_block(s, &s->out[i]);
+		free_out(&s->out[i]);
+	}
+	free(s->out);
+	mapped_time_destroy(s->time);
+	free(s->payload);
+	free(s);
+}
+
+static void add_to_block(struct samples *s, struct slave_out *out)
+{
+	const ecdaq_SampleV1 *m = &out->sample;
+	ecdaq_BlockV1 *b = &out->block;
+	size_t n = b->channel_count;
+	size_t k = b->count;
+
+	if (s->block_cycles == 0) {
+		return;
+	}
+	out->cycle[k] = m->cycle;
+	out->dc_time_ns[k] = m->dc_time_ns;
+	out->utc_ns[k] = m->utc_ns;
+	out->flags[k] = m->flags;
+	out->is_good[k] = m->is_good;
+	out->adc[k] = m->adc;
+	out->counter[k] = m->counter;
+	out->sample_time_ns[k] = m->sample_time_ns;
+	memcpy(out->block_values + k * n, out->values, n * sizeof(double));
+	memcpy(out->block_raw + k * n, out->raw, n * sizeof(uint64_t));
+	b->count++;
+	if (b->count == s->block_cycles) {
+		flush_block(s, out);
+	}
+}
+
+static void put_slave(struct samples *s, const struct sample_header *h, const uint8_t *image,
+		      uint32_t slave)
+{
+	const struct slave_view *view = &s->table.view[slave];
+	const struct channel *channels = s->table.channels;
+	struct slave_out *out = &s->out[slave];
+	ecdaq_SampleV1 *m = &out->sample;
+
+	m->cycle = h->cycle;
+	m->dc_time_ns = h->dc_time_ns;
+	m->utc_ns = s->utc_ns;
+	m->flags = h->flags;
+	m->is_good = slave_is_good(h, view) != 0;
+	for (uint32_t i = 0; i < view->count; i++) {
+		const struct channel *ch = &channels[s->table.order[view->first + i]];
+
+		out->raw[i] = image_get_raw(image, ch);
+		out->values[i] = image_raw_to_physical(ch, out->raw[i]);
+	}
+	m->adc = view->adc < 0 ? NAN : image_get_physical(image, &channels[view->adc]);
+	m->counter = view->counter < 0 ? 0 : image_get_raw(image, &channels[view->counter]);
+	m->sample_time_ns = view->sample_time < 0
+				    ? 0
+				    : (int64_t)image_get_raw(image, &channels[view->sample_time]);
+	put(s, s->topics->sample, m);
+	add_to_block(s, out);
+}
+
+static void put_cycle(struct samples *s)
+{
+	struct sample_header h;
+
+	memcpy(&h, s->payload, sizeof(h));
+	/* Without memory for a new map the old one goes on for this sample. */
+	(void)mapped_time_feed(s->time, &h, &s->utc_ns);
+	for (uint32_t i = 0; i < s->table.meta->slave_count; i++) {
+		put_slave(s, &h, s->payload + sizeof(h), i);
+	}
+	s->cycle = h.cycle;
+	s->counts->published++;
+}
+
+enum samples_result samples_step(struct samples *s, unsigned most)
+{
+	uint64_t lost = 0;
+
+	for (unsigned n = 0; n < most;) {
+		switch (ring_read(s->ring, s->payload, &lost)) {
+		case RING_OK:
+			n++;
+			put_cycle(s);
+			break;
+		case RING_LOST:
+			s->counts->missed += lost;
+			break;
+		case RING_EMPTY:
+			return SAMPLES_EMPTY;
+		case RING_CLOSED:
+			return SAMPLES_ENDED;
+		}
+	}
+	return SAMPLES_MORE;
+}
+
+const struct slave_table *samples_table(const struct samples *s)
+{
+	return &s->table;
+}
+
+uint64_t samples_cycle(const struct samples *s)
+{
+	return s->cycle;
+}
+
+int64_t samples_utc_of_tai(const struct samples *s, int64_t tai_ns)
+{
+	return mapped_time_of_tai(s->time, tai_ns);
+}
+
+void samples_note_tai_offset(struct samples *s, int32_t tai_offset_s)
+{
+	mapped_time_note_tai_offset(s->time, tai_offset_s);
+}
+
+int samples_timemap_news(struct samples *s, struct timemap_state *ret)
+{
+	return mapped_time_news(s->time, ret);
+}

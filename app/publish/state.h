@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * What is told again to whoever comes later: ecdaq/channels, ecdaq/status, ecdaq/timemap,
+ * ecdaq/idl. Context: publisher's thread.
+ */
+#ifndef PUBLISH_STATE_H
+#define PUBLISH_STATE_H
+
+#include "base/status.h"
+#include "base/timemap.h"
+#include "config/config.h"
+#include "publish/commands.h"
+#include "publish/samples.h"
+#include "publish/slave_view.h"
+#include "publish/topics.h"
+
+struct state_view {
+	const struct status_page *page;  /* NULL: none */
+	const struct slave_table *table; /* NULL: no master runs */
+	struct samples_counts samples;
+	struct commands_counts commands;
+};
+
+void state_put_idl(const struct topics *topics);
+/** 0 or -ENOMEM. */
+int state_put_channels(const struct topics *topics, const struct config *cfg,
+		       const struct slave_table *table);
+void state_put_status(const struct topics *topics, const struct state_view *view);
+void state_put_timemap(const struct topics *topics, uint64_t session,
+		       const struct timemap_state *map);
+
+#endif

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: MIT
+"""An appliance in one network namespace, a PC in another, a veth pair between them for DDS."""
+
+from __future__ import annotations
+
+import csv
+import importlib.util
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+ROOT = Path(__file__).resolve().parents[2]
+KIT = ROOT / "app" / "publish" / "python"
+
+
+def load_segment() -> ModuleType:
+    """tests/live/segment.py, by its path: each group of tests has a path of its own."""
+    spec = importlib.util.spec_from_file_location(
+        "live_segment", ROOT / "tests" / "live" / "segment.py"
+    )
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["live_segment"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+live = load_segment()
+wait_for = live.wait_for
+BUILD = Path(os.environ.get("ECDAQ_BUILD", ROOT / "build" / "release"))
+
+DDS_SETTINGS = {
+    "dds.enable": "on",
+    "dds.interface": "dds0",
+    "dds.domain": "7",
+    "dds.allow_insecure_commands": "on",
+}
+
+
+class Bench:
+    """The appliance's programs (live.Segment) and those on the PC."""
+
+    def __init__(self, folder: Path, settings: dict[str, str] | None = None) -> None:
+        self.folder = folder
+        self.segment = live.Segment(folder, settings=DDS_SETTINGS | (settings or {}))
+        self.pc = live.Namespace()
+        self.started: list[subprocess.Popen[bytes]] = []
+        self._wire()
+
+    def _wire(self) -> None:
+        appliance = self.segment.space
+        appliance.run("ip", "link", "add", "dds0", "type", "veth", "peer", "name", "dds1")
+        # Moved by the PC's pid, which both namespaces know.
+        appliance.run("ip", "link", "set", "dds1", "netns", str(self.pc.holder.pid))
+        for space, nic, address in ((appliance, "dds0", 1), (self.pc, "dds1", 2)):
+            space.run("ip", "link", "set", "lo", "up")
+            space.run("ip", "address", "add", f"10.77.0.{address}/24", "dev", nic)
+            space.run("ip", "link", "set", nic, "multicast", "on", "up")
+            space.run("ip", "route", "add", "224.0.0.0/4", "dev", nic)
+
+    def start_all(self) -> None:
+        self.segment.start_all()
+        self.start_dds()
+
+    def start_dds(self) -> None:
+        self.segment.start("dds", str(live.BIN / "ecdaq-dds"), *self.segment.options())
+        wait_for("ecdaq-dds' session", lambda: self.dds_says("publishing session"), 20)
+
+    def dds_says(self, words: str) -> bool:
+        return words in self.segment.log("dds")
+
+    def on_pc(self, name: str, *command: str) -> subprocess.Popen[bytes]:
+        process: subprocess.Popen[bytes] = self.pc.start(*command, log=self.folder / f"{name}.log")
+        self.started.append(process)
+        return process
+
+    def python(self, script: str, *arguments: str) -> subprocess.Popen[bytes]:
+        """A program of this folder on the PC, with the kit."""
+        paths = os.pathsep.join(p for p in (str(KIT), os.environ.get("PYTHONPATH")) if p)
+        program = str(Path(__file__).parent / script)
+        return self.on_pc(
+            Path(script).stem, "env", f"PYTHONPATH={paths}", sys.executable, program, *arguments
+        )
+
+    def log(self, name: str) -> str:
+        path = self.folder / f"{name}.log"
+        return path.read_text() if path.exists() else ""
+
+    def close(self) -> None:
+        for process in self.started:
+            if process.poll() is None:
+                process.kill()
+                process.wait(10)
+        dds = self.segment.processes.pop("dds", None)
+        if dds is not None and dds.poll() is None:
+            dds.terminate()
+            try:
+                dds.wait(20)
+            except subprocess.TimeoutExpired:
+                dds.kill()
+                dds.wait(10)
+        self.pc.close()
+        self.segment.close()
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
