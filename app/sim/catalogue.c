@@ -14,8 +14,8 @@ enum { PDI_LAN9252 = 0x80 };
 #define TEXT_VERL 0x6c726556u
 
 /*
- * What captures of real devices say of their ESCs: types, ports and feature words as 0x0000 to 0x0008
- * gave them, counts of FMMUs and SMs and the kind of clock by which registers gave a working
+ * What captures of real devices say of their ESCs: types, ports and feature words as 0x0000 to
+ * 0x0008 gave them, counts of FMMUs and SMs and the kind of clock by which registers gave a working
  * counter (SPECNOTES).
  */
 static const struct esc_features coupler = {
@@ -68,7 +68,8 @@ static const struct esc_features et1200_terminal = {
 	.receive_time_at_power_on = { 0, TEXT_HOFF, 0, TEXT_VERL },
 };
 
-/* EL2889: of the older kind; it has its system time although its EEPROM leaves both DC units off. */
+/* EL2889: of the older kind; it has its system time although its EEPROM leaves both DC units off.
+ */
 static const struct esc_features et1200_old_terminal = {
 	.type = 0x12,
 	.build = 0x0001,
@@ -137,8 +138,8 @@ static const struct esc_features *features_of(const struct sii *sii)
 }
 
 /*
- * Terminals touch each other (captures: 300 to 310 ns round the last two, 590 to 600 ns round three);
- * others have PHYs and a cable.
+ * Terminals touch each other (captures: 300 to 310 ns round the last two, 590 to 600 ns round
+ * three); others have PHYs and a cable.
  */
 static void set_delays(struct segment_slave_spec *spec, int is_terminal)
 {

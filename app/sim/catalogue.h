@@ -14,7 +14,8 @@
 /** Features of the ESC in the device with this identity; an ET1100's where it is not known. */
 const struct esc_features *catalogue_features(uint32_t vendor, uint32_t product);
 
-/** The generic slave of @sii (kept until segment_create()), in line behind @position - 1. -ENOMEM, 0. */
+/** The generic slave of @sii (kept until segment_create()), in line behind @position - 1. -ENOMEM,
+ * 0. */
 int catalogue_sii_slave(const uint8_t *sii, size_t sii_bytes, int position,
 			struct segment_slave_spec *ret_spec);
 

@@ -73,7 +73,8 @@ static const struct sii_sm *assigned_sm(const struct sii *sii, uint16_t index)
 	return &sii->sm[n];
 }
 
-/* Number of the entry @index:@subindex, or -1; its highest subindex into @ret_last, 0: no object. */
+/* Number of the entry @index:@subindex, or -1; its highest subindex into @ret_last, 0: no object.
+ */
 static int find_entry(const struct sii *sii, uint16_t index, uint8_t subindex, uint8_t *ret_last)
 {
 	int found = -1;

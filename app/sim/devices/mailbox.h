@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The application's end of the standard mailbox: SyncManager 0 brings requests, 1 takes answers. A request
- * with the counter of the one before is answered again and not executed again; a toggled repeat
- * request brings the last answer back (ETG.1000.4).
+ * The application's end of the standard mailbox: SyncManager 0 brings requests, 1 takes answers. A
+ * request with the counter of the one before is answered again and not executed again; a toggled
+ * repeat request brings the last answer back (ETG.1000.4).
  */
 #ifndef SIM_DEVICES_MAILBOX_H
 #define SIM_DEVICES_MAILBOX_H
@@ -21,7 +21,7 @@ enum mailbox_error { MAILBOX_UNSUPPORTED = 2, MAILBOX_INVALID_SIZE = 8 };
 
 struct mailbox {
 	uint8_t answer[MAILBOX_BYTES];
-	size_t answer_len; /* 0: none yet */
+	size_t answer_len;  /* 0: none yet */
 	uint8_t is_waiting; /* the answer could not be put into SM1 yet */
 	uint8_t request_counter;
 	uint8_t answer_counter;

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A slave that is nothing but its SII image. It goes through the AL states with the checks that ETG.1000.6
- * asks of a simple slave, answers SDOs if its SII says CoE, falls back when its watchdog is down, and
- * its inputs count its passes. Where the EEPROM asks for device emulation the chip does the states.
+ * A slave that is nothing but its SII image. It goes through the AL states with the checks that
+ * ETG.1000.6 asks of a simple slave, answers SDOs if its SII says CoE, falls back when its watchdog
+ * is down, and its inputs count its passes. Where the EEPROM asks for device emulation the chip
+ * does the states.
  */
 #include <stdlib.h>
 #include <string.h>
