@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A simulated segment, the master and the recorder in a network namespace of their own, in real time."""
+"""A simulated segment, the master and the recorder in a network namespace, in real time."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ ROOT = Path(__file__).resolve().parents[2]
 BIN = Path(os.environ.get("ECDAQ_BIN_DIR", ROOT / "build" / "stage" / "bin"))
 
 
-class Timeout(AssertionError):
+class NeverError(AssertionError):
     """Something that had to happen did not."""
 
 
 def wait_for(what: str, condition: Callable[[], Any], seconds: float) -> Any:
-    """Poll @condition until it is true; its value, or Timeout naming @what."""
+    """Poll @condition until it is true; its value, or NeverError naming @what."""
     end = time.monotonic() + seconds
     while True:
         value = condition()
         if value:
             return value
         if time.monotonic() > end:
-            raise Timeout(f"after {seconds} s: no {what}")
+            raise NeverError(f"after {seconds} s: no {what}")
         # A bounded poll of a condition, not a synchronisation by time.
         time.sleep(0.02)
 
@@ -135,7 +135,7 @@ class Segment:
         def in_op() -> dict[str, Any]:
             daemon = self.processes["daemon"]
             if daemon.poll() is not None:
-                raise Timeout(f"ecdaqd ended with {daemon.returncode}: {self.log('daemon')}")
+                raise NeverError(f"ecdaqd ended with {daemon.returncode}: {self.log('daemon')}")
             status = self.status()
             return status if status.get("state") == "OP" else {}
 

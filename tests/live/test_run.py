@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The main job on a real packet socket in real time. Times are not judged: counts and content are."""
+"""The main job on a real packet socket in real time. Counts and content are judged, not times."""
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import os
@@ -23,7 +24,7 @@ PICCOLOS = ("piccolo0", "piccolo1")
 
 
 def fit_sine(time_s: np.ndarray, volt: np.ndarray) -> tuple[float, float, float]:
-    """Frequency, amplitude and offset of the sine nearest 1 Hz (least squares, frequency by refinement)."""
+    """Frequency, amplitude and offset of the sine nearest 1 Hz (least squares)."""
     best = (math.inf, 0.0, 0.0, 0.0)
     for frequency in np.linspace(0.98, 1.02, 401):
         angle = 2 * np.pi * frequency * time_s
@@ -85,7 +86,7 @@ def test_a_minute_at_one_millisecond_loses_and_invents_nothing(
 def check_values(samples: dict[int, Any]) -> None:
     """The counter went on by as many as the cycle; the ADC holds the 1 Hz sine of the generator."""
     numbers = sorted(samples)
-    for before, after in zip(numbers, numbers[1:], strict=False):
+    for before, after in itertools.pairwise(numbers):
         assert (samples[after].counter - samples[before].counter) % 65536 == (
             after - before
         ) % 65536
@@ -124,7 +125,7 @@ def test_a_recorder_killed_for_ten_seconds_misses_no_cycle(
 def test_a_stopped_reader_of_the_ring_changes_nothing_for_the_cycle(
     make_segment: Callable[..., Segment],
 ) -> None:
-    """Half the time with a reader, half with it stopped, in one run; counts are compared, not times."""
+    """Half the time with a reader, half with it stopped, in one run; counts are compared."""
     segment = make_segment()
     segment.start_all()
     segment.start(

@@ -110,7 +110,8 @@ def test_an_sdo_the_slave_refuses_is_an_error_with_its_abort_code(
     segment.start_sim()
     file = segment.folder / "ecdaq.yaml"
     file.write_text(
-        "slaves:\n  - name: a\n    sdo:\n      - { index: 0x9999, subindex: 1, type: USINT, value: 1 }\n"
+        "slaves:\n  - name: a\n    sdo:\n"
+        "      - { index: 0x9999, subindex: 1, type: USINT, value: 1 }\n"
     )
     line = only_line(run_daemon(segment, "--config", str(file), "--set", "bus.presence=any"))
     assert "0x9999" in line and "06020000" in line
