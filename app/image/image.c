@@ -55,10 +55,11 @@ void image_set_raw(uint8_t *image, const struct channel *ch, uint64_t raw)
 	unsigned shift = ch->bit_offset % 8;
 	unsigned left = ch->bit_len;
 
+	assert(left >= 1 && left <= 64);
 	raw &= low_bits(ch->bit_len);
 	while (left > 0) {
 		unsigned n = 8 - shift < left ? 8 - shift : left;
-		uint8_t mask = (uint8_t)(((1u << n) - 1) << shift);
+		uint8_t mask = (uint8_t)((0xffu >> (8 - n)) << shift);
 
 		*p = (uint8_t)((*p & ~mask) | ((raw << shift) & mask));
 		raw >>= n;

@@ -16,11 +16,14 @@ from project import ROOT
 SCRIPT = ROOT / "app" / "tools" / "run-segment.sh"
 # A program that says when it starts and ends, and with what; SIGTERM ends it.
 STAND_IN = """#!/bin/bash
-echo "start $(basename "$0") $*" >> "$LOG"
 trap 'echo "end $(basename "$0")" >> "$LOG"; exit 0' TERM
 trap 'echo "interrupted $(basename "$0")" >> "$LOG"' INT
+echo "start $(basename "$0") $*" >> "$LOG"
 {body}
 while :; do sleep 0.05; done
+"""
+# Ends only when the others run: else they could be ended before they can say so.
+WHEN_ALL_RUN = """until [ "$(grep -c '^start' "$LOG")" -ge 3 ]; do sleep 0.01; done
 """
 TOOL = """#!/bin/bash
 echo "tool $*" >> "$LOG"
@@ -100,7 +103,7 @@ def test_an_interrupt_ends_all_in_order_with_a_summary(bench: Bench, number: int
 
 
 def test_json_ends_with_the_summary_as_one_line(bench: Bench) -> None:
-    bench.make_it("ecdaqd", "exit 0")
+    bench.make_it("ecdaqd", WHEN_ALL_RUN + "exit 0")
     run = bench.start("--seconds", "1", "--json", "--slaves", "8")
     out, err = run.communicate(timeout=20)
     assert run.returncode == 0, err
@@ -111,7 +114,7 @@ def test_json_ends_with_the_summary_as_one_line(bench: Bench) -> None:
 
 
 def test_a_master_that_fails_fails_the_run(bench: Bench) -> None:
-    bench.make_it("ecdaqd", "exit 8")
+    bench.make_it("ecdaqd", WHEN_ALL_RUN + "exit 8")
     run = bench.start("--seconds", "1")
     _, err = run.communicate(timeout=20)
     assert run.returncode == 1
