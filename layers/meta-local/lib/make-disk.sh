@@ -36,7 +36,8 @@ make_ext4()
 type_of()
 {
 	case $table/$fstype in
-	gpt/vfat) echo C12A7328-F81F-11D2-BA4B-00A0C93EC93B ;;
+	# "Basic data": a PC with any system shows it, and systemd does not take it for its own.
+	gpt/vfat) echo EBD0A0A2-B9E5-4433-87C0-68B6B72699C7 ;;
 	gpt/*) echo 0FC63DAF-8483-4772-8E79-3D69D8477DE4 ;;
 	msdos/vfat) echo c ;;
 	*) echo 83 ;;

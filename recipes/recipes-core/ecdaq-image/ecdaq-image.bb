@@ -16,4 +16,4 @@ IMAGE_PREINSTALL += "init systemd-sysv udev dbus kmod \
                      openssh-server sudo chrony \
                      iproute2 ethtool iputils-ping nftables \
                      e2fsprogs fdisk dosfstools procps less gpiod \
-                     libyaml-0-2 libzstd1 zlib1g"
+                     libddsc0t64 libyaml-0-2 libzstd1 zlib1g"
