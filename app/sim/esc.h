@@ -211,5 +211,7 @@ void esc_set_links(struct esc *esc, uint8_t ports);
 int esc_is_port_closed(const struct esc *esc, unsigned port);
 /** AL status and code as a fault sets them, whoever the application is. */
 void esc_force_al_status(struct esc *esc, uint8_t status, uint16_t code);
+/** The process data watchdog expires now, whatever was written. */
+void esc_force_watchdog(struct esc *esc);
 
 #endif

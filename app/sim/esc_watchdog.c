@@ -41,6 +41,11 @@ void esc_watchdog_expire(struct esc *esc)
 	esc->al_event |= ESC_AL_EVENT_WATCHDOG;
 }
 
+void esc_force_watchdog(struct esc *esc)
+{
+	esc_watchdog_expire(esc);
+}
+
 static int has_microcontroller(const struct esc *esc)
 {
 	uint8_t pdi = esc->reg[ESC_REG_PDI_CONTROL];

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Faults: what happens to frames and slaves, and when. A plan is a list of lines, from a file, a test or the control
- * socket of ecdaq-sim:
+ * Faults: what happens to frames and slaves, and when. A plan is a list of lines, from a file, a
+ * test or the control socket of ecdaq-sim:
  *
  *   WHEN ACTION [KEY=VALUE...]
  *   at=2s lose                         one frame, the first after 2 s
@@ -13,6 +13,9 @@
  *   at=3s drift slave=1 ppm=80
  *   at=3s al-error slave=1 code=0x001b
  *   at=3s port-error slave=1 port=0
+ *   at=3s watchdog slave=1             its process data watchdog expires
+ *   at=3s mailbox-stuck slave=1 for=1s its answers are lost, for ever without for=
+ *   at=3s identity slave=1 product=0x1 its EEPROM names another product from now on
  */
 #ifndef SIM_FAULT_H
 #define SIM_FAULT_H
@@ -36,6 +39,9 @@ enum fault_action {
 	FAULT_DRIFT,
 	FAULT_AL_ERROR,
 	FAULT_PORT_ERROR,
+	FAULT_WATCHDOG,
+	FAULT_MAILBOX_STUCK,
+	FAULT_IDENTITY,
 };
 
 enum fault_trigger { FAULT_AT, FAULT_FRAME, FAULT_EVERY, FAULT_PROBABLY };
@@ -43,28 +49,34 @@ enum fault_trigger { FAULT_AT, FAULT_FRAME, FAULT_EVERY, FAULT_PROBABLY };
 struct fault {
 	enum fault_trigger trigger;
 	enum fault_action action;
-	int64_t at_ns;       /* FAULT_AT: from the plan's start */
-	int64_t for_ns;      /* 0: once */
-	uint64_t frame;      /* FAULT_FRAME, FAULT_EVERY */
-	double probability;  /* FAULT_PROBABLY */
+	int64_t at_ns;      /* FAULT_AT: from the plan's start */
+	int64_t for_ns;     /* 0: once */
+	uint64_t frame;     /* FAULT_FRAME, FAULT_EVERY */
+	double probability; /* FAULT_PROBABLY */
 	int64_t by_ns;
 	unsigned slave;
 	unsigned port;
 	double ppm;
 	uint16_t code;
+	uint32_t product;
 	int is_done;
 };
 
 /* What is to be done with one frame. */
 struct fault_verdict {
-	int is_dropped;  /* before the slaves */
-	int is_lost;     /* behind them */
+	int is_dropped; /* before the slaves */
+	int is_lost;    /* behind them */
 	int is_doubled;
 	int64_t delay_ns;
 	size_t truncate_to; /* 0: not */
 	size_t corrupt_at;  /* 0: not */
 	uint8_t corrupt_xor;
 };
+
+/**
+ * Take a line apart (it is changed). 1 and @ret; 0: empty or a comment; -EINVAL with why in @error.
+ */
+int fault_parse(char *line, size_t slave_count, struct fault *ret, char *error, size_t error_bytes);
 
 struct fault_plan;
 
@@ -80,7 +92,7 @@ int fault_plan_load(struct fault_plan *plan, const char *path, size_t slave_coun
 void fault_plan_restart(struct fault_plan *plan, int64_t start_ns);
 
 /** Do what is due to the segment at @t_ns, and say what happens to the frame that is sent now. */
-struct fault_verdict fault_plan_judge(struct fault_plan *plan, struct segment *segment, int64_t t_ns,
-				      size_t frame_len);
+struct fault_verdict fault_plan_judge(struct fault_plan *plan, struct segment *segment,
+				      int64_t t_ns, size_t frame_len);
 
 #endif
