@@ -6,7 +6,7 @@
 
 #include "base/bytes.h"
 
-enum { TRIES = 3, ACCESSES_PER_FRAME = 128 };
+enum { TRIES = 3, LOOK_TRIES = 2, ACCESSES_PER_FRAME = 128 };
 
 /* A late answer to the first try is thrown away, so that later tries wait longer. */
 static const int64_t try_ns[TRIES] = { 2 * NS_PER_MS, 10 * NS_PER_MS, 50 * NS_PER_MS };
@@ -58,12 +58,14 @@ int registers_run(struct bus *bus, struct access *access, size_t count)
 	uint8_t frame[LIMIT_FRAME_BYTES];
 	uint8_t answer[LIMIT_FRAME_BYTES];
 
+	int tries = bus->is_looking ? LOOK_TRIES : TRIES;
+
 	while (count > 0) {
 		struct ecat_frame_builder fb;
 		size_t packed = 0;
 		int r = -EMSGSIZE;
 
-		for (int i = 0; i < TRIES && r < 0; i++) {
+		for (int i = 0; i < tries && r < 0; i++) {
 			packed = pack(&fb, frame, access, count, bus->sequence++);
 			if (packed == 0) {
 				return -EMSGSIZE;

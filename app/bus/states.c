@@ -201,12 +201,24 @@ static int step_down(struct bus *bus, enum al_state state, int before, char *err
 	return before < 0 ? before : r;
 }
 
+static int is_line_dead(struct bus *bus)
+{
+	struct access access = { .cmd = ECAT_CMD_BRD, .reg = ESC_REG_AL_STATUS, .len = 2 };
+
+	return registers_run(bus, &access, 1) < 0;
+}
+
 int bus_stop(struct bus *bus, char *error)
 {
 	int r = 0;
 
+	bus->error = error;
 	if (bus->slave_count == 0) {
 		return 0;
+	}
+	if (is_line_dead(bus)) {
+		return bus_fail(bus, -EIO,
+				"no frame comes back: the slaves are left to their watchdogs");
 	}
 	if (bus->target == AL_OP) {
 		r = step_down(bus, AL_SAFEOP, r, error);

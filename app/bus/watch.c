@@ -55,7 +55,7 @@ static int look_at_all(struct bus *bus, struct look *look)
 	}
 	r = registers_run(bus, access, n);
 	for (size_t i = 0; i < n; i++) {
-		look[i / LOOKS].wkc[i % LOOKS] = r < 0 ? 0 : access[i].wkc;
+		look[i / LOOKS].wkc[i % LOOKS] = access[i].wkc;
 	}
 	return r;
 }
@@ -147,7 +147,8 @@ static void show(const struct bus_slave *sl, const struct look *look, struct sla
 
 static int is_in_op(const struct bus_slave *sl)
 {
-	return !sl->is_lost && (sl->al_status & (AL_STATE_MASK | AL_ERROR)) == AL_OP;
+	return !sl->is_lost && sl->misses == 0 &&
+	       (sl->al_status & (AL_STATE_MASK | AL_ERROR)) == AL_OP;
 }
 
 static void recover_some(struct bus *bus, const struct bus_emit *emit)
@@ -179,6 +180,7 @@ int bus_watch(struct bus *bus, struct status_page *page,
 	int r;
 
 	bus->error = NULL;
+	bus->is_looking = 1;
 	r = look_at_all(bus, look);
 	for (size_t i = 0; i < bus->slave_count; i++) {
 		int is_here = look[i].wkc[LOOK_AL] > 0;
@@ -196,6 +198,7 @@ int bus_watch(struct bus *bus, struct status_page *page,
 		bus_reference_time(bus, &time_ns);
 	}
 	recover_some(bus, &out);
+	bus->is_looking = 0;
 	*ret_report = (struct bus_watch_report){ 0 };
 	for (size_t i = 0; i < bus->slave_count; i++) {
 		ret_report->slaves_op += is_in_op(&bus->slave[i]) ? 1 : 0;

@@ -4,7 +4,9 @@
  * service transaction, or SOEM's SDO transfer through our NIC layer. Then records follow; each is
  * one frame: raw bytes, or the frame sent last, marked by a slave, with some of its bytes changed.
  */
-#include "oshw.h"
+#include "nicdrv.h"
+
+#include "ethercatmain.h"
 
 #include "ethercatcoe.h"
 

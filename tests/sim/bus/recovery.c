@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Slaves that go and come back while the bus is in OP. */
 #include "base/bytes.h"
+#include <errno.h>
+
 #include "harness/test.h"
 #include "sim/bus/bus_bench.h"
 
@@ -222,5 +224,34 @@ TEST(recovery, watching_costs_no_cycle)
 	ok = b->ok;
 	watch_for(b, 50);
 	CHECK_EQ(b->ok - ok, b->cycles - cycles);
+	bench_destroy(b);
+}
+
+TEST(recovery, slave_that_missed_one_look_is_neither_lost_nor_in_op)
+{
+	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 2, .seed = 96 });
+	struct bus_watch_report report;
+
+	bench_bring_up(b);
+	segment_cut(b->segment, 1, bench_now_ns(b));
+	report = bench_watch(b);
+	CHECK_EQ(report.slaves_op, 1);
+	CHECK_EQ(report.slaves_lost, 0);
+	CHECK_EQ(report.is_all_op, 0);
+	bench_destroy(b);
+}
+
+TEST(recovery, stop_on_a_dead_line_ends_soon_and_says_so)
+{
+	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 8, .seed = 97 });
+	int64_t begun_ns;
+
+	bench_bring_up(b);
+	segment_cut(b->segment, 0, bench_now_ns(b));
+	bench_run(b, 10);
+	begun_ns = bench_now_ns(b);
+	CHECK_EQ(bench_stop(b), -EIO);
+	CHECK(strstr(b->error, "no frame comes back") != NULL);
+	CHECK(bench_now_ns(b) - begun_ns < NS_PER_S);
 	bench_destroy(b);
 }
