@@ -98,20 +98,30 @@ struct esc_fmmu {
 	uint8_t is_bytewise;
 };
 
-/* The clock: system time s at true time t, and how fast it runs. */
+/*
+ * The clock: local(t) = base_local + (t - base_true) * (1 + rate). Rates are relative deviations in
+ * units of 2^-48.
+ */
 struct esc_clock {
-	double ppm;        /* of the crystal */
-	double correction; /* of the time loop control, relative */
+	int64_t crystal;    /* of the oscillator */
+	int64_t correction; /* of the time loop control */
+	int64_t rate;       /* both together */
 	int64_t base_true_ns;
 	uint64_t base_local_ns;
-	double base_fraction;
-	uint64_t offset_ns; /* 0x0920 */
+	uint64_t base_fraction; /* 2^-48 ns */
+	uint64_t phase_ns;      /* where its ticks lie */
+	uint64_t offset_ns;     /* 0x0920 */
+
+	/* time loop control */
 	double diff_filtered_ns;
-	double integral; /* frequency part of the correction, relative */
-	int64_t last_compare_true_ns;
+	double integral;    /* frequency part of the correction */
+	double interval_ns; /* between two comparisons, averaged */
+	int64_t speed_diff; /* D, 0x0932 */
+	uint64_t last_compare_ns;
+	uint8_t has_compared;
 	uint8_t time_filter; /* depth in force: 0x0934 as of the last write to 0x0930 */
 	uint8_t speed_filter;
-	uint16_t speed_start;
+	uint16_t speed_start; /* S, 0x0930 */
 };
 
 struct esc_sync {

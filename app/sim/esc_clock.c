@@ -1,31 +1,32 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The distributed clock: a crystal, an offset, and the time loop control that regulates the local copy of
- * the system time on each write to 0x0910. The rate correction is the data sheet's
- * D / (5 (S + D + 2) (S - D + 2)) with S = 0x0930 and D = 0x0932; how D follows the measured difference
- * is our model (SPECNOTES): proportional with 2^-5 a write, integral with 2^-filter (0x0935).
+ * The ESC's clock, in integers, so that a run is the same on every machine: rates are relative deviations in
+ * units of 2^-48 (3.6e-15), the local time has 48 bits behind the ns. What registers and the SYNC unit see is
+ * its tick of 10 ns.
  */
 #include "sim/esc_inside.h"
 
-#include <math.h>
+enum { RATE_BITS = 48, TICK_NS = 10 };
 
-#define PROPORTIONAL 0x1p-5
-#define COMPARE_MIN_NS 10000.0
-#define COMPARE_MAX_NS 4000000.0
+#define RATE_ONE ((__int128)1 << RATE_BITS)
 
-static double rate(const struct esc_clock *c)
+/* What the rate made of @dt_ns: whole ns, and the rest in 2^-48 ns. */
+static int64_t deviation(const struct esc_clock *c, int64_t dt_ns, uint64_t *ret_fraction)
 {
-	return (1.0 + c->ppm * 1e-6) * (1.0 + c->correction);
+	__int128 d = (__int128)dt_ns * c->rate + (__int128)c->base_fraction;
+
+	*ret_fraction = (uint64_t)(d & (RATE_ONE - 1));
+	return (int64_t)(d >> RATE_BITS);
 }
 
 uint64_t esc_local_time(const struct esc *esc, int64_t t_ns)
 {
 	const struct esc_clock *c = &esc->clock;
 	int64_t dt = t_ns - c->base_true_ns;
+	uint64_t fraction;
+	uint64_t local = c->base_local_ns + (uint64_t)(dt + deviation(c, dt, &fraction));
 
-	/* The whole part apart from the small one: a double has not the digits for both. */
-	return c->base_local_ns + (uint64_t)dt +
-	       (uint64_t)(int64_t)floor((double)dt * (rate(c) - 1.0) + c->base_fraction);
+	return local - (local - c->phase_ns) % TICK_NS;
 }
 
 uint64_t esc_system_time(const struct esc *esc, int64_t t_ns)
@@ -35,125 +36,87 @@ uint64_t esc_system_time(const struct esc *esc, int64_t t_ns)
 	return esc->features.dc == ESC_DC_32 ? s & UINT32_MAX : s;
 }
 
-static uint64_t time_since(const struct esc *esc, int64_t t_ns, uint64_t start)
+/* First true time at which the tick is at or past @local_ns. */
+static int64_t when_local(const struct esc_clock *c, uint64_t local_ns)
 {
-	uint64_t since = esc_system_time(esc, t_ns) - start;
+	uint64_t past = (local_ns - c->phase_ns) % TICK_NS;
+	uint64_t tick = past == 0 ? local_ns : local_ns + (TICK_NS - past);
+	__int128 left = ((__int128)(int64_t)(tick - c->base_local_ns) << RATE_BITS) -
+			(__int128)c->base_fraction;
+	__int128 speed = RATE_ONE + c->rate;
+	__int128 dt = left / speed;
 
-	return esc->features.dc == ESC_DC_32 ? (uint32_t)since : since;
+	/* Rounded up to whole ns of true time. */
+	if (left > 0 && left % speed != 0) {
+		dt++;
+	}
+	return c->base_true_ns + (int64_t)dt;
 }
 
 int64_t esc_clock_when(const struct esc *esc, int64_t t_ns, uint64_t system_ns)
 {
-	uint64_t now = esc_system_time(esc, t_ns);
-	uint64_t left = system_ns - now;
-	int64_t guess;
+	uint64_t left = system_ns - esc_system_time(esc, t_ns);
+	int64_t at_ns;
 
+	/* The tick that is on now has not passed. */
+	if (left > UINT64_MAX - TICK_NS) {
+		return t_ns;
+	}
 	/* With 32 bits a time that is past comes again; with 64 it never does. */
 	if (esc->features.dc == ESC_DC_32) {
-		left = (uint32_t)left;
+		left = left & UINT32_MAX;
+		left = left > UINT32_MAX - TICK_NS ? 0 : left;
 	}
 	if (left > INT64_MAX / 4) {
 		return INT64_MAX;
 	}
-	guess = t_ns + (int64_t)ceil((double)left / rate(&esc->clock));
-	/* The clock is in whole ns: step to the first instant at which it shows the time. */
-	while (guess > t_ns && time_since(esc, guess - 1, now) >= left) {
-		guess--;
-	}
-	while (time_since(esc, guess, now) < left) {
-		guess++;
-	}
-	return guess;
+	at_ns = when_local(&esc->clock, esc_local_time(esc, t_ns) + left);
+	return at_ns > t_ns ? at_ns : t_ns;
 }
 
 static void rebase(struct esc_clock *c, int64_t t_ns)
 {
 	int64_t dt = t_ns - c->base_true_ns;
-	double small = (double)dt * (rate(c) - 1.0) + c->base_fraction;
-	double whole = floor(small);
+	uint64_t fraction;
 
-	c->base_local_ns += (uint64_t)dt + (uint64_t)(int64_t)whole;
-	c->base_fraction = small - whole;
+	c->base_local_ns += (uint64_t)(dt + deviation(c, dt, &fraction));
+	c->base_fraction = fraction;
 	c->base_true_ns = t_ns;
+}
+
+/* Crystal and correction together: (1 + a) (1 + b) - 1. */
+static void combine(struct esc_clock *c)
+{
+	c->rate = c->crystal + c->correction +
+		  (int64_t)(((__int128)c->crystal * c->correction) >> RATE_BITS);
+}
+
+static int64_t rate_of_ppm(double ppm)
+{
+	return (int64_t)(ppm * 1e-6 * 0x1p48);
 }
 
 void esc_clock_start(struct esc *esc, int64_t t_ns, uint64_t local_ns, double ppm)
 {
-	esc->clock = (struct esc_clock){ .ppm = ppm, .base_true_ns = t_ns, .base_local_ns = local_ns };
-	esc_clock_reset_filter(esc);
+	esc->clock = (struct esc_clock){ .crystal = rate_of_ppm(ppm),
+					 .base_true_ns = t_ns,
+					 .base_local_ns = local_ns,
+					 .phase_ns = local_ns % TICK_NS };
+	esc_dc_reset_filter(esc, t_ns);
 }
 
 void esc_clock_drift(struct esc *esc, int64_t t_ns, double ppm)
 {
 	rebase(&esc->clock, t_ns);
-	esc->clock.ppm = ppm;
+	esc->clock.crystal = rate_of_ppm(ppm);
+	combine(&esc->clock);
 	esc_sync_replan(esc, t_ns);
 }
 
-void esc_clock_reset_filter(struct esc *esc)
+void esc_clock_correct(struct esc *esc, int64_t t_ns, int64_t correction)
 {
-	struct esc_clock *c = &esc->clock;
-
-	c->time_filter = esc->reg[ESC_REG_DC_TIME_FILTER] & 0x0f;
-	c->speed_filter = esc->reg[ESC_REG_DC_SPEED_FILTER] & 0x0f;
-	c->speed_start = get_le16(esc->reg + ESC_REG_DC_SPEED_COUNTER_START) & 0x7fff;
-	c->diff_filtered_ns = 0;
-	c->integral = 0;
-	esc_clock_to_registers(esc);
-}
-
-/* The D whose rate is nearest to @wanted, within the data sheet's range. */
-static double speed_diff(uint16_t speed_start, double wanted)
-{
-	double s = (double)speed_start + 2.0;
-	double limit = fmax(0.0, (double)speed_start - 127.0);
-	double k = 5.0 * fabs(wanted);
-	double d = k < 1e-15 ? 0.0 : (-1.0 + sqrt(1.0 + 4.0 * k * k * s * s)) / (2.0 * k);
-
-	return copysign(fmin(round(d), limit), wanted);
-}
-
-static double rate_of(uint16_t speed_start, double d)
-{
-	double s = (double)speed_start + 2.0;
-
-	return d / (5.0 * (s + d) * (s - d));
-}
-
-void esc_clock_compare(struct esc *esc, int64_t t_ns, uint64_t received_ns)
-{
-	struct esc_clock *c = &esc->clock;
-	uint64_t delay = get_le32(esc->reg + ESC_REG_DC_SYSTEM_TIME_DELAY);
-	int64_t diff_ns = (int64_t)(received_ns + delay - esc_system_time(esc, t_ns));
-	double since_ns = (double)(t_ns - c->last_compare_true_ns);
-	double wanted;
-
-	if (esc->features.dc == ESC_DC_32) {
-		diff_ns = (int32_t)(uint32_t)diff_ns;
-	}
-	c->diff_filtered_ns += ((double)diff_ns - c->diff_filtered_ns) / (double)(1u << c->time_filter);
-	if (since_ns > 0) {
-		double step = (double)diff_ns / fmin(fmax(since_ns, COMPARE_MIN_NS), COMPARE_MAX_NS);
-
-		rebase(c, t_ns);
-		step = fmax(-1e-3, fmin(1e-3, step));
-		c->integral += step / (double)(1u << c->speed_filter);
-		c->integral = fmax(-7e-4, fmin(7e-4, c->integral));
-		wanted = c->integral + PROPORTIONAL * step;
-		c->correction = rate_of(c->speed_start, speed_diff(c->speed_start, wanted));
-		c->last_compare_true_ns = t_ns;
-		esc_sync_replan(esc, t_ns);
-	}
-}
-
-void esc_clock_to_registers(struct esc *esc)
-{
-	const struct esc_clock *c = &esc->clock;
-	double magnitude = fmin(fabs(c->diff_filtered_ns), (double)INT32_MAX);
-	double d = speed_diff(c->speed_start, c->correction);
-
-	/* Bit 31: the local copy is behind the time received. */
-	put_le32(esc->reg + ESC_REG_DC_SYSTEM_TIME_DIFF,
-		 (uint32_t)magnitude | (c->diff_filtered_ns > 0 ? 0x80000000u : 0));
-	put_le16(esc->reg + ESC_REG_DC_SPEED_COUNTER_DIFF, (uint16_t)(int16_t)d);
+	rebase(&esc->clock, t_ns);
+	esc->clock.correction = correction;
+	combine(&esc->clock);
+	esc_sync_replan(esc, t_ns);
 }

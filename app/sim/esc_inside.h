@@ -50,11 +50,16 @@ static inline int esc_touches(uint16_t addr, size_t len, unsigned reg, size_t re
 uint64_t esc_local_time(const struct esc *esc, int64_t t_ns);
 /** First true time at or after @t_ns at which the copy of the system time is @system_ns; INT64_MAX. */
 int64_t esc_clock_when(const struct esc *esc, int64_t t_ns, uint64_t system_ns);
-/** The master's time @received came with a frame that passed at @t_ns: compare and regulate. */
-void esc_clock_compare(struct esc *esc, int64_t t_ns, uint64_t received_ns);
+/** Let the clock run with another correction from @t_ns on. */
+void esc_clock_correct(struct esc *esc, int64_t t_ns, int64_t correction);
+
+/* --- esc_dc.c --- */
+
+/** The master's time @received_ns came with a frame that started here at @t_ns: compare and regulate. */
+void esc_dc_compare(struct esc *esc, int64_t t_ns, uint64_t received_ns);
 /** 0x0930 was written: filters in force from now on, loop reset. */
-void esc_clock_reset_filter(struct esc *esc);
-void esc_clock_to_registers(struct esc *esc);
+void esc_dc_reset_filter(struct esc *esc, int64_t t_ns);
+void esc_dc_to_registers(struct esc *esc);
 
 /* --- esc_sync.c --- */
 

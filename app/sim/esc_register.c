@@ -39,7 +39,7 @@ static void refresh_times(struct esc *esc, enum esc_side side, int64_t t_ns, uin
 		put_le64(esc->reg + ESC_REG_DC_SYSTEM_TIME, now);
 	}
 	if (esc_touches(addr, len, ESC_REG_DC_SYSTEM_TIME_DIFF, 8)) {
-		esc_clock_to_registers(esc);
+		esc_dc_to_registers(esc);
 	}
 	if (esc_touches(addr, len, ESC_REG_DC_ACTIVATION_STATUS, 0x20)) {
 		esc_sync_to_registers(esc);
@@ -138,7 +138,7 @@ static void time_written(struct esc *esc, int64_t t_ns, const uint8_t *buf, size
 		len >= 8 ? get_le64(buf)
 			 : now + (uint64_t)(int64_t)(int32_t)(get_le32(buf) - (uint32_t)now);
 
-	esc_clock_compare(esc, t_ns, received);
+	esc_dc_compare(esc, t_ns, received);
 }
 
 static void dc_written(struct esc *esc, const struct esc_frame *frame, uint16_t addr, size_t len,
@@ -160,7 +160,7 @@ static void dc_written(struct esc *esc, const struct esc_frame *frame, uint16_t 
 		esc_sync_replan(esc, frame->pu_ns);
 	}
 	if (esc_touches(addr, len, ESC_REG_DC_SPEED_COUNTER_START, 2)) {
-		esc_clock_reset_filter(esc);
+		esc_dc_reset_filter(esc, frame->pu_ns);
 	}
 	if (esc_touches(addr, len, ESC_REG_DC_ACTIVATION, 1) &&
 	    !(esc->reg[ESC_REG_DC_CYCLIC_CONTROL] & 1)) {
