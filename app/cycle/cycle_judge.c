@@ -60,6 +60,23 @@ void cycle_skip(struct cycle *cy, uint64_t count)
 	}
 }
 
+/*
+ * Edges by which the number was behind when the frame was sent, though this master was not late: the
+ * deadline is right as it is. Moved with the number, it would pass one more edge in every cycle.
+ */
+static uint64_t passed_before_sending(const struct cycle *cy, const struct exchange_result *res)
+{
+	int64_t round_trip_ns = res->round_trip.ns > 0 ? res->round_trip.ns : 0;
+	int64_t since_edge_ns = res->dc_time_ns - round_trip_ns -
+				numbering_dc_time(&cy->numbering, cy->sample.cycle);
+	uint64_t passed =
+		since_edge_ns > 0 ? (uint64_t)(since_edge_ns / cy->numbering.period_ns) : 0;
+	uint64_t late = numbering_skipped(cy->period.ns, cy->set_point_ns,
+					  mono_sub(res->sent, cy->deadline).ns);
+
+	return passed > late ? passed - late : 0;
+}
+
 int cycle_place(struct cycle *cy, const struct exchange_result *res)
 {
 	struct numbering_place place;
@@ -73,7 +90,11 @@ int cycle_place(struct cycle *cy, const struct exchange_result *res)
 		check_restart(&cy->check);
 	}
 	if (place.passed_edges > 0) {
+		mono_t deadline = cy->deadline;
+		uint64_t moved = place.passed_edges - passed_before_sending(cy, res);
+
 		cycle_skip(cy, place.passed_edges);
+		cy->deadline = mono_add(deadline, (span_t){ (int64_t)moved * cy->period.ns });
 	}
 	return place.is_in_window;
 }
