@@ -27,9 +27,9 @@ struct node {
 	int64_t processing_ns;
 	int64_t forwarding_ns;
 	int has_power;
-	int is_cut;            /* the cable towards the parent */
-	struct esc_frame way;  /* when a frame passes, from the time it leaves the master */
-	int64_t next_ns;       /* of its ESC and its device */
+	int is_cut;           /* the cable towards the parent */
+	struct esc_frame way; /* when a frame passes, from the time it leaves the master */
+	int64_t next_ns;      /* of its ESC and its device */
 };
 
 struct segment {
@@ -257,6 +257,17 @@ static void power_on(struct node *n, int64_t t_ns, uint64_t clock_start_ns)
 	plan(n);
 }
 
+/* The first slave hangs on the master, every other one on a free port of one before it. */
+static int is_place_free(const struct segment *seg, unsigned i,
+			 const struct segment_slave_spec *spec)
+{
+	if (i == 0 || spec->parent < 0) {
+		return i == 0 && spec->parent < 0;
+	}
+	return spec->parent < (int)i && spec->parent_port >= 1 && spec->parent_port < ESC_PORTS &&
+	       seg->node[spec->parent].child[spec->parent_port] == NO_CHILD;
+}
+
 static int add_slave(struct segment *seg, unsigned i, const struct segment_slave_spec *spec)
 {
 	struct node *n = &seg->node[i];
@@ -276,10 +287,7 @@ static int add_slave(struct segment *seg, unsigned i, const struct segment_slave
 		.forwarding_ns = spec->forwarding_ns,
 		.sii_bytes = spec->sii_bytes,
 	};
-	if (spec->sii_bytes > SEGMENT_SII_BYTES || spec->parent >= (int)i ||
-	    (spec->parent >= 0 &&
-	     (spec->parent_port < 1 || spec->parent_port > 3 ||
-	      seg->node[spec->parent].child[spec->parent_port] != NO_CHILD))) {
+	if (spec->sii_bytes > SEGMENT_SII_BYTES || !is_place_free(seg, i, spec)) {
 		return -EINVAL;
 	}
 	n->sii = malloc(spec->sii_bytes > 0 ? spec->sii_bytes : 1);
@@ -293,28 +301,39 @@ static int add_slave(struct segment *seg, unsigned i, const struct segment_slave
 	return 0;
 }
 
+static void destroy_devices(const struct segment_slave_spec *slaves, size_t from, size_t count)
+{
+	for (size_t i = from; i < count; i++) {
+		if (slaves[i].device != NULL) {
+			slaves[i].device->ops->destroy(slaves[i].device);
+		}
+	}
+}
+
 int segment_create(const struct segment_slave_spec *slaves, size_t count, int64_t t_ns,
 		   struct segment **ret_segment)
 {
+	int is_count_right = count >= 1 && count <= LIMIT_SLAVES;
 	struct segment *seg = calloc(1, sizeof(*seg));
 	int r = 0;
 
-	if (seg == NULL) {
-		return -ENOMEM;
+	if (seg != NULL && is_count_right) {
+		seg->node = calloc(count, sizeof(*seg->node));
 	}
-	seg->node = count >= 1 && count <= LIMIT_SLAVES ? calloc(count, sizeof(*seg->node)) : NULL;
-	if (seg->node == NULL) {
+	if (seg == NULL || seg->node == NULL) {
 		free(seg);
-		return count >= 1 && count <= LIMIT_SLAVES ? -ENOMEM : -EINVAL;
+		destroy_devices(slaves, 0, count);
+		return is_count_right ? -ENOMEM : -EINVAL;
 	}
 	seg->now_ns = t_ns;
-	for (unsigned i = 0; i < count; i++) {
+	for (unsigned i = 0; i < count && r == 0; i++) {
 		r = add_slave(seg, i, &slaves[i]);
 		seg->count = i + 1u;
-		if (r < 0) {
-			segment_destroy(seg);
-			return r;
-		}
+	}
+	if (r < 0) {
+		destroy_devices(slaves, seg->count, count);
+		segment_destroy(seg);
+		return r;
 	}
 	for (size_t i = 0; i < count; i++) {
 		power_on(&seg->node[i], t_ns, seg->node[i].clock_start_ns);
@@ -411,7 +430,8 @@ int64_t segment_now_ns(const struct segment *segment)
 }
 
 void segment_sync0_to(struct segment *segment,
-		      void (*sink)(void *ctx, unsigned slave, int64_t t_ns, uint64_t system_time_ns),
+		      void (*sink)(void *ctx, unsigned slave, int64_t t_ns,
+				   uint64_t system_time_ns),
 		      void *ctx)
 {
 	segment->sink = sink;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A line of slaves on one axis of true time: their ESCs, clocks and applications, the wires between them. Nothing
- * here reads a clock or waits: segment_advance() runs everything that is due, segment_frame() sends a
- * frame through. Same calls, same results.
+ * A line of slaves on one axis of true time: their ESCs, clocks and applications, the wires between
+ * them. Nothing here reads a clock or waits: segment_advance() runs everything that is due,
+ * segment_frame() sends a frame through. Same calls, same results.
  */
 #ifndef SIM_SEGMENT_H
 #define SIM_SEGMENT_H
@@ -19,21 +19,25 @@ enum { SEGMENT_SII_BYTES = 65536 };
 
 struct segment_slave_spec {
 	const struct esc_features *features;
-	const uint8_t *sii;          /* copied */
+	const uint8_t *sii; /* copied */
 	size_t sii_bytes;
-	struct sim_device *device;   /* taken over; NULL: the ESC alone */
+	struct sim_device *device; /* taken over; NULL: the ESC alone */
 	struct signal_spec signal;
-	double ppm;                  /* of its crystal */
-	uint64_t clock_start_ns;     /* its local time at power-on */
-	int parent;                  /* index of the slave towards the master; -1: the master */
-	unsigned parent_port;        /* 1, 2 or 3 of the parent */
-	int64_t wire_ns;             /* one way, from the parent's port */
-	int64_t processing_ns;       /* port 0 to the next port, through the processing unit */
-	int64_t forwarding_ns;       /* any port to the next, on the way back */
+	double ppm;              /* of its crystal */
+	uint64_t clock_start_ns; /* its local time at power-on */
+	int parent;              /* index of the slave towards the master; -1: the master */
+	unsigned parent_port;    /* 1, 2 or 3 of the parent */
+	int64_t wire_ns;         /* one way, from the parent's port */
+	int64_t processing_ns;   /* port 0 to the next port, through the processing unit */
+	int64_t forwarding_ns;   /* any port to the next, on the way back */
 };
 
 struct segment;
 
+/**
+ * Power up @count slaves at @t_ns; their devices are taken over, on failure, too. 0; -EINVAL: not 1
+ * to LIMIT_SLAVES of them, or one hangs on no free port; -ENOMEM.
+ */
 int segment_create(const struct segment_slave_spec *slaves, size_t count, int64_t t_ns,
 		   struct segment **ret_segment);
 void segment_destroy(struct segment *segment);
@@ -44,8 +48,9 @@ void segment_advance(struct segment *segment, int64_t t_ns);
 int64_t segment_next_event_ns(const struct segment *segment);
 
 /**
- * A frame whose start leaves the master at @t_ns: changed in place. 0 and the time at which its start is back; -ENOLINK: it does not
- * come back; -EBADMSG: it was no whole EtherCAT frame (slaves destroy it). The segment is advanced to @t_ns first.
+ * A frame whose start leaves the master at @t_ns: changed in place. 0 and the time at which its
+ * start is back; -ENOLINK: it does not come back; -EBADMSG: it was no whole EtherCAT frame (slaves
+ * destroy it). The segment is advanced to @t_ns first.
  */
 int segment_frame(struct segment *segment, int64_t t_ns, uint8_t *frame, size_t frame_len,
 		  int64_t *ret_back_ns);
@@ -57,12 +62,14 @@ int64_t segment_now_ns(const struct segment *segment);
 
 /** Every SYNC0 edge of every slave, exact. */
 void segment_sync0_to(struct segment *segment,
-		      void (*sink)(void *ctx, unsigned slave, int64_t t_ns, uint64_t system_time_ns),
+		      void (*sink)(void *ctx, unsigned slave, int64_t t_ns,
+				   uint64_t system_time_ns),
 		      void *ctx);
 
 /* --- faults that are a state of the segment --- */
 
-/** Cut or heal the cable towards @slave from its parent. Its port errors are counted as a link loss. */
+/** Cut or heal the cable towards @slave from its parent. Its port errors are counted as a link
+ * loss. */
 void segment_cut(struct segment *segment, size_t slave, int64_t t_ns);
 void segment_heal(struct segment *segment, size_t slave, int64_t t_ns);
 /** A slave without power passes nothing on. Power-on starts it anew, with its clock at 0. */
