@@ -48,6 +48,12 @@ struct bytes capture_load(const char *name)
 	return b;
 }
 
+void capture_free(struct bytes *b)
+{
+	free(b->at);
+	b->at = NULL;
+}
+
 /* What the answers of one slave have told so far. */
 struct learning {
 	struct bytes image;

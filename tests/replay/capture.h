@@ -23,4 +23,6 @@ struct bytes capture_load(const char *name);
  */
 struct bytes capture_learn_sii(const struct bytes *capture, uint16_t station, uint16_t position);
 
+void capture_free(struct bytes *b);
+
 #endif

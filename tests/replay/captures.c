@@ -108,6 +108,10 @@ TEST(replay, ek1100_el2828_el2889_answer_ethercrab_as_the_real_ones_did)
 	replay(&b, LINK_UNSEEN, "EtherCrab, EK1100 + EL2828 + EL2889", &capture, &c);
 	check_round_trip(&c, 0x1000, 1);
 	check_round_trip(&c, 0x1001, 1);
+	capture_free(&capture);
+	capture_free(&ek1100);
+	capture_free(&el2828);
+	capture_free(&el2889);
 }
 
 TEST(replay, ek1100_answers_soem_as_the_real_one_did)
@@ -119,6 +123,8 @@ TEST(replay, ek1100_answers_soem_as_the_real_one_did)
 
 	add_slave(&b, &ek1100, 140, 0);
 	replay(&b, LINK_SEEN, "SOEM, EK1100", &capture, &c);
+	capture_free(&capture);
+	capture_free(&ek1100);
 }
 
 /* There is no image of an EL1004, so its EEPROM is what SOEM read; the rest of the capture tests. */
@@ -134,4 +140,7 @@ TEST(replay, ek1100_and_el1004_answer_soem_as_the_real_ones_did)
 	add_slave(&b, &el1004, 150, 0);
 	replay(&b, LINK_UNSEEN, "SOEM, EK1100 + EL1004", &capture, &c);
 	check_round_trip(&c, 0x1001, 1);
+	capture_free(&capture);
+	capture_free(&ek1100);
+	capture_free(&el1004);
 }
