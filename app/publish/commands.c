@@ -157,7 +157,7 @@ static void lose(struct commands *c, const struct slave_table *table, uint64_t s
 		*place = 0;
 	}
 	take_back(c, table, sender);
-	gate_forget(c->gate, sender);
+	gate_lose(c->gate, sender);
 }
 
 static void hear(struct commands *c, const struct slave_table *table)
@@ -205,7 +205,6 @@ static void beat(struct commands *c)
 static void reply(struct commands *c, const struct topics *topics, const ecdaq_CommandV1 *command,
 		  uint64_t cycle, char *reason)
 {
-	struct timespec now;
 	ecdaq_ReplyV1 m = {
 		.commander = command->commander,
 		.id = command->id,
@@ -215,8 +214,7 @@ static void reply(struct commands *c, const struct topics *topics, const ecdaq_C
 		.reason = reason,
 	};
 
-	clock_gettime(CLOCK_REALTIME, &now);
-	(void)topics_write(topics->reply, &m, now.tv_sec * NS_PER_S + now.tv_nsec);
+	(void)topics_write_now(topics->reply, &m);
 	c->counts.accepted += m.is_accepted;
 	c->counts.refused += !m.is_accepted;
 }

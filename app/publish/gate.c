@@ -15,6 +15,7 @@ struct commander {
 	uint64_t sender; /* 0: free */
 	uint64_t last_id;
 	int has_id;
+	int is_gone; /* its place may be given to another */
 	double tokens; /* commands it may send now */
 	int64_t refilled_ns;
 };
@@ -85,27 +86,41 @@ static struct commander *find(struct gate *gate, uint64_t sender)
 	return NULL;
 }
 
+static struct commander *find_gone(struct gate *gate)
+{
+	for (size_t i = 0; i < GATE_COMMANDERS; i++) {
+		if (gate->commander[i].is_gone) {
+			return &gate->commander[i];
+		}
+	}
+	return NULL;
+}
+
 static struct commander *admit(struct gate *gate, uint64_t sender, int64_t now_ns)
 {
 	struct commander *c = find(gate, sender);
 
 	if (c == NULL) {
 		c = find(gate, 0);
+		c = c != NULL ? c : find_gone(gate);
 		if (c != NULL) {
 			*c = (struct commander){ .sender = sender,
 						 .tokens = gate->cfg->dds_command_rate,
 						 .refilled_ns = now_ns };
 		}
 	}
+	if (c != NULL) {
+		c->is_gone = 0;
+	}
 	return c;
 }
 
-void gate_forget(struct gate *gate, uint64_t sender)
+void gate_lose(struct gate *gate, uint64_t sender)
 {
 	struct commander *c = sender == 0 ? NULL : find(gate, sender);
 
 	if (c != NULL) {
-		*c = (struct commander){ .sender = 0 };
+		c->is_gone = 1;
 	}
 	for (unsigned i = 0; i < BOARD_OUTPUTS; i++) {
 		if (gate->setter[i] == sender) {

@@ -58,8 +58,11 @@ void gate_destroy(struct gate *gate);
 int gate_check(struct gate *gate, const struct gate_command *cmd, const struct gate_view *view,
 	       struct gate_item *ret_items, char *reason);
 
-/** @sender is gone: what was remembered of its ids is forgotten. */
-void gate_forget(struct gate *gate, uint64_t sender);
+/**
+ * @sender is not heard of: it owns nothing any more. Its ids are remembered (it may be heard of again,
+ * and an old command must not pass then) until its place is needed for another.
+ */
+void gate_lose(struct gate *gate, uint64_t sender);
 
 /** Who last set @output (0: nobody), and whether a lost owner leaves it fail-safe (has a time-out).
  */

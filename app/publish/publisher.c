@@ -3,6 +3,7 @@
 
 #include <errno.h>
 #include <inttypes.h>
+#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -251,7 +252,7 @@ static void wait_for_news(const struct publisher *p, int is_in_flight)
 	struct timespec pause = { .tv_nsec = FLIGHT_LOOK_NS };
 
 	if (is_in_flight) {
-		nanosleep(&pause, NULL);
+		ppoll(NULL, 0, &pause, NULL);
 	} else {
 		(void)dds_waitset_wait(p->waitset, NULL, 0, p->cfg->cycle_period_ns / 2);
 	}

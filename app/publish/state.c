@@ -5,9 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
-#include "base/clock.h"
 #include "ecdaq.h"
 #include "image/image.h"
 #include "publish/mapped_time.h"
@@ -16,21 +14,13 @@ enum { TYPE_BYTES = 16, TEXT_BYTES = 256 };
 
 extern const char idl_text[];
 
-static int64_t utc_now_ns(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_REALTIME, &now);
-	return now.tv_sec * NS_PER_S + now.tv_nsec;
-}
-
 void state_put_idl(const struct topics *topics)
 {
 	static char text[sizeof(char) * 16384];
 	ecdaq_IdlV1 m = { .text = text };
 
 	snprintf(text, sizeof(text), "%s", idl_text);
-	(void)topics_write(topics->idl, &m, utc_now_ns());
+	(void)topics_write_now(topics->idl, &m);
 }
 
 /* --- channels --- */
@@ -131,7 +121,7 @@ int state_put_channels(const struct topics *topics, const struct config *cfg,
 	m->are_commands_on = cfg->dds_allow_insecure_commands != 0;
 	put_slaves(m, table);
 	put_channels(m, table, cfg);
-	(void)topics_write(topics->channels, m, utc_now_ns());
+	(void)topics_write_now(topics->channels, m);
 	ecdaq_ChannelsV1_free(m, DDS_FREE_ALL);
 	return 0;
 }
@@ -194,7 +184,7 @@ void state_put_status(const struct topics *topics, const struct state_view *view
 	if (page != NULL && view->table != NULL) {
 		snprintf(state, sizeof(state), "%s", bus_state_to_str(u32(&page->bus_state)));
 	}
-	(void)topics_write(topics->status, &m, utc_now_ns());
+	(void)topics_write_now(topics->status, &m);
 }
 
 void state_put_timemap(const struct topics *topics, uint64_t session,

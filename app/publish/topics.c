@@ -156,6 +156,11 @@ void topics_close(struct topics *topics)
 	memset(topics, 0, sizeof(*topics));
 }
 
+int topics_write_now(dds_entity_t writer, const void *message)
+{
+	return dds_write(writer, message) < 0 ? -EIO : 0;
+}
+
 int topics_write(dds_entity_t writer, const void *message, int64_t utc_ns)
 {
 	return dds_write_ts(writer, message, utc_ns < 0 ? 0 : utc_ns) < 0 ? -EIO : 0;

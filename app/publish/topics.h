@@ -29,5 +29,7 @@ void topics_close(struct topics *topics);
 
 /** Write @message with @utc_ns as its source time stamp. 0 or -EIO. Never waits for a reader. */
 int topics_write(dds_entity_t writer, const void *message, int64_t utc_ns);
+/** The same, stamped with the time now. */
+int topics_write_now(dds_entity_t writer, const void *message);
 
 #endif

@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import csv
 import importlib.util
+import json
 import os
 import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
 KIT = ROOT / "app" / "publish" / "python"
@@ -40,6 +42,35 @@ DDS_SETTINGS = {
 }
 
 
+class Commander:
+    """command_python.py, spoken to in JSON."""
+
+    def __init__(self, process: subprocess.Popen[bytes]) -> None:
+        self.process = process
+        self.channels: list[str] = self._answer()["ready"]
+
+    def _answer(self) -> dict[str, Any]:
+        assert self.process.stdout is not None
+        line = self.process.stdout.readline()
+        assert line, "the commander ended"
+        return json.loads(line)
+
+    def command(self, values: dict[str, float], **more: Any) -> dict[str, Any]:
+        assert self.process.stdin is not None
+        self.process.stdin.write((json.dumps({"values": values} | more) + "\n").encode())
+        self.process.stdin.flush()
+        return self._answer()
+
+    def accepted(self, values: dict[str, float]) -> int:
+        answer = self.command(values)
+        assert answer["accepted"], answer
+        return answer["cycle"]
+
+    def kill(self) -> None:
+        self.process.kill()
+        self.process.wait(10)
+
+
 class Bench:
     """The appliance's programs (live.Segment) and those on the PC."""
 
@@ -65,25 +96,49 @@ class Bench:
         self.segment.start_all()
         self.start_dds()
 
-    def start_dds(self) -> None:
-        self.segment.start("dds", str(live.BIN / "ecdaq-dds"), *self.segment.options())
-        wait_for("ecdaq-dds' session", lambda: self.dds_says("publishing session"), 20)
+    def start_dds(self, sessions: int = 1) -> None:
+        """Returns when ecdaq-dds, this one or those before, have told of so many sessions."""
+        process = self.segment.start(
+            "dds", str(live.BIN / "ecdaq-dds"), *self.segment.options()
+        )
 
-    def dds_says(self, words: str) -> bool:
-        return words in self.segment.log("dds")
+        def is_publishing() -> bool:
+            said = self.segment.log("dds")
+            assert process.poll() is None, said
+            return said.count("publishing session") >= sessions
+
+        wait_for("ecdaq-dds' session", is_publishing, 20)
+
+    def logs(self) -> dict[str, str]:
+        return {path.stem: path.read_text() for path in self.folder.glob("*.log")}
 
     def on_pc(self, name: str, *command: str) -> subprocess.Popen[bytes]:
         process: subprocess.Popen[bytes] = self.pc.start(*command, log=self.folder / f"{name}.log")
         self.started.append(process)
         return process
 
-    def python(self, script: str, *arguments: str) -> subprocess.Popen[bytes]:
+    def python(self, name: str, script: str, *arguments: str) -> subprocess.Popen[bytes]:
         """A program of this folder on the PC, with the kit."""
         paths = os.pathsep.join(p for p in (str(KIT), os.environ.get("PYTHONPATH")) if p)
         program = str(Path(__file__).parent / script)
         return self.on_pc(
-            Path(script).stem, "env", f"PYTHONPATH={paths}", sys.executable, program, *arguments
+            name, "env", f"PYTHONPATH={paths}", sys.executable, program, *arguments
         )
+
+    def commander(self) -> Commander:
+        """A commander on the PC that does as it is told (command_python.py)."""
+        paths = os.pathsep.join(p for p in (str(KIT), os.environ.get("PYTHONPATH")) if p)
+        program = str(Path(__file__).parent / "command_python.py")
+        with (self.folder / "commander.log").open("ab") as errors:
+            process = subprocess.Popen(
+                [*self.pc.enter, "env", f"PYTHONPATH={paths}", sys.executable, program, "dds1",
+                 DDS_SETTINGS["dds.domain"]],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=errors,
+            )
+        self.started.append(process)
+        return Commander(process)
 
     def log(self, name: str) -> str:
         path = self.folder / f"{name}.log"

@@ -1,0 +1,100 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * subscriber DOMAIN INTERFACE SECONDS OUT: what comes on ecdaq/sample, as CSV, for some seconds. On a
+ * plain Cyclone DDS reader, as a C user would write one; prints "ready" when the publisher is there.
+ */
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+
+#include "dds/dds.h"
+#include "ecdaq.h"
+
+enum { AT_ONCE = 256, NS = 1000000000 };
+
+static int64_t now_ns(void)
+{
+	struct timespec now;
+
+	clock_gettime(CLOCK_MONOTONIC, &now);
+	return now.tv_sec * INT64_C(1000000000) + now.tv_nsec;
+}
+
+static dds_entity_t make_reader(const char *domain, const char *interface)
+{
+	char xml[512];
+	dds_domainid_t id = (dds_domainid_t)strtoul(domain, NULL, 10);
+	dds_qos_t *qos = dds_create_qos();
+	dds_entity_t participant;
+	dds_entity_t topic;
+	dds_entity_t reader;
+
+	snprintf(xml, sizeof(xml),
+		 "<General><Interfaces><NetworkInterface name=\"%s\"/></Interfaces></General>"
+		 "<Discovery><ParticipantIndex>auto</ParticipantIndex></Discovery>",
+		 interface);
+	if (dds_create_domain(id, xml) < 0) {
+		return -1;
+	}
+	participant = dds_create_participant(id, NULL, NULL);
+	topic = dds_create_topic(participant, &ecdaq_SampleV1_desc, "ecdaq/sample", NULL, NULL);
+	dds_qset_reliability(qos, DDS_RELIABILITY_RELIABLE, DDS_MSECS(100));
+	dds_qset_history(qos, DDS_HISTORY_KEEP_ALL, 0);
+	reader = dds_create_reader(participant, topic, qos, NULL);
+	dds_delete_qos(qos);
+	return reader;
+}
+
+static void put(FILE *out, const ecdaq_SampleV1 *s)
+{
+	fprintf(out, "%u,%" PRIu64 ",%" PRIu64 ",%" PRId64 ",%u,%d,%.17g,%" PRIu64 ",%" PRId64 ",",
+		s->slave, s->session, s->cycle, s->dc_time_ns, s->flags, s->is_good, s->adc,
+		s->counter, s->sample_time_ns);
+	for (uint32_t i = 0; i < s->raw._length; i++) {
+		fprintf(out, "%s%" PRIu64, i > 0 ? " " : "", s->raw._buffer[i]);
+	}
+	fputc('\n', out);
+}
+
+static void take(dds_entity_t reader, FILE *out)
+{
+	void *messages[AT_ONCE] = { NULL };
+	dds_sample_info_t info[AT_ONCE];
+	int n;
+
+	while ((n = dds_take(reader, messages, info, AT_ONCE, AT_ONCE)) > 0) {
+		for (int i = 0; i < n; i++) {
+			if (info[i].valid_data) {
+				put(out, messages[i]);
+			}
+		}
+		dds_return_loan(reader, messages, n);
+	}
+}
+
+int main(int argc, char **argv)
+{
+	dds_entity_t reader = argc == 5 ? make_reader(argv[1], argv[2]) : -1;
+	FILE *out = reader < 0 ? NULL : fopen(argv[4], "w");
+	dds_entity_t waitset;
+	int64_t end;
+
+	if (out == NULL) {
+		fputs("usage: subscriber DOMAIN INTERFACE SECONDS OUT\n", stderr);
+		return 2;
+	}
+	fputs("slave,session,cycle,dc_time_ns,flags,is_good,adc,counter,sample_time_ns,raw\n", out);
+	waitset = dds_create_waitset(dds_get_participant(reader));
+	dds_set_status_mask(reader, DDS_DATA_AVAILABLE_STATUS);
+	dds_waitset_attach(waitset, reader, 1);
+	dds_waitset_wait(waitset, NULL, 0, DDS_SECS(20));
+	puts("ready");
+	fflush(stdout);
+	end = now_ns() + (int64_t)(strtod(argv[3], NULL) * NS);
+	while (now_ns() < end) {
+		dds_waitset_wait(waitset, NULL, 0, DDS_MSECS(100));
+		take(reader, out);
+	}
+	return fclose(out) == 0 ? 0 : 1;
+}

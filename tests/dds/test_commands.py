@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: MIT
+"""Commands from a PC to the outputs: answered once, refused with a reason, taken back when their owner dies."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Callable
+
+import pytest
+from bench import DDS_SETTINGS, Bench, live
+
+LED = "piccolo0.led"
+TIMEOUT_MS = 200
+REMOTE_LED = {
+    "outputs[0].channel": LED,
+    "outputs[0].owner": "remote",
+    "outputs[0].timeout": f"{TIMEOUT_MS}ms",
+}
+
+
+# A commander on a busy machine is not to be taken for dead where that is not what is looked at.
+PATIENT = REMOTE_LED | {"outputs[0].timeout": "4s"}
+
+
+def led_by_cycle(bench: Bench) -> dict[int, bool]:
+    return {m.cycle: m.led for m in live.recorded(bench.segment.record_dir, "/ecdaq/piccolo0")}
+
+
+def end(bench: Bench) -> None:
+    bench.segment.stop("daemon")
+    assert bench.segment.stop("recorder") == 0
+    assert bench.segment.stop("dds") == 0
+
+
+def test_answer_names_the_very_cycle_whose_frame_carried_the_value(
+    make_bench: Callable[..., Bench],
+) -> None:
+    bench = make_bench(**PATIENT)
+    bench.start_all()
+    commander = bench.commander()
+    answers = [(k % 2, commander.command({LED: k % 2})) for k in range(1, 101)]
+    assert all(answer["accepted"] for _, answer in answers), answers
+    end(bench)
+    led = led_by_cycle(bench)
+    for value, answer in answers:
+        assert led[answer["cycle"]] == value
+        assert led[answer["cycle"] - 1] != value
+    took = sorted(answer["ms"] for _, answer in answers)
+    print(f"command to answer on the PC, in cycles of 1 ms, {len(took)} commands: "
+          f"median {statistics.median(took):.1f}, p99 {took[98]:.1f}, most {took[99]:.1f}")
+
+
+def test_commander_killed_leaves_its_output_fail_safe_within_the_time_out(
+    make_bench: Callable[..., Bench],
+) -> None:
+    bench = make_bench(**REMOTE_LED)
+    bench.start_all()
+    commander = bench.commander()
+    set_at = commander.accepted({LED: 1})
+    bench.segment.wait_for_cycles(1000, 30)  # it lives: five times the time-out
+    killed_at = bench.segment.status()["cycle_number"]  # no later than the kill
+    commander.kill()
+    bench.segment.wait_for_cycles(1000, 30)
+    end(bench)
+    led = led_by_cycle(bench)
+    off = min(cycle for cycle in led if cycle > set_at and not led[cycle])
+    print(f"set in cycle {set_at}, killed from {killed_at} on, fail-safe from {off}: "
+          f"{off - killed_at} cycles later, time-out {TIMEOUT_MS}")
+    assert off > set_at + 1000
+    assert off - killed_at <= TIMEOUT_MS
+    assert not any(led[cycle] for cycle in led if cycle >= off)
+
+
+def test_publisher_killed_leaves_the_output_fail_safe_and_its_successor_does_not_bring_it_back(
+    make_bench: Callable[..., Bench],
+) -> None:
+    bench = make_bench(**REMOTE_LED)
+    bench.start_all()
+    commander = bench.commander()
+    set_at = commander.accepted({LED: 1})
+    bench.segment.processes["dds"].kill()
+    bench.segment.processes.pop("dds").wait(10)
+    killed_at = bench.segment.status()["cycle_number"]
+    bench.segment.wait_for_cycles(1000, 30)
+    bench.start_dds(sessions=2)
+    bench.segment.wait_for_cycles(1000, 30)
+    end(bench)
+    led = led_by_cycle(bench)
+    off = min(cycle for cycle in led if cycle > set_at and not led[cycle])
+    print(f"ecdaq-dds killed by {killed_at}, fail-safe from {off}: {off - killed_at} cycles later")
+    assert off - killed_at <= TIMEOUT_MS + 5
+    assert not any(led[cycle] for cycle in led if cycle >= off)
+
+
+def test_wrong_commands_are_refused_with_their_reason_and_never_reach_the_bus(
+    make_bench: Callable[..., Bench],
+) -> None:
+    bench = make_bench(**PATIENT)
+    bench.start_all()
+    commander = bench.commander()
+    start = commander.accepted({LED: 0})
+    for values, more, reason in (
+        ({"piccolo1.led": 1}, {}, "owned by local, not remote"),
+        ({LED: 1, "piccolo1.led": 1}, {}, "owned by local, not remote"),
+        ({"piccolo0.adc": 1}, {}, "is an input"),
+        ({"nobody.led": 1}, {}, "no such channel"),
+        ({LED: 7}, {}, "cannot be held"),
+        ({LED: 2}, {"raw": True}, "does not fit in 1 bits"),
+        ({LED: 1}, {"session": 5}, "stale"),
+        ({LED: 1}, {"not_after_cycle": 1}, "stale"),
+        ({}, {}, "0 channels"),
+        ({LED: 1}, {"id": 1}, "stale"),
+    ):
+        answer = commander.command(values, **more)
+        assert not answer["accepted"], (values, more, answer)
+        assert reason in answer["reason"], answer
+    last = commander.accepted({LED: 0})
+    end(bench)
+    led = led_by_cycle(bench)
+    assert not any(led[cycle] for cycle in range(start, last + 1))
+
+
+def test_commands_are_off_unless_allowed(make_bench: Callable[..., Bench]) -> None:
+    bench = make_bench(**PATIENT, **{"dds.allow_insecure_commands": "off"})
+    bench.start_all()
+    answer = bench.commander().command({LED: 1})
+    assert not answer["accepted"]
+    assert "commands are off" in answer["reason"]
+
+
+@pytest.mark.parametrize(
+    ("settings", "reason"),
+    [
+        ({"dds.interface": "ecat0"}, "is bus.interface"),
+        ({"dds.interface": "nowhere0"}, "nowhere0: no such network interface"),
+        ({"dds.interface": ""}, "must be given"),
+        ({"dds.interface": "lo\"/><x"}, "is no name of a network interface"),
+        ({"dds.peers": "10.0.0.1 <"}, "must be addresses"),
+    ],
+)
+def test_publisher_starts_on_a_named_interface_of_its_own_only(
+    make_bench: Callable[..., Bench], settings: dict[str, str], reason: str
+) -> None:
+    bench = make_bench()
+    given = DDS_SETTINGS | {"bus.interface": "ecat0"} | settings
+    options = [word for item in given.items() for word in ("--set", "=".join(item))]
+    ended = bench.segment.space.run(str(live.BIN / "ecdaq-dds"), *options, check=False)
+    assert ended.returncode == 3
+    assert reason in ended.stderr
+
+
+def test_publisher_refuses_the_nic_that_the_running_master_has(
+    make_bench: Callable[..., Bench],
+) -> None:
+    bench = make_bench()
+    bench.segment.start_all()
+    ended = bench.segment.space.run(
+        str(live.BIN / "ecdaq-dds"), "--run-dir", str(bench.segment.run_dir),
+        "--set", "dds.enable=on", "--set", "dds.interface=ecat0", check=False,
+    )  # fmt: skip
+    assert ended.returncode == 3
+    assert "ecat0 is the EtherCAT segment's" in ended.stderr

@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: MIT
+"""Samples over DDS: complete, equal to the recording, whatever happens to those who carry them.
+
+ECDAQ_DDS_SECONDS: how long each looks (10). Numbers are printed: ./build.sh test dds, or pytest -s.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from bench import BUILD, Bench, live, rows, wait_for
+
+SECONDS = float(os.environ.get("ECDAQ_DDS_SECONDS", "10"))
+DOMAIN = "7"
+
+
+def start_python(bench: Bench, name: str, seconds: float, *more: str) -> Path:
+    out = bench.folder / f"{name}.csv"
+    bench.python(
+        name, "subscribe_python.py", "--interface", "dds1", "--domain", DOMAIN,
+        "--seconds", str(seconds), "--out", str(out), *more,
+    )  # fmt: skip
+    return out
+
+
+def start_c(bench: Bench, seconds: float) -> Path:
+    out = bench.folder / "c.csv"
+    program = str(BUILD / "tests" / "dds" / "dds_subscriber")
+    bench.on_pc("subscriber", program, DOMAIN, "dds1", str(seconds), str(out))
+    return out
+
+
+def ends(bench: Bench, seconds: float) -> None:
+    for process in bench.started:
+        assert process.wait(seconds) == 0, [bench.log(p.stem) for p in bench.folder.glob("*.log")]
+
+
+def of_recording(bench: Bench) -> dict[tuple[int, int], tuple[int, ...]]:
+    """(slave, cycle) -> time, flags, goodness and every raw value, from the appliance's recording."""
+    return {
+        (slave, m.cycle): (
+            m.dc_time_ns, m.flags, int(m.good), int(m.led), m.oneshot_time, m.adc, m.counter,
+            m.sample_time, m.status,
+        )  # fmt: skip
+        for slave in (0, 1)
+        for m in live.recorded(bench.segment.record_dir, f"/ecdaq/piccolo{slave}")
+    }
+
+
+def of_subscriber(path: Path) -> dict[tuple[int, int], tuple[int, ...]]:
+    """The same from a subscriber's file; no sample came twice."""
+    found = rows(path)
+    assert found
+    values = {
+        (int(r["slave"]), int(r["cycle"])): (
+            int(r["dc_time_ns"]), int(r["flags"]), int(r["is_good"]), *map(int, r["raw"].split())
+        )  # fmt: skip
+        for r in found
+    }
+    assert len(values) == len(found)
+    for r in found:  # what needs no decoder says the same as the raw values
+        raw = [int(word) for word in r["raw"].split()]
+        assert float(r["adc"]) == pytest.approx(raw[2] * 3.3 / 4095, abs=1e-12)
+        assert (int(r["counter"]), int(r["sample_time_ns"])) == (raw[3], raw[4])
+    return values
+
+
+def gaps_of(values: dict[tuple[int, int], tuple[int, ...]], slave: int) -> list[tuple[int, int]]:
+    """First and count of what is missing between the first and the last cycle."""
+    cycles = sorted(cycle for place, cycle in values if place == slave)
+    pairs = zip(cycles, cycles[1:], strict=False)
+    return [(a + 1, b - a - 1) for a, b in pairs if b != a + 1]
+
+
+def finish(bench: Bench, seconds: float) -> None:
+    """All subscribers end by themselves; then the appliance ends in order."""
+    for process in bench.started:
+        assert process.wait(seconds) == 0, bench.logs()
+    assert bench.segment.stop("dds") == 0
+    bench.segment.stop("daemon")
+    assert bench.segment.stop("recorder") == 0
+
+
+def test_every_sample_reaches_c_and_python_and_equals_the_recording(
+    make_bench: Callable[..., Bench],
+) -> None:
+    bench = make_bench()
+    bench.start_all()
+    files = {
+        "C": start_c(bench, SECONDS),
+        "Python": start_python(bench, "python", SECONDS),
+        "Python, blocks": start_python(bench, "blocks", SECONDS, "--blocks"),
+    }
+    finish(bench, SECONDS + 60)
+    recorded = of_recording(bench)
+    for name, path in files.items():
+        got = of_subscriber(path)
+        wrong = [key for key, value in got.items() if recorded.get(key) != value]
+        missing = gaps_of(got, 0) + gaps_of(got, 1)
+        print(f"{name}: {len(got)} samples, {len(missing)} gaps, {len(wrong)} wrong values")
+        assert len(got) > SECONDS * 2 * 700  # a subscriber takes a while to start
+        assert not missing
+        assert not wrong, (wrong[0], got[wrong[0]], recorded.get(wrong[0]))
+    assert not gaps_of(recorded, 0)
+
+
+def test_killed_publisher_costs_its_subscribers_its_down_time_and_the_recording_nothing(
+    make_bench: Callable[..., Bench],
+) -> None:
+    bench = make_bench()
+    bench.start_all()
+    out = start_python(bench, "python", SECONDS + 8)
+    wait_for("the subscriber", lambda: "ready" in bench.log("python"), 30)
+    bench.segment.wait_for_cycles(2000, 30)
+    bench.segment.stop("dds", signal.SIGKILL)
+    down = bench.segment.status()["cycle_number"]
+    bench.segment.wait_for_cycles(1000, 30)
+    up = bench.segment.status()["cycle_number"]
+    bench.start_dds(sessions=2)
+    back = bench.segment.status()["cycle_number"]
+    finish(bench, SECONDS + 60)
+    found = gaps_of(of_subscriber(out), 0)
+    print(f"killed at cycle {down}, started at {up}, back by {back}: gaps {found}")
+    assert len(found) == 1
+    first, count = found[0]
+    assert first <= down + 100
+    assert up - down - 200 <= count
+    # Discovery between the new publisher and an old subscriber takes its time, too.
+    assert first + count <= back + 3000
+    assert not gaps_of(of_recording(bench), 0)
+
+
+def test_publisher_follows_the_master_through_a_restart(make_bench: Callable[..., Bench]) -> None:
+    bench = make_bench()
+    bench.start_all()
+    out = start_python(bench, "python", SECONDS + 8)
+    wait_for("the subscriber", lambda: "ready" in bench.log("python"), 30)
+    bench.segment.wait_for_cycles(500, 30)
+    bench.segment.stop("daemon")
+    bench.segment.start_daemon()
+    bench.segment.wait_for_op()
+    wait_for("the new session", lambda: bench.log("python") and sessions(out) == 2, SECONDS + 30)
+    finish(bench, SECONDS + 60)
+    for session in sorted({r["session"] for r in rows(out)}):
+        cycles = [int(r["cycle"]) for r in rows(out) if r["session"] == session and r["slave"] == "0"]
+        assert cycles == list(range(cycles[0], cycles[-1] + 1))
+    assert cycles[0] == 0  # of a new master, all is published
+
+
+def sessions(path: Path) -> int:
+    return len({r.get("session") for r in rows(path)} - {None})
+
+
+def test_hostile_peer_with_our_names_and_garbage_brings_nobody_down(
+    make_bench: Callable[..., Bench],
+) -> None:
+    bench = make_bench()
+    bench.start_all()
+    lost = bench.segment.status()["frames_lost"]
+    out = start_python(bench, "python", SECONDS)
+    program = str(BUILD / "tests" / "dds" / "dds_hostile")
+    bench.on_pc("hostile", program, DOMAIN, "dds1", str(int(SECONDS)), "10.77.0.1")
+    finish(bench, SECONDS + 60)
+    print(bench.log("hostile").splitlines()[-1])
+    got = of_subscriber(out)
+    missing = gaps_of(got, 0) + gaps_of(got, 1)
+    print(f"{len(got)} samples, {len(missing)} gaps beside the hostile peer; frames lost before {lost}")
+    assert not missing
+    assert "garbage" in bench.log("hostile")
