@@ -25,19 +25,19 @@ POLL_S = 0.2
 ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]|\r")
 
 
-class Timeout(AssertionError):
+class WaitError(AssertionError):
     """What was waited for did not come."""
 
 
 def wait_for(what: str, seconds: float, probe: Callable[[], Any]) -> Any:
-    """Ask `probe` until it gives something true; Timeout names what was waited for."""
+    """Ask `probe` until it gives something true; WaitError names what was waited for."""
     until = time.monotonic() + seconds
     while True:
         result = probe()
         if result:
             return result
         if time.monotonic() > until:
-            raise Timeout(f"{what}: not within {seconds:.0f} s")
+            raise WaitError(f"{what}: not within {seconds:.0f} s")
         time.sleep(POLL_S)
 
 
@@ -104,7 +104,9 @@ class Machine:
     def console(self) -> str:
         """All that the console showed, without terminal control."""
         logs = [self.folder / f"console-{n}.log" for n in range(1, self.boots + 1)]
-        return "".join(ANSI.sub("", log.read_text(errors="replace")) for log in logs if log.exists())
+        return "".join(
+            ANSI.sub("", log.read_text(errors="replace")) for log in logs if log.exists()
+        )
 
     def console_of_this_boot(self) -> str:
         log = self.folder / f"console-{self.boots}.log"

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-import gzip
 import base64
+import gzip
 import re
 from pathlib import Path
 

@@ -67,7 +67,9 @@ def test_its_memory_is_locked(machine: Machine) -> None:
 def test_the_cycle_goes_on_and_is_recorded(machine: Machine) -> None:
     before = machine.json("ecdaq status --json")["cycles"]
     wait_for(
-        "3,000 cycles more", OP_S, lambda: machine.json("ecdaq status --json")["cycles"] > before + 3000
+        "3,000 cycles more",
+        OP_S,
+        lambda: machine.json("ecdaq status --json")["cycles"] > before + 3000,
     )
     files = machine.run("sudo find /data/record -name '*.mcap*' -size +4k")
     assert files.strip()
@@ -76,5 +78,7 @@ def test_the_cycle_goes_on_and_is_recorded(machine: Machine) -> None:
 def test_a_killed_master_comes_back_by_itself(machine: Machine) -> None:
     was = machine.run("pgrep -x ecdaqd").strip()
     machine.run("sudo kill -KILL " + was)
-    wait_for("another ecdaqd", 60, lambda: machine.try_run(f"pgrep -x ecdaqd | grep -v {was}").stdout)
+    wait_for(
+        "another ecdaqd", 60, lambda: machine.try_run(f"pgrep -x ecdaqd | grep -v {was}").stdout
+    )
     wait_for("OP again", OP_S, lambda: in_operation(machine))

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The power goes at random moments: the machine boots again by itself every time, its file system is
-mended by the journal alone, and what was recorded opens."""
+"""The power goes at random moments: the machine boots again by itself every time, and its file
+system is mended by the journal alone."""
 
 from __future__ import annotations
 
@@ -19,7 +19,9 @@ def test_the_machine_comes_back_after_every_cut(machine: Machine) -> None:
     for cut in range(CUTS):
         wait_for("a recording", 180, lambda: machine.try_run("sudo ls /data/record/*").stdout)
         moment = dice.uniform(0.0, 15.0)
-        machine.try_run(f"sudo dd if=/dev/urandom of=/data/noise bs=64k count=64 & sleep {moment:.1f}")
+        machine.try_run(
+            f"sudo dd if=/dev/urandom of=/data/noise bs=64k count=64 & sleep {moment:.1f}"
+        )
         machine.cut_power()
         machine.start()
         machine.wait_for_login()

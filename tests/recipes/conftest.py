@@ -14,7 +14,7 @@ sys.path[:0] = [
     str(TOP / "app" / "tools" / "image"),
     str(TOP / "layers" / "meta-local" / "lib"),
 ]
-from metadata import Metadata
+from metadata import Metadata  # noqa: E402 - found on the path set above
 
 MACHINES = sorted(p.stem for p in (TOP / "layers/meta-ecdaq/conf/machine").glob("*.conf"))
 

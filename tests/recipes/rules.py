@@ -19,7 +19,9 @@ LICENSES = {
     "GPL-2.0-only WITH SOEM-exception",
     "GPL-2.0-only WITH Linux-syscall-note",
 }
-HOST = re.compile(r"(?<![\w.-])(?!www\.)(?:[a-z0-9-]+\.)*(?:debian\.org|pythonhosted\.org|pypi\.org)\b")
+HOST = re.compile(
+    r"(?<![\w.-])(?!www\.)(?:[a-z0-9-]+\.)*(?:debian\.org|pythonhosted\.org|pypi\.org)\b"
+)
 ASSIGN = re.compile(r"^([A-Z][A-Z0-9_]*)(?::[a-z0-9:-]+)?\s*(=|\?=|\?\?=|:=|\+=|\.=)(.*)$")
 
 
@@ -31,7 +33,9 @@ def license_fields(recipe: Recipe) -> list[str]:
             found.append(f"{recipe.file}: no {name}")
     for part in recipe.value("LICENSE").split(" AND "):
         if part not in LICENSES:
-            found.append(f"{recipe.file}: LICENSE '{part}' is not in the list of tests/recipes/rules.py")
+            found.append(
+                f"{recipe.file}: LICENSE '{part}' is not in the list of tests/recipes/rules.py"
+            )
     if not recipe.value("LIC_FILES_CHKSUM"):
         found.append(f"{recipe.file}: no LIC_FILES_CHKSUM")
     return found
@@ -55,8 +59,12 @@ def pins(recipe: Recipe) -> list[str]:
     for uri in recipe.value("SRC_URI").split():
         scheme = uri.partition("://")[0]
         if scheme not in ("file", "apt"):
-            found.append(f"{recipe.file}: {uri}: only file:// and apt:// (others by a class with a hash)")
-    if recipe.value("PYPI_PACKAGE") and not re.fullmatch(r"[0-9a-f]{64}", recipe.value("PYPI_SHA256")):
+            found.append(
+                f"{recipe.file}: {uri}: only file:// and apt:// (others by a class with a hash)"
+            )
+    if recipe.value("PYPI_PACKAGE") and not re.fullmatch(
+        r"[0-9a-f]{64}", recipe.value("PYPI_SHA256")
+    ):
         found.append(f"{recipe.file}: PYPI_SHA256 is no SHA-256")
     return found
 
@@ -82,7 +90,7 @@ def soem_patches(recipe: Recipe, folder: Path) -> list[str]:
 
 
 def field_order(name: str, text: str) -> list[str]:
-    """Fields stand in the order of the style guide, with spaces round the sign and double quotes."""
+    """Fields stand in the order of the style guide; spaces round the sign, double quotes."""
     found = []
     last = -1
     for number, line in enumerate(text.splitlines(), 1):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The program that takes a machine's settings from its boot partition, run here on made-up folders."""
+"""The program that takes a machine's settings from its boot partition, on made-up folders."""
 
 from __future__ import annotations
 
@@ -42,6 +42,7 @@ class Place:
             "ECDAQ_DAEMON": str(base / "daemon"),
             "ECDAQ_STANDARD": str(base / "standard.yaml"),
             "ECDAQ_DATA_DIR": str(base),
+            "ECDAQ_HOSTS": str(base / "hosts"),
             "ECDAQ_CONSOLE": str(self.console),
         }
 
@@ -125,7 +126,7 @@ def test_a_file_without_a_key_lets_nobody_in(place: Place) -> None:
 def test_what_is_no_host_name_is_refused(place: Place, name: str) -> None:
     (place.source / "hostname").write_text(name + "\n")
     assert "hostname:" in place.run()
-    assert not (place.target / "hostname").exists()
+    assert (place.target / "hostname").read_text() == "ecdaq\n"
 
 
 def test_network_files_are_taken_but_never_for_the_ethercat_port(place: Place) -> None:

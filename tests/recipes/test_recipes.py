@@ -65,7 +65,9 @@ def test_what_the_machine_does_not_matter_for_is_made_once(tmp_path: Path) -> No
     for machine in MACHINES:
         settings = {"MACHINE": machine, "DISTRO": "ecdaq", "TMPDIR": str(tmp_path)}
         graph = Graph(Metadata(TOP, tmp_path / machine, settings))
-        hashes.append([graph.hash(Task(name, "do_dpkg_build")) for name in ("linux-ecdaq", "ecdaq")])
+        hashes.append(
+            [graph.hash(Task(name, "do_dpkg_build")) for name in ("linux-ecdaq", "ecdaq")]
+        )
     assert all(h == hashes[0] for h in hashes)
 
 

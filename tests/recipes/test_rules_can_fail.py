@@ -63,7 +63,9 @@ def test_another_soem_is_found(tmp_path: Path) -> None:
     lock.write_text("package = p\nversion = 1\nsha256 = aa\n")
     same = recipe(PYPI_PACKAGE="p", PYPI_VERSION="1", PYPI_SHA256="aa")
     assert rules.soem_pin(same, lock) == []
-    assert len(rules.soem_pin(recipe(PYPI_PACKAGE="p", PYPI_VERSION="2", PYPI_SHA256="b"), lock)) == 2
+    assert (
+        len(rules.soem_pin(recipe(PYPI_PACKAGE="p", PYPI_VERSION="2", PYPI_SHA256="b"), lock)) == 2
+    )
 
 
 def test_a_forgotten_patch_is_found(tmp_path: Path) -> None:

@@ -63,7 +63,7 @@ class Executor:
         stamp.write_text(self.graph.hash(task))
 
     def plan(self, wanted: Task) -> list[Task]:
-        """What has to run for `wanted`, in an order that works. Nothing below a result that is there."""
+        """What has to run for `wanted`, in order; nothing below a result that is there."""
         order: list[Task] = []
         seen: set[Task] = set()
 
@@ -109,7 +109,7 @@ class Executor:
         data = self.graph.recipe(task).data.createCopy()
         os.environ.clear()
         os.environ.update(bb.utils.build_environment(data) or {})
-        for name in data.keys():
+        for name in list(data.keys()):
             if data.getVarFlag(name, "export", False) and data.getVar(name) is not None:
                 os.environ[name] = data.getVar(name)
         data.setVarFlag(task.name, "nostamp", "1")
@@ -131,7 +131,7 @@ class Executor:
             status = 1
             try:
                 status = self._child(task)
-            except Exception:  # noqa: BLE001 - the parent only sees the exit code
+            except Exception:
                 traceback.print_exc()
             sys.stdout.flush()
             sys.stderr.flush()

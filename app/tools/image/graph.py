@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which tasks there are to run: the graph over recipes, and a hash of everything a task depends on."""
+"""Which tasks there are: the graph over recipes, and a hash of all that a task depends on."""
 
 from __future__ import annotations
 
@@ -89,7 +89,9 @@ class Graph:
             bb: Any = self.metadata.bb
             ignored = set((recipe.data.getVar("BB_BASEHASH_IGNORE_VARS") or "").split())
             tasks, needed, values = bb.data.generate_dependencies(recipe.data, ignored)
-            _, hashes = bb.data.generate_dependency_hash(tasks, needed, values, ignored, recipe.name)
+            _, hashes = bb.data.generate_dependency_hash(
+                tasks, needed, values, ignored, recipe.name
+            )
             self._bases[recipe.name] = {k.rpartition(":")[2]: v for k, v in hashes.items()}
         return self._bases[recipe.name]
 

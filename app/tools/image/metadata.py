@@ -76,7 +76,9 @@ def write_configuration(top: Path, build: Path, settings: dict[str, str]) -> Non
     conf = build / "conf"
     conf.mkdir(parents=True, exist_ok=True)
     layers = " ".join(str(top / layer) for layer in LAYERS)
-    (conf / "bblayers.conf").write_text(f'BBPATH = "${{TOPDIR}}"\nBBFILES = ""\nBBLAYERS = "{layers}"\n')
+    (conf / "bblayers.conf").write_text(
+        f'BBPATH = "${{TOPDIR}}"\nBBFILES = ""\nBBLAYERS = "{layers}"\n'
+    )
     lines = [f'{name} = "{value}"\n' for name, value in settings.items()]
     (conf / "local.conf").write_text("".join(lines))
 

@@ -60,7 +60,9 @@ def _fill_boot(inputs: Inputs, out: Path, boot: Path) -> None:
         if not found.exists():
             found = Path(inputs.rootfs) / source
         if not found.exists():
-            raise FileNotFoundError(f"IMAGE_BOOT_FILES: {source} is neither deployed nor in the root")
+            raise FileNotFoundError(
+                f"IMAGE_BOOT_FILES: {source} is neither deployed nor in the root"
+            )
         place = boot / (target or found.name)
         place.parent.mkdir(parents=True, exist_ok=True)
         if found.is_dir():

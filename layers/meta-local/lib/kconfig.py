@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Hold a kernel's final .config against the fragments it was asked for: every symbol, every value.
+"""Hold a kernel's final .config against the fragments it was made of: every symbol and value.
 
-usage: kconfig.py CONFIG FRAGMENT...    one line and exit code 1 for each symbol that came out different
+usage: kconfig.py CONFIG FRAGMENT...    a line for each symbol that differs, and exit code 1
 """
 
 import re

@@ -30,7 +30,7 @@ class Partition:
 
 @dataclass(frozen=True)
 class Layout:
-    """A whole file: the kind and the identity of the partition table, and its partitions in order."""
+    """A whole file: kind and identity of the partition table, and the partitions in order."""
 
     table: str
     identity: str

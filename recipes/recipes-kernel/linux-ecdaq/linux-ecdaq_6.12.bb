@@ -8,6 +8,7 @@ LIC_FILES_CHKSUM = "file://COPYING;md5=6bc538ed5bd9a7fc9398086aedcd7e46"
 
 # Debian's source package, the newest of the suite: security updates come with it.
 SRC_URI = "apt://linux \
+           file://0001-sysfs-say-that-the-kernel-is-real-time.patch \
            file://base.cfg \
            file://rt.cfg \
            file://systemd.cfg \
