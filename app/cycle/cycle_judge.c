@@ -61,8 +61,9 @@ void cycle_skip(struct cycle *cy, uint64_t count)
 }
 
 /*
- * Edges by which the number was behind when the frame was sent, though this master was not late: the
- * deadline is right as it is. Moved with the number, it would pass one more edge in every cycle.
+ * Edges by which the number was behind when the frame was sent, though this master was not late:
+ * the deadline is right as it is. Moved with the number, it would pass one more edge in every
+ * cycle.
  */
 static uint64_t passed_before_sending(const struct cycle *cy, const struct exchange_result *res)
 {

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The ESC's clock, in integers, so that a run is the same on every machine: rates are relative deviations in
- * units of 2^-48 (3.6e-15), the local time has 48 bits behind the ns. What registers and the SYNC unit see is
- * its tick of 10 ns.
+ * The ESC's clock, in integers, so that a run is the same on every machine: rates are relative
+ * deviations in units of 2^-48 (3.6e-15), the local time has 48 bits behind the ns. What registers
+ * and the SYNC unit see is its tick of 10 ns.
  */
 #include "sim/esc_inside.h"
 

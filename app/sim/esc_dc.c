@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The time loop control: each write to 0x0910 compares the local copy of the system time with the time
- * received and regulates the local clock. From the data sheet: the registers, their resets, and the rate
- * that a speed counter difference D stands for, D / (5 (S + D + 2) (S - D + 2)) with S = 0x0930. How
- * D follows the difference is not published; ours is a second order loop, critically damped, whose
- * bandwidth goes with the rate of the frames (SPECNOTES, "Time loop control").
+ * The time loop control: each write to 0x0910 compares the local copy of the system time with the
+ * time received and regulates the local clock. From the data sheet: the registers, their resets,
+ * and the rate that a speed counter difference D stands for, D / (5 (S + D + 2) (S - D + 2)) with S
+ * = 0x0930. How D follows the difference is not published; ours is a second order loop, critically
+ * damped, whose bandwidth goes with the rate of the frames (SPECNOTES, "Time loop control").
  */
 #include <math.h>
 
@@ -27,8 +27,9 @@ static int64_t speed_limit(const struct esc_clock *c)
 static int64_t rate_of_speed(const struct esc_clock *c, int64_t d)
 {
 	int64_t s = (int64_t)c->speed_start + 2;
+	int64_t divisor = 5 * (s + d) * (s - d);
 
-	return (int64_t)(((__int128)d << RATE_SCALE_BITS) / (5 * (s + d) * (s - d)));
+	return (int64_t)(((__int128)d << RATE_SCALE_BITS) / divisor);
 }
 
 /* The D whose rate is nearest to @wanted: the positive root of 5 w D^2 + D - 5 w S^2 = 0. */

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Capture files in pcapng: frames with their times, read from memory and written to memory. Either byte order, any
- * time resolution; block types that are not needed are passed over. Bytes may be anything: every length is
- * checked against the buffer. Context: any; nothing allocates.
+ * Capture files in pcapng: frames with their times, read from memory and written to memory. Either
+ * byte order, any time resolution; block types that are not needed are passed over. Bytes may be
+ * anything: every length is checked against the buffer. Context: any; nothing allocates.
  */
 #ifndef WIRE_PCAPNG_H
 #define WIRE_PCAPNG_H
@@ -41,8 +41,8 @@ struct pcapng_packet {
 int pcapng_open(struct pcapng *file, const uint8_t *bytes, size_t len);
 
 /**
- * The next packet. 1: *ret is filled; 0: end of the file; -EBADMSG: a block is damaged or cut off, -E2BIG: more
- * interfaces than PCAPNG_LIMIT_INTERFACES; the walk ends there.
+ * The next packet. 1: *ret is filled; 0: end of the file; -EBADMSG: a block is damaged or cut off,
+ * -E2BIG: more interfaces than PCAPNG_LIMIT_INTERFACES; the walk ends there.
  */
 int pcapng_next(struct pcapng *file, struct pcapng_packet *ret);
 
@@ -56,7 +56,8 @@ size_t pcapng_write_head(uint8_t *buf);
 /** Bytes that a packet of @frame_len takes in the file. */
 size_t pcapng_packet_bytes(size_t frame_len);
 
-/** Write one packet to @buf (pcapng_packet_bytes()). Returns its size; @t_ns is Unix time, not before 1970. */
+/** Write one packet to @buf (pcapng_packet_bytes()). Returns its size; @t_ns is Unix time, not
+ * before 1970. */
 size_t pcapng_write_packet(uint8_t *buf, int64_t t_ns, const uint8_t *frame, size_t frame_len);
 
 #endif

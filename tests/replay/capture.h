@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Captures and EEPROM images of real slaves. They are not part of this repository: who has none skips. */
+/* Captures and EEPROM images of real slaves. They are not part of this repository: who has none
+ * skips. */
 #ifndef TESTS_REPLAY_CAPTURE_H
 #define TESTS_REPLAY_CAPTURE_H
 
@@ -12,14 +13,15 @@ struct bytes {
 };
 
 /**
- * A file below $ECDAQ_DATA, $ECDAQ_SHARED_DATA or ../shared/data beside the repository. Skips the test when the
- * folder is not there; fails it when the folder is and the file is not.
+ * A file below $ECDAQ_DATA, $ECDAQ_SHARED_DATA or ../shared/data beside the repository. Skips the
+ * test when the folder is not there; fails it when the folder is and the file is not.
  */
 struct bytes capture_load(const char *name);
 
 /**
- * What a capture shows of the EEPROM of station @station: every word that the master read, all others 0, the
- * configuration word 0 as APRD/FPRD of 0x0140 gave it at @position, the checksum made to fit.
+ * What a capture shows of the EEPROM of station @station: every word that the master read, all
+ * others 0, the configuration word 0 as APRD/FPRD of 0x0140 gave it at @position, the checksum made
+ * to fit.
  */
 struct bytes capture_learn_sii(const struct bytes *capture, uint16_t station, uint16_t position);
 

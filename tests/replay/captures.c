@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The truth of the simulated segment: a master's half of a capture goes in, what comes out must be what the real
- * slaves answered. Clock values differ and are listed; every other byte and every WKC must agree.
+ * The truth of the simulated segment: a master's half of a capture goes in, what comes out must be
+ * what the real slaves answered. Clock values differ and are listed; every other byte and every WKC
+ * must agree.
  */
 #include "base/bytes.h"
 #include "capture.h"
@@ -88,8 +89,8 @@ static void check_round_trip(const struct compare *c, uint16_t station, unsigned
 	int32_t real = (int32_t)(l->real[port] - l->real[0]);
 	int32_t simulated = (int32_t)(l->simulated[port] - l->simulated[0]);
 
-	printf("  station %04x: frame back at port %u after %d ns, simulated %d ns\n", station, port, real,
-	       simulated);
+	printf("  station %04x: frame back at port %u after %d ns, simulated %d ns\n", station,
+	       port, real, simulated);
 	CHECK(abs(real - simulated) <= 20);
 }
 
@@ -127,7 +128,8 @@ TEST(replay, ek1100_answers_soem_as_the_real_one_did)
 	capture_free(&ek1100);
 }
 
-/* There is no image of an EL1004, so its EEPROM is what SOEM read; the rest of the capture tests. */
+/* There is no image of an EL1004, so its EEPROM is what SOEM read; the rest of the capture tests.
+ */
 TEST(replay, ek1100_and_el1004_answer_soem_as_the_real_ones_did)
 {
 	struct bytes capture = capture_load("captures/soem-ek1100-el1004.pcapng");

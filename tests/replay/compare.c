@@ -16,13 +16,15 @@ static const struct {
 } volatiles[] = {
 	{ ESC_REG_EEPROM_CONTROL, 1, 0x10,
 	  "bit 4: no data sheet names it; terminals drop it some time after SAFE-OP" },
-	{ ESC_REG_DC_RECEIVE_TIME_PORT, 16, 0xff, "receive time: that clock runs since its power-on" },
+	{ ESC_REG_DC_RECEIVE_TIME_PORT, 16, 0xff,
+	  "receive time: that clock runs since its power-on" },
 	{ ESC_REG_DC_SYSTEM_TIME, 8, 0xff, "system time of the reference clock" },
 	{ ESC_REG_DC_RECEIVE_TIME_PU, 8, 0xff, "receive time: that clock runs since its power-on" },
 	{ ESC_REG_DC_SYSTEM_TIME_DIFF, 4, 0xff, "what is left of the clocks' difference" },
 };
 
-/* A frame on its way: what our segment has answered, until the capture shows what the real one did. */
+/* A frame on its way: what our segment has answered, until the capture shows what the real one did.
+ */
 struct pending {
 	uint8_t bytes[ECAT_FRAME_MAX_BYTES];
 	size_t len;
@@ -37,7 +39,8 @@ static const char *explain(const struct ecat_datagram *dg, size_t offset, uint8_
 		return NULL;
 	}
 	for (size_t i = 0; i < sizeof(volatiles) / sizeof(volatiles[0]); i++) {
-		if (at >= volatiles[i].first && at < (size_t)volatiles[i].first + volatiles[i].len &&
+		if (at >= volatiles[i].first &&
+		    at < (size_t)volatiles[i].first + volatiles[i].len &&
 		    (difference & ~volatiles[i].bits) == 0) {
 			return volatiles[i].why;
 		}
@@ -45,7 +48,8 @@ static const char *explain(const struct ecat_datagram *dg, size_t offset, uint8_
 	return NULL;
 }
 
-static struct compare_row *row_for(struct compare *c, const struct ecat_datagram *dg, const char *why)
+static struct compare_row *row_for(struct compare *c, const struct ecat_datagram *dg,
+				   const char *why)
 {
 	struct compare_row *row;
 
@@ -152,8 +156,8 @@ static void compare_frames(struct compare *c, uint8_t *real, size_t real_len, ui
 		}
 		if (get_le16(r.wkc) != get_le16(s.wkc)) {
 			c->wkc_differ++;
-			printf("WKC: %s %04x:%04x %u, simulated %u\n", ecat_cmd_to_str(r.cmd), r.adp,
-			       r.ado, get_le16(r.wkc), get_le16(s.wkc));
+			printf("WKC: %s %04x:%04x %u, simulated %u\n", ecat_cmd_to_str(r.cmd),
+			       r.adp, r.ado, get_le16(r.wkc), get_le16(s.wkc));
 		}
 		compare_data(c, &r, &s);
 		keep_latch(c, &r, &s);
@@ -174,7 +178,8 @@ static struct pending *slot_of(struct pending *pending, const uint8_t *frame, si
 		pos = 0;
 		if (pending[i].is_used &&
 		    ecat_frame_next(pending[i].bytes, pending[i].len, &pos, &dg) == 1 &&
-		    dg.idx == wanted.idx && dg.cmd == wanted.cmd && dg.data_len == wanted.data_len) {
+		    dg.idx == wanted.idx && dg.cmd == wanted.cmd &&
+		    dg.data_len == wanted.data_len) {
 			return &pending[i];
 		}
 	}
@@ -245,15 +250,16 @@ static void print_bytes(const uint8_t *bytes)
 
 void compare_print(const char *title, const struct compare *c)
 {
-	printf("%s: %u frames, %u datagrams, %u data bytes; WKCs that differ: %u; headers: %u; data bytes: "
+	printf("%s: %u frames, %u datagrams, %u data bytes; WKCs that differ: %u; headers: %u; "
+	       "data bytes: "
 	       "%u, not explained: %u\n",
 	       title, c->frames, c->datagrams, c->bytes, c->wkc_differ, c->header_differ,
 	       c->bytes_differ, c->bytes_unexplained);
 	for (unsigned i = 0; i < c->row_count; i++) {
 		const struct compare_row *row = &c->row[i];
 
-		printf("  %s %04x:%04x  %4u datagrams %5u bytes  ", ecat_cmd_to_str(row->cmd), row->adp,
-		       row->ado, row->datagrams, row->bytes);
+		printf("  %s %04x:%04x  %4u datagrams %5u bytes  ", ecat_cmd_to_str(row->cmd),
+		       row->adp, row->ado, row->datagrams, row->bytes);
 		print_bytes(row->real);
 		printf(" / ");
 		print_bytes(row->simulated);

@@ -52,7 +52,8 @@ struct bench *bench_create(const struct bench_slave *slaves, unsigned count)
 		uint8_t address[2];
 
 		put_le16(address, (uint16_t)(BENCH_STATION + i));
-		CHECK_EQ(bench_send(b, ECAT_CMD_APWR, (uint16_t)-i, ESC_REG_STATION_ADDRESS, address, 2),
+		CHECK_EQ(bench_send(b, ECAT_CMD_APWR, (uint16_t)-i, ESC_REG_STATION_ADDRESS,
+				    address, 2),
 			 1);
 	}
 	return b;
@@ -60,9 +61,9 @@ struct bench *bench_create(const struct bench_slave *slaves, unsigned count)
 
 struct bench *bench_create_one(void)
 {
-	return bench_create(&(struct bench_slave){ .pdi = PDI_SPI, .config = BOTH_DC_UNITS,
-						   .sync_pins = 0x06 },
-			    1);
+	return bench_create(
+		&(struct bench_slave){ .pdi = PDI_SPI, .config = BOTH_DC_UNITS, .sync_pins = 0x06 },
+		1);
 }
 
 void bench_destroy(struct bench *b)
@@ -101,12 +102,14 @@ uint16_t bench_send(struct bench *b, enum ecat_cmd cmd, uint16_t adp, uint16_t a
 	return send(b, cmd, adp, ado, data, len);
 }
 
-uint16_t bench_logical(struct bench *b, enum ecat_cmd cmd, uint32_t address, void *data, uint16_t len)
+uint16_t bench_logical(struct bench *b, enum ecat_cmd cmd, uint32_t address, void *data,
+		       uint16_t len)
 {
 	return send(b, cmd, (uint16_t)address, (uint16_t)(address >> 16), data, len);
 }
 
-static void write_bytes(struct bench *b, uint16_t station, uint16_t ado, uint64_t value, uint16_t len)
+static void write_bytes(struct bench *b, uint16_t station, uint16_t ado, uint64_t value,
+			uint16_t len)
 {
 	uint8_t bytes[8];
 

@@ -12,16 +12,16 @@
 enum {
 	BENCH_SLAVES = 8,
 	BENCH_SII_BYTES = 256,
-	BENCH_STEP_NS = 100000,     /* from one frame to the next */
-	BENCH_STATION = 0x1000,     /* address of the first slave, after bench_create() */
+	BENCH_STEP_NS = 100000, /* from one frame to the next */
+	BENCH_STATION = 0x1000, /* address of the first slave, after bench_create() */
 };
 
 struct bench_slave {
 	const struct esc_features *features; /* NULL: ET1100 */
-	uint8_t pdi;        /* EEPROM byte 0 */
-	uint8_t config;     /* EEPROM byte 1: 0x0141 */
-	uint8_t sync_pins;  /* EEPROM byte 3: 0x0151 */
-	uint8_t no_eeprom;  /* 1: its checksum is wrong */
+	uint8_t pdi;                         /* EEPROM byte 0 */
+	uint8_t config;                      /* EEPROM byte 1: 0x0141 */
+	uint8_t sync_pins;                   /* EEPROM byte 3: 0x0151 */
+	uint8_t no_eeprom;                   /* 1: its checksum is wrong */
 	uint16_t alias;
 	double ppm;
 	uint64_t clock_ns;
@@ -34,12 +34,13 @@ struct bench {
 	int64_t back_ns;
 	uint8_t frame[ECAT_FRAME_MAX_BYTES];
 	size_t frame_len;
-	uint16_t irq;  /* of the last datagram */
-	uint16_t adp;  /* as it came back */
+	uint16_t irq; /* of the last datagram */
+	uint16_t adp; /* as it came back */
 	uint8_t sii[BENCH_SLAVES][BENCH_SII_BYTES];
 };
 
-/** A line of @count slaves, EEPROMs loaded, station addresses 0x1000 and up. Free with bench_destroy(). */
+/** A line of @count slaves, EEPROMs loaded, station addresses 0x1000 and up. Free with
+ * bench_destroy(). */
 struct bench *bench_create(const struct bench_slave *slaves, unsigned count);
 /** One ET1100 behind an SPI PDI with both DC units on. */
 struct bench *bench_create_one(void);
@@ -48,7 +49,8 @@ void bench_destroy(struct bench *b);
 /** Send one datagram and take its answer into @data. Returns the WKC. */
 uint16_t bench_send(struct bench *b, enum ecat_cmd cmd, uint16_t adp, uint16_t ado, void *data,
 		    uint16_t len);
-uint16_t bench_logical(struct bench *b, enum ecat_cmd cmd, uint32_t address, void *data, uint16_t len);
+uint16_t bench_logical(struct bench *b, enum ecat_cmd cmd, uint32_t address, void *data,
+		       uint16_t len);
 
 /* To and from the slave with @station; the WKC must be 1. */
 void bench_write8(struct bench *b, uint16_t station, uint16_t ado, uint8_t value);

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* The fifteen commands: who takes part, what moves, what counts. */
-#include "base/bytes.h"
 #include "bench.h"
 #include "harness/test.h"
 #include "wire/esc_reg.h"
@@ -62,7 +61,9 @@ TEST(commands, broadcast_read_write_ors_and_writes_what_came_in)
 
 TEST(commands, read_multiple_write_takes_from_one_and_gives_to_all_others)
 {
-	const struct bench_slave slaves[4] = { { .pdi = 5 }, { .pdi = 5 }, { .pdi = 5 }, { .pdi = 5 } };
+	const struct bench_slave slaves[4] = {
+		{ .pdi = 5 }, { .pdi = 5 }, { .pdi = 5 }, { .pdi = 5 }
+	};
 	struct bench *b = bench_create(slaves, 4);
 	uint8_t data[1] = { 0x42 };
 
@@ -123,8 +124,8 @@ TEST(commands, logical_access_counts_once_a_slave_and_direction)
 TEST(commands, an_fmmu_moves_bits_where_it_is_told)
 {
 	struct bench *b = two();
-	uint8_t fmmu[ESC_FMMU_BYTES] = { [0] = 0x00, [4] = 2, [6] = 6, [7] = 1, [8] = 0x00, [9] = 0x10,
-					 [10] = 3, [11] = 1, [12] = 1 };
+	uint8_t fmmu[ESC_FMMU_BYTES] = { [0] = 0x00, [4] = 2,  [6] = 6,  [7] = 1, [8] = 0x00,
+					 [9] = 0x10, [10] = 3, [11] = 1, [12] = 1 };
 	uint8_t memory[1] = { 0x78 }; /* bits 3 to 6 set */
 	uint8_t data[2] = { 0, 0xff };
 
@@ -146,7 +147,8 @@ TEST(commands, digital_outputs_keep_the_bits_that_another_fmmu_wrote)
 {
 	struct bench *b = two();
 	uint8_t low[ESC_FMMU_BYTES] = { [4] = 1, [7] = 3, [9] = 0x0f, [11] = 2, [12] = 1 };
-	uint8_t high[ESC_FMMU_BYTES] = { [0] = 1, [4] = 1, [7] = 3, [9] = 0x0f, [10] = 4, [11] = 2, [12] = 1 };
+	uint8_t high[ESC_FMMU_BYTES] = { [0] = 1,  [4] = 1,  [7] = 3, [9] = 0x0f,
+					 [10] = 4, [11] = 2, [12] = 1 };
 	uint8_t data[2] = { 0x05, 0x0a };
 
 	CHECK_EQ(bench_send(b, ECAT_CMD_FPWR, 0x1000, ESC_REG_FMMU, low, sizeof(low)), 1);

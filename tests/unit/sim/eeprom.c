@@ -23,7 +23,8 @@ static uint16_t command(struct bench *b, uint16_t control, uint32_t word)
 
 	put_le16(data, control);
 	put_le32(data + 2, word);
-	return bench_send(b, ECAT_CMD_FPWR, BENCH_STATION, ESC_REG_EEPROM_CONTROL, data, sizeof(data));
+	return bench_send(b, ECAT_CMD_FPWR, BENCH_STATION, ESC_REG_EEPROM_CONTROL, data,
+			  sizeof(data));
 }
 
 static uint16_t wait_idle(struct bench *b)
@@ -118,7 +119,8 @@ TEST(eeprom, a_wrong_checksum_leaves_the_slave_without_its_application)
 	struct bench *b = bench_create(&(struct bench_slave){ .pdi = 5, .no_eeprom = 1 }, 1);
 	uint8_t type[1] = { 0xaa };
 
-	CHECK_EQ(bench_read16(b, BENCH_STATION, ESC_REG_EEPROM_CONTROL) & (CHECKSUM_ERROR | NOT_LOADED),
+	CHECK_EQ(bench_read16(b, BENCH_STATION, ESC_REG_EEPROM_CONTROL) &
+			 (CHECKSUM_ERROR | NOT_LOADED),
 		 CHECKSUM_ERROR | NOT_LOADED);
 	CHECK_EQ(esc_eeprom_loaded(segment_esc(b->segment, 0)), 0);
 	CHECK_EQ(bench_read16(b, BENCH_STATION, ESC_REG_DL_STATUS) & 1, 0);

@@ -12,9 +12,15 @@ enum { BECKHOFF = 2, DIGITAL_IO = 0x04, EMULATION = 0x01 };
 static struct bench *real_bus(void)
 {
 	const struct bench_slave slaves[] = {
-		{ .features = catalogue_features(BECKHOFF, 0x044c2c52), .pdi = 0x00, .config = 0x0d },
-		{ .features = catalogue_features(BECKHOFF, 0x0b0c3052), .pdi = DIGITAL_IO, .config = EMULATION },
-		{ .features = catalogue_features(BECKHOFF, 0x0b493052), .pdi = DIGITAL_IO, .config = EMULATION },
+		{ .features = catalogue_features(BECKHOFF, 0x044c2c52),
+		  .pdi = 0x00,
+		  .config = 0x0d },
+		{ .features = catalogue_features(BECKHOFF, 0x0b0c3052),
+		  .pdi = DIGITAL_IO,
+		  .config = EMULATION },
+		{ .features = catalogue_features(BECKHOFF, 0x0b493052),
+		  .pdi = DIGITAL_IO,
+		  .config = EMULATION },
 	};
 
 	return bench_create(slaves, 3);
@@ -69,13 +75,15 @@ TEST(facts, a_register_that_does_not_exist_gives_no_wkc)
 	for (uint16_t n = 0; n < 16; n++) {
 		uint16_t wanted = n < 3 ? 3 : n < 8 ? 1 : 0;
 
-		CHECK_EQ(broadcast(b, (uint16_t)(ESC_REG_FMMU + n * ESC_FMMU_BYTES), ESC_FMMU_BYTES),
-			 wanted);
+		CHECK_EQ(
+			broadcast(b, (uint16_t)(ESC_REG_FMMU + n * ESC_FMMU_BYTES), ESC_FMMU_BYTES),
+			wanted);
 	}
 	for (uint16_t n = 0; n < 16; n++) {
 		uint16_t wanted = n < 4 ? 3 : n < 8 ? 1 : 0;
 
-		CHECK_EQ(broadcast(b, (uint16_t)(ESC_REG_SM + n * ESC_SM_BYTES), ESC_SM_BYTES), wanted);
+		CHECK_EQ(broadcast(b, (uint16_t)(ESC_REG_SM + n * ESC_SM_BYTES), ESC_SM_BYTES),
+			 wanted);
 	}
 	bench_destroy(b);
 }

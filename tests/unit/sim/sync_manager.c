@@ -8,7 +8,7 @@
 enum {
 	START = 0x1100,
 	LEN = 4,
-	OUTPUTS = 0x24,   /* buffered, master writes, event to the PDI */
+	OUTPUTS = 0x24, /* buffered, master writes, event to the PDI */
 	INPUTS = 0x20,
 	MAILBOX_OUT = 0x26,
 	MAILBOX_IN = 0x22,

@@ -31,8 +31,10 @@ static struct file two_packets(void)
 	struct file f = { .len = 0 };
 
 	f.len = pcapng_write_head(f.bytes);
-	f.len += pcapng_write_packet(f.bytes + f.len, 1700000000123456789, (const uint8_t *)"abc", 3);
-	f.len += pcapng_write_packet(f.bytes + f.len, 1700000000123456999, (const uint8_t *)"defgh", 5);
+	f.len += pcapng_write_packet(f.bytes + f.len, 1700000000123456789, (const uint8_t *)"abc",
+				     3);
+	f.len += pcapng_write_packet(f.bytes + f.len, 1700000000123456999, (const uint8_t *)"defgh",
+				     5);
 	return f;
 }
 
@@ -66,7 +68,8 @@ TEST(pcapng, what_is_written_is_read_back_with_its_time_to_the_ns)
 
 TEST(pcapng, the_other_byte_order_says_the_same)
 {
-	/* Two 16-bit numbers to a word change places, too: link type 1 stands in the upper half then. */
+	/* Two 16-bit numbers to a word change places, too: link type 1 stands in the upper half
+	 * then. */
 	uint8_t section[20] = { 0x4d, 0x3c, 0x2b, 0x1a, [8] = 0xff, [12] = 0xff };
 	uint8_t interface[8] = { [2] = 1 };
 	uint8_t packet[24] = { [8] = 5, [12] = 3, [16] = 3 };
@@ -93,9 +96,11 @@ TEST(pcapng, every_time_resolution_comes_out_in_ns)
 		uint8_t resolution;
 		uint32_t units;
 		int64_t t_ns;
-	} cases[] = { { 0, 2, 2000000000 }, { 3, 7, 7000000 }, { 6, 7, 7000 },    { 9, 7, 7 },
-		      { 12, 7999, 7 },      { 40, 7, 0 },      { 0x80, 3, 3000000000 },
-		      { 0x8a, 1024, 1000000000 },              { 0xff, 9, 0 } };
+	} cases[] = { { 0, 2, 2000000000 },    { 3, 7, 7000000 },
+		      { 6, 7, 7000 },          { 9, 7, 7 },
+		      { 12, 7999, 7 },         { 40, 7, 0 },
+		      { 0x80, 3, 3000000000 }, { 0x8a, 1024, 1000000000 },
+		      { 0xff, 9, 0 } };
 
 	for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
 		uint8_t section[16] = { 0x4d, 0x3c, 0x2b, 0x1a };
@@ -154,7 +159,8 @@ TEST(pcapng, a_file_cut_anywhere_gives_its_whole_packets_and_then_an_error)
 			packets++;
 		}
 		CHECK_EQ(packets, len >= first_end);
-		CHECK_EQ(r, len == 28 || len == PCAPNG_HEAD_BYTES || len == first_end ? 0 : -EBADMSG);
+		CHECK_EQ(r,
+			 len == 28 || len == PCAPNG_HEAD_BYTES || len == first_end ? 0 : -EBADMSG);
 	}
 }
 

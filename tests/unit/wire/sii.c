@@ -48,9 +48,10 @@ static struct image small_slave(void)
 	static const uint8_t strings[] = { 2, 3, 'O', 'n', 'e', 4, 'T', '\x01', 'w', 'o' };
 	static const uint8_t general[32] = { [2] = 1, [3] = 2, [5] = 0x21 };
 	static const uint8_t fmmu[] = { 1, 2, 3, 0xff };
-	static const uint8_t sm[] = { 0x00, 0x11, 2, 0, 0x64, 0, 1, 3, 0x80, 0x11, 4, 0, 0x20, 0, 1, 4 };
-	static const uint8_t tx[] = { 0x00, 0x1a, 2, 1, 0, 0, 0, 0, 0x00, 0x60, 1, 0, 6, 12, 0, 0,
-				      0x00, 0x00, 0, 0, 0, 4,  0, 0 };
+	static const uint8_t sm[] = { 0x00, 0x11, 2, 0, 0x64, 0, 1, 3,
+				      0x80, 0x11, 4, 0, 0x20, 0, 1, 4 };
+	static const uint8_t tx[] = { 0x00, 0x1a, 2, 1, 0,    0,    0, 0, 0x00, 0x60, 1, 0,
+				      6,    12,   0, 0, 0x00, 0x00, 0, 0, 0,    4,    0, 0 };
 	static const uint8_t rx[] = { 0x00, 0x16, 1, 0, 0, 0, 0, 0, 0x00, 0x70, 1, 0, 6, 16, 0, 0 };
 	struct image im = begin();
 
@@ -124,7 +125,8 @@ TEST(sii, categories_without_end_end_at_the_images_end)
 	/* Zeros are empty categories of type 0: the walk must go on, and stop. */
 	memset(im.bytes + SII_CATEGORIES_BYTE, 0, IMAGE_BYTES - SII_CATEGORIES_BYTE);
 	CHECK_EQ(parse(&im, IMAGE_BYTES, &sii), -EBADMSG);
-	CHECK_EQ(sii_find_category(im.bytes, IMAGE_BYTES, SII_CATEGORY_SM, &offset, &bytes), -EBADMSG);
+	CHECK_EQ(sii_find_category(im.bytes, IMAGE_BYTES, SII_CATEGORY_SM, &offset, &bytes),
+		 -EBADMSG);
 	CHECK_EQ(offset, 77);
 }
 
