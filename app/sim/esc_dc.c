@@ -29,7 +29,7 @@ static int64_t rate_of_speed(const struct esc_clock *c, int64_t d)
 	int64_t s = (int64_t)c->speed_start + 2;
 	int64_t divisor = 5 * (s + d) * (s - d);
 
-	return (int64_t)(((__int128)d << RATE_SCALE_BITS) / divisor);
+	return (int64_t)(((__int128)d * ((__int128)1 << RATE_SCALE_BITS)) / divisor);
 }
 
 /* The D whose rate is nearest to @wanted: the positive root of 5 w D^2 + D - 5 w S^2 = 0. */
