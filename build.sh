@@ -63,7 +63,9 @@ Without GROUP all groups run, the fast ones first:
   sim      the whole master on virtual time; also under ASan+UBSan
   fuzz     every fuzz target: its corpus, then some seconds of search
   live     everything over a veth pair, in real time
-To come: dds control sync0 recipes boot.
+Only when named:
+  dds      samples and commands over DDS between two namespaces; needs CycloneDDS
+To come: control sync0 recipes boot.
 
   --keep-going      run all groups even if one fails (default)
   --fail-fast       stop behind the first suite with a failure

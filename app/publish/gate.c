@@ -15,7 +15,7 @@ struct commander {
 	uint64_t sender; /* 0: free */
 	uint64_t last_id;
 	int has_id;
-	int is_gone; /* its place may be given to another */
+	int is_gone;   /* its place may be given to another */
 	double tokens; /* commands it may send now */
 	int64_t refilled_ns;
 };

@@ -59,8 +59,8 @@ int gate_check(struct gate *gate, const struct gate_command *cmd, const struct g
 	       struct gate_item *ret_items, char *reason);
 
 /**
- * @sender is not heard of: it owns nothing any more. Its ids are remembered (it may be heard of again,
- * and an old command must not pass then) until its place is needed for another.
+ * @sender is not heard of: it owns nothing any more. Its ids are remembered (it may be heard of
+ * again, and an old command must not pass then) until its place is needed for another.
  */
 void gate_lose(struct gate *gate, uint64_t sender);
 

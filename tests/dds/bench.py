@@ -98,9 +98,7 @@ class Bench:
 
     def start_dds(self, sessions: int = 1) -> None:
         """Returns when ecdaq-dds, this one or those before, have told of so many sessions."""
-        process = self.segment.start(
-            "dds", str(live.BIN / "ecdaq-dds"), *self.segment.options()
-        )
+        process = self.segment.start("dds", str(live.BIN / "ecdaq-dds"), *self.segment.options())
 
         def is_publishing() -> bool:
             said = self.segment.log("dds")
@@ -121,8 +119,13 @@ class Bench:
         """A program of this folder on the PC, with the kit."""
         paths = os.pathsep.join(p for p in (str(KIT), os.environ.get("PYTHONPATH")) if p)
         program = str(Path(__file__).parent / script)
+        return self.on_pc(name, "env", f"PYTHONPATH={paths}", sys.executable, program, *arguments)
+
+    def module(self, name: str, module: str, *arguments: str) -> subprocess.Popen[bytes]:
+        """python -m @module on the PC, with the kit."""
+        paths = os.pathsep.join(p for p in (str(KIT), os.environ.get("PYTHONPATH")) if p)
         return self.on_pc(
-            name, "env", f"PYTHONPATH={paths}", sys.executable, program, *arguments
+            name, "env", f"PYTHONPATH={paths}", sys.executable, "-m", module, *arguments
         )
 
     def commander(self) -> Commander:
@@ -131,8 +134,15 @@ class Bench:
         program = str(Path(__file__).parent / "command_python.py")
         with (self.folder / "commander.log").open("ab") as errors:
             process = subprocess.Popen(
-                [*self.pc.enter, "env", f"PYTHONPATH={paths}", sys.executable, program, "dds1",
-                 DDS_SETTINGS["dds.domain"]],
+                [
+                    *self.pc.enter,
+                    "env",
+                    f"PYTHONPATH={paths}",
+                    sys.executable,
+                    program,
+                    "dds1",
+                    DDS_SETTINGS["dds.domain"],
+                ],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=errors,

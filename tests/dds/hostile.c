@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * hostile DOMAIN INTERFACE SECONDS: a peer that announces ecdaq's topics and type names with types of
- * its own, which have a uint8 and type information, reads and writes them, and sends garbage to the
- * ports of the participants. Prints "ready", then how much it sent.
+ * hostile DOMAIN INTERFACE SECONDS: a peer that announces ecdaq's topics and type names with types
+ * of its own, which have a uint8 and type information, reads and writes them, and sends garbage to
+ * the ports of the participants. Prints "ready", then how much it sent.
  */
 #include <arpa/inet.h>
 #include <poll.h>
@@ -34,8 +34,8 @@ static void send_garbage(int fd, const char *host, unsigned domain)
 	size_t len = 8 + random_next() % (PACKET - 8);
 	struct sockaddr_in to = {
 		.sin_family = AF_INET,
-		.sin_port = htons((uint16_t)(PORT_BASE + PORT_A_DOMAIN * domain +
-					     random_next() % PORTS)),
+		.sin_port = htons(
+			(uint16_t)(PORT_BASE + PORT_A_DOMAIN * domain + random_next() % PORTS)),
 	};
 
 	for (size_t i = 0; i < len; i++) {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Write what comes on ecdaq/sample (or ecdaq/block, cut up again) to a CSV file, for some seconds."""
+"""Write what comes on ecdaq/sample (or ecdaq/block) to a CSV file, for some seconds."""
 
 from __future__ import annotations
 
@@ -11,14 +11,34 @@ from typing import Any
 
 import ecdaq
 
-FIELDS = ["slave", "session", "cycle", "dc_time_ns", "flags", "is_good", "adc", "counter",
-          "sample_time_ns", "raw"]
+FIELDS = [
+    "slave",
+    "session",
+    "cycle",
+    "dc_time_ns",
+    "flags",
+    "is_good",
+    "adc",
+    "counter",
+    "sample_time_ns",
+    "raw",
+]
 
 
 def of_samples(link: ecdaq.Link, seconds: float) -> Iterator[list[Any]]:
     for s in link.subscribe(seconds):
-        yield [s.slave, s.session, s.cycle, s.dc_time_ns, s.flags, int(s.is_good), f"{s.adc:.17g}",
-               s.counter, s.sample_time_ns, " ".join(map(str, s.raw))]
+        yield [
+            s.slave,
+            s.session,
+            s.cycle,
+            s.dc_time_ns,
+            s.flags,
+            int(s.is_good),
+            f"{s.adc:.17g}",
+            s.counter,
+            s.sample_time_ns,
+            " ".join(map(str, s.raw)),
+        ]
 
 
 def of_blocks(link: ecdaq.Link, seconds: float) -> Iterator[list[Any]]:
@@ -26,8 +46,18 @@ def of_blocks(link: ecdaq.Link, seconds: float) -> Iterator[list[Any]]:
         n = b.channel_count
         for k in range(b.count):
             raw = b.raw[k * n : (k + 1) * n]
-            yield [b.slave, b.session, b.cycle[k], b.dc_time_ns[k], b.flags[k], int(b.is_good[k]),
-                   f"{b.adc[k]:.17g}", b.counter[k], b.sample_time_ns[k], " ".join(map(str, raw))]
+            yield [
+                b.slave,
+                b.session,
+                b.cycle[k],
+                b.dc_time_ns[k],
+                b.flags[k],
+                int(b.is_good[k]),
+                f"{b.adc[k]:.17g}",
+                b.counter[k],
+                b.sample_time_ns[k],
+                " ".join(map(str, raw)),
+            ]
 
 
 def main() -> None:

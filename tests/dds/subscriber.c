@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * subscriber DOMAIN INTERFACE SECONDS OUT: what comes on ecdaq/sample, as CSV, for some seconds. On a
- * plain Cyclone DDS reader, as a C user would write one; prints "ready" when the publisher is there.
+ * subscriber DOMAIN INTERFACE SECONDS OUT: what comes on ecdaq/sample, as CSV, for some seconds. On
+ * a plain Cyclone DDS reader, as a C user would write one; prints "ready" when the publisher is
+ * there.
  */
 #include <inttypes.h>
 #include <stdio.h>

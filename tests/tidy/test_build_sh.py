@@ -103,9 +103,9 @@ def test_an_unknown_group_is_named() -> None:
 
 
 def test_a_group_that_is_not_there_yet_fails_by_name() -> None:
-    result = build_sh("test", "dds")
+    result = build_sh("test", "control")
     assert result.returncode == 1
-    assert "dds: not there yet" in result.stdout
+    assert "control: not there yet" in result.stdout
     assert result.stdout.splitlines()[-1] == "0 passed, 1 failed, 0 skipped"
 
 

@@ -74,3 +74,20 @@ TEST(board, the_cycle_never_takes_half_a_set)
 	CHECK(taken > 0);
 	CHECK_EQ(set.raw[0], 50000 * 16);
 }
+
+TEST(board, output_taken_back_is_not_set_in_the_next_set)
+{
+	board_init(&board);
+	memset(&set, 0, sizeof(set));
+	board_begin(&board);
+	board_put(&board, 3, 9);
+	board_put(&board, 4, 9);
+	board_commit(&board);
+	board_begin(&board);
+	board_unset(&board, 3);
+	board_unset(&board, BOARD_OUTPUTS);
+	board_commit(&board);
+	CHECK_EQ(board_take(&board, 8, &set), 1);
+	CHECK_EQ(set.is_set[3], 0);
+	CHECK_EQ(set.is_set[4], 1);
+}

@@ -95,3 +95,23 @@ TEST(config, run_path_takes_the_option_then_the_environment_then_the_standard_pl
 	CHECK_EQ(config_run_path(&cfg, CONFIG_RUN_STATUS, path, sizeof(path)), 0);
 	CHECK_STR(path, standard);
 }
+
+TEST(config, dds_wants_an_interface_of_its_own)
+{
+	static struct config cfg;
+	char error[256];
+
+	config_defaults(&cfg);
+	CHECK_EQ(config_set(&cfg, "dds.enable=on", error, sizeof(error)), 0);
+	CHECK_EQ(config_check(&cfg, error, sizeof(error)), -EINVAL);
+	CHECK_STR(error, "dds.interface: must be given while dds.enable is on");
+	CHECK_EQ(config_set(&cfg, "dds.interface=eth0", error, sizeof(error)), 0);
+	CHECK_EQ(config_set(&cfg, "bus.interface=eth0", error, sizeof(error)), 0);
+	CHECK_EQ(config_check(&cfg, error, sizeof(error)), -EINVAL);
+	CHECK_STR(error, "dds.interface: is bus.interface, which is for EtherCAT alone");
+	CHECK_EQ(config_set(&cfg, "dds.interface=eth0.5", error, sizeof(error)), 0);
+	CHECK_EQ(config_check(&cfg, error, sizeof(error)), 0);
+	CHECK_EQ(config_set(&cfg, "dds.peers=10.0.0.1,<pc>", error, sizeof(error)), 0);
+	CHECK_EQ(config_check(&cfg, error, sizeof(error)), -EINVAL);
+	CHECK_STR(error, "dds.peers: must be addresses or host names with commas between");
+}

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: MIT
 """Samples and commands of an ecdaq appliance over DDS, for Python.
 
-    import ecdaq
-    with ecdaq.connect(interface="eth0") as link:
-        print(link.channels())
-        for sample in link.subscribe(seconds=1):
-            print(sample.cycle, sample.adc)
+import ecdaq
+with ecdaq.connect(interface="eth0") as link:
+    print(link.channels())
+    for sample in link.subscribe(seconds=1):
+        print(sample.cycle, sample.adc)
 """
 
-from ecdaq.link import Channel, Channels, Link, LinkError, Refused, connect
+from ecdaq.link import Channel, Channels, Link, LinkError, RefusedError, connect
 from ecdaq.series import Gaps, Series
 
 __all__ = [
@@ -17,7 +17,7 @@ __all__ = [
     "Gaps",
     "Link",
     "LinkError",
-    "Refused",
+    "RefusedError",
     "Series",
     "connect",
 ]

@@ -10,16 +10,32 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import TracebackType
 
-from cyclonedds.core import Policy, Qos, ReadCondition, WaitSet
-from cyclonedds.core import InstanceState, SampleState, ViewState
+from cyclonedds.core import (
+    InstanceState,
+    Policy,
+    Qos,
+    ReadCondition,
+    SampleState,
+    ViewState,
+    WaitSet,
+)
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
-from ecdaq.idl_types import BlockV1, ChannelsV1, CommandV1, EventV1, IdlV1, ReplyV1, SampleV1
-from ecdaq.idl_types import StatusV1, TimeMapV1
+from ecdaq.idl_types import (
+    BlockV1,
+    ChannelsV1,
+    CommandV1,
+    EventV1,
+    IdlV1,
+    ReplyV1,
+    SampleV1,
+    StatusV1,
+    TimeMapV1,
+)
 from ecdaq.series import Gaps
 
 ANY = ViewState.Any | InstanceState.Any | SampleState.Any
@@ -30,7 +46,7 @@ class LinkError(Exception):
     """What was asked of the appliance did not come."""
 
 
-class Refused(LinkError):
+class RefusedError(LinkError):
     """A command was refused; the text says why."""
 
 
@@ -108,13 +124,14 @@ def domain_config(interface: str, multicast: bool, peers: list[str], tag: str) -
             raise ValueError(f"{word!r} is no name")
     is_loopback = interface == "lo"
     found = (["localhost"] if is_loopback else []) + peers
+    listed = "".join(f'<Peer Address="{peer}"/>' for peer in found)
     return (
         f'<General><Interfaces><NetworkInterface name="{interface}" presence_required="false"/>'
         f"</Interfaces><AllowMulticast>{str(multicast and not is_loopback).lower()}"
         "</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>"
         "<MaxAutoParticipantIndex>99</MaxAutoParticipantIndex>"
         + (f"<Tag>{tag}</Tag>" if tag else "")
-        + ("<Peers>" + "".join(f'<Peer Address="{p}"/>' for p in found) + "</Peers>" if found else "")
+        + (f"<Peers>{listed}</Peers>" if found else "")
         + "</Discovery>"
     )
 
@@ -133,7 +150,7 @@ def connect(
 
 
 class Link:
-    """A participant of our own with readers for all that ecdaq-dds publishes, made when asked for."""
+    """A participant of our own; readers of what ecdaq-dds publishes are made when asked for."""
 
     def __init__(self, domain: int, config: str, commander: str = "") -> None:
         self.domain = Domain(domain, config)
@@ -275,8 +292,15 @@ class Link:
                 raise LinkError("nobody takes commands here")
             time.sleep(0.01)
 
-    def send(self, values: Mapping[str, float], *, raw: bool = False, not_after_cycle: int = 0,
-             session: int = 0, message_id: int | None = None) -> int:
+    def send(
+        self,
+        values: Mapping[str, float],
+        *,
+        raw: bool = False,
+        not_after_cycle: int = 0,
+        session: int = 0,
+        message_id: int | None = None,
+    ) -> int:
         """Send a command and do not wait for its answer; the command's id."""
         writer = self._command_writer()
         if message_id is None:
@@ -301,21 +325,26 @@ class Link:
         taken = self._take(self.reader("ecdaq/reply", ReplyV1), seconds)
         return [r for r in taken if r.commander == self.commander]
 
-    def command(self, values: Mapping[str, float], *, raw: bool = False, not_after_cycle: int = 0,
-                session: int = 0, seconds: float = 2) -> int:
-        """Set outputs, all in one cycle or none; the cycle whose frame carried them. Or Refused.
+    def command(
+        self,
+        values: Mapping[str, float],
+        *,
+        raw: bool = False,
+        not_after_cycle: int = 0,
+        session: int = 0,
+        seconds: float = 2,
+    ) -> int:
+        """Set outputs, all in one cycle or none; the cycle whose frame carried them. Or RefusedError.
 
         What is set holds while this link lives and the appliance hears of it; then outputs with a
         time-out go to their fail-safe values.
         """
-        number = self.send(
-            values, raw=raw, not_after_cycle=not_after_cycle, session=session
-        )
+        number = self.send(values, raw=raw, not_after_cycle=not_after_cycle, session=session)
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0:
             for reply in self.replies(left):
                 if reply.id == number and reply.is_accepted:
                     return reply.cycle
                 if reply.id == number:
-                    raise Refused(reply.reason)
+                    raise RefusedError(reply.reason)
         raise LinkError(f"no answer within {seconds:g} s")

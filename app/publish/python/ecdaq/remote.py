@@ -24,8 +24,7 @@ def watch(link: Link, options: argparse.Namespace) -> int:
             continue
         shown[sample.slave] = sample.cycle + every
         values = " ".join(
-            f"{c.entry}={sample.values[c.place]:g}{c.unit}"
-            for c in channels.of_slave(sample.slave)
+            f"{c.entry}={sample.values[c.place]:g}{c.unit}" for c in channels.of_slave(sample.slave)
         )
         name = channels.slave_names[sample.slave]
         good = "" if sample.is_good else " NOT GOOD"
@@ -48,9 +47,7 @@ def record(link: Link, options: argparse.Namespace) -> int:
     """A CSV file for each slave, raw and exact where a channel has no scale."""
     channels = link.channels()
     options.dir.mkdir(parents=True, exist_ok=True)
-    files = [
-        (options.dir / f"{name}.csv").open("w", newline="") for name in channels.slave_names
-    ]
+    files = [(options.dir / f"{name}.csv").open("w", newline="") for name in channels.slave_names]
     try:
         writers = [csv.writer(file) for file in files]
         for slave, writer in enumerate(writers):
@@ -60,7 +57,8 @@ def record(link: Link, options: argparse.Namespace) -> int:
                 print("the master was restarted: the recording ends here", file=sys.stderr)
                 break
             values = [
-                s.raw[c.place] if c.scale == 1 and c.offset == 0 and c.type.startswith(("UINT", "B"))
+                s.raw[c.place]
+                if c.scale == 1 and c.offset == 0 and c.type.startswith(("UINT", "B"))
                 else s.values[c.place]
                 for c in channels.of_slave(s.slave)
             ]

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: MIT
+"""The Python kit by itself: its types are those of the IDL, its counting is right."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import ecdaq
+import pytest
+from bench import KIT, ROOT, Bench
+from ecdaq import idl_types
+from ecdaq.link import domain_config
+
+IDL = (ROOT / "app" / "publish" / "idl" / "ecdaq.idl").read_text()
+TYPES = {
+    "boolean": "bool", "double": "types.float64", "string": "str",
+    "unsigned short": "types.uint16", "unsigned long": "types.uint32", "long": "types.int32",
+    "unsigned long long": "types.uint64", "long long": "types.int64",
+}  # fmt: skip
+
+
+def of_idl() -> dict[str, list[tuple[str, str]]]:
+    found = {}
+    text = re.sub(r"//.*", "", IDL)
+    for struct in re.finditer(r"@final struct (\w+) \{(.*?)\};", text, re.DOTALL):
+        members = []
+        for line in filter(None, map(str.strip, struct.group(2).split(";"))):
+            kind, name = line.removeprefix("@key ").rsplit(" ", 1)
+            inner = re.fullmatch(r"sequence<(.*)>", kind)
+            python = f"types.sequence[{TYPES[inner.group(1)]}]" if inner else TYPES[kind]
+            members.append((name, python))
+        found[struct.group(1)] = members
+    return found
+
+
+def of_python() -> dict[str, list[tuple[str, str]]]:
+    text = (KIT / "ecdaq" / "idl_types.py").read_text()
+    return {
+        found.group(1): re.findall(r"^    (\w+): (.+)$", found.group(2), re.MULTILINE)
+        for found in re.finditer(r"^class (\w+)\(.*?\n((?:    .*\n)+)", text, re.MULTILINE)
+    }
+
+
+def test_types_are_those_of_the_idl() -> None:
+    assert of_idl() == of_python()
+    keys = dict(re.findall(r"@final struct (\w+) \{[^}]*?@key [a-z ]+ (\w+);", IDL))
+    assert keys == {
+        "SampleV1": "slave", "BlockV1": "slave", "CommandV1": "commander", "ReplyV1": "commander",
+    }  # fmt: skip
+    for name, key in keys.items():
+        text = (KIT / "ecdaq" / "idl_types.py").read_text()
+        assert re.search(rf'class {name}\(.*?\n    {key}: [^\n]*\n    key\("{key}"\)', text)
+        assert getattr(idl_types, name).__idl__.idl_transformed_typename == f"ecdaq::{name}"
+
+
+def test_types_are_final_and_flat() -> None:
+    text = re.sub(r"//.*", "", IDL)
+    assert text.count("struct") == text.count("@final struct")
+    assert not re.search(r"\b(octet|u?int8|char|enum|typedef|optional|union|map)\b", text)
+
+
+def sample(slave: int, cycle: int, session: int = 1) -> Any:
+    return SimpleNamespace(
+        slave=slave, session=session, cycle=cycle, dc_time_ns=cycle, utc_ns=cycle, flags=0,
+        is_good=True, adc=1.5, counter=cycle, sample_time_ns=0, values=[0.5], raw=[7],
+    )  # fmt: skip
+
+
+def test_gaps_are_counted_for_each_slave_and_session() -> None:
+    gaps = ecdaq.Gaps()
+    missing = [gaps.take(sample(*s)) for s in ((0, 5), (1, 9), (0, 6), (1, 12), (0, 6), (0, 1, 2))]
+    assert missing == [0, 0, 0, 2, 0, 0]
+    assert (gaps.gaps, gaps.missing, gaps.doubled, gaps.spans) == (1, 2, 1, [(1, 10, 2)])
+
+
+def test_series_of_one_slave_becomes_columns() -> None:
+    series = ecdaq.Series(1)
+    series.extend([sample(0, 1), sample(1, 1), sample(1, 2)])
+    assert series.to_numpy()["cycle"].tolist() == [1, 2]
+
+
+def test_configuration_takes_no_markup() -> None:
+    assert "<AllowMulticast>false<" in domain_config("lo", True, [], "")
+    with pytest.raises(ValueError, match="is no name"):
+        domain_config('eth0"/><x', True, [], "")
+
+
+def test_remote_tool_watches_records_sets_and_tells_status(
+    make_bench: Callable[..., Bench],
+) -> None:
+    bench = make_bench(**{"outputs[0].channel": "piccolo0.led", "outputs[0].owner": "remote"})
+    bench.start_all()
+    tool = ["--interface", "dds1", "--domain", "7"]
+    for name, words, expected in (
+        ("status", ["status", "--json"], '"state": "OP"'),
+        ("watch", ["watch", "--seconds", "2"], "piccolo1 cycle"),
+        ("set", ["set", "piccolo0.led=on"], "piccolo0.led=on from cycle"),
+        ("record", ["record", "--seconds", "2", "--dir", str(bench.folder)], "0 gaps, 0 samples"),
+    ):
+        assert bench.module(name, "ecdaq", *tool, *words).wait(40) == 0, bench.logs()
+        assert expected in bench.log(name)
+    assert bench.module("refused", "ecdaq", *tool, "set", "piccolo1.led=on").wait(40) == 1
+    assert "owned by local" in bench.log("refused")
+    lines = (bench.folder / "piccolo0.csv").read_text().splitlines()
+    assert lines[0].startswith("cycle,dc_time_ns,utc_ns,flags,is_good,led,")
+    assert len(lines) > 1000
