@@ -160,6 +160,16 @@ static void lose(struct commands *c, const struct slave_table *table, uint64_t s
 	gate_lose(c->gate, sender);
 }
 
+static void gain(struct commands *c, uint64_t sender)
+{
+	uint64_t *place = find_alive(c, sender);
+
+	place = place != NULL ? place : find_alive(c, 0);
+	if (place != NULL) {
+		*place = sender;
+	}
+}
+
 static void hear(struct commands *c, const struct slave_table *table)
 {
 	struct news news[NEWS];
@@ -174,12 +184,10 @@ static void hear(struct commands *c, const struct slave_table *table)
 	c->has_lost_news = 0;
 	pthread_mutex_unlock(&c->lock);
 	for (size_t i = 0; i < count; i++) {
-		uint64_t *place = find_alive(c, news[i].sender);
-
-		if (!news[i].is_alive) {
+		if (news[i].is_alive) {
+			gain(c, news[i].sender);
+		} else {
 			lose(c, table, news[i].sender);
-		} else if (place == NULL && (place = find_alive(c, 0)) != NULL) {
-			*place = news[i].sender;
 		}
 	}
 	/* More came than we could hear: nobody is known to be alive any more. */
@@ -237,7 +245,7 @@ static void look_after_flight(struct commands *c, const struct topics *topics, i
 		return;
 	}
 	if (board != NULL &&
-	    atomic_load_explicit(&board->taken_sequence, memory_order_acquire) == f->sequence) {
+	    atomic_load_explicit(&board->taken_sequence, memory_order_acquire) >= f->sequence) {
 		reply(c, topics, f->command,
 		      atomic_load_explicit(&board->taken_cycle, memory_order_relaxed), no_reason);
 		land(c);

@@ -2,7 +2,7 @@
 /* ecdaq-dds: publishes what ecdaqd measures over DDS and takes commands, until it is told to stop.
  */
 #include <errno.h>
-#include <getopt.h>
+#include <getopt.h> /* IWYU pragma: keep */
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>

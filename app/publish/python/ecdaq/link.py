@@ -334,10 +334,10 @@ class Link:
         session: int = 0,
         seconds: float = 2,
     ) -> int:
-        """Set outputs, all in one cycle or none; the cycle whose frame carried them. Or RefusedError.
+        """Set outputs, all in one cycle or none; the cycle whose frame carried them.
 
         What is set holds while this link lives and the appliance hears of it; then outputs with a
-        time-out go to their fail-safe values.
+        time-out go to their fail-safe values. RefusedError says why it was not taken.
         """
         number = self.send(values, raw=raw, not_after_cycle=not_after_cycle, session=session)
         end = time.monotonic() + seconds
