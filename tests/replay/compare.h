@@ -9,7 +9,7 @@
 #include "capture.h"
 #include "sim/segment.h"
 
-enum { COMPARE_ROWS = 64, COMPARE_MAX_FRAMES = 64 };
+enum { COMPARE_ROWS = 64 };
 
 /* Bytes of one register of one slave that differ, and why that is as it should be. */
 struct compare_row {
@@ -32,12 +32,19 @@ struct compare_latch {
 };
 
 struct compare {
+	/* Set before the run: ports of one slave whose receive times are leftovers, no frame sets
+	 * them. */
+	uint16_t leftover_station;
+	uint8_t leftover_ports;
+
 	unsigned frames;
 	unsigned datagrams;
 	unsigned unanswered; /* requests that the capture has no answer to */
 	unsigned wkc_differ;
 	unsigned header_differ; /* command, index, address, length, irq, source address */
 	unsigned bytes;
+	unsigned ram_bytes; /* of them read from process RAM: mailbox answers, which are played back
+			     */
 	unsigned bytes_differ;
 	unsigned bytes_unexplained;
 	unsigned row_count;
@@ -46,8 +53,8 @@ struct compare {
 	struct compare_latch latch[COMPARE_ROWS];
 };
 
-/** Send the master's frames of @capture through @segment at their times and compare each answer. */
-void compare_run(const struct bytes *capture, struct segment *segment, int64_t start_ns,
+/** Send the master's frames through @segment at their times and compare each answer. */
+void compare_run(const struct capture_pairs *pairs, struct segment *segment, int64_t start_ns,
 		 struct compare *ret);
 /** The table, on stdout. */
 void compare_print(const char *title, const struct compare *c);
