@@ -193,17 +193,23 @@ static void close_writer(struct esc *esc, struct esc_sm *sm, enum esc_side side,
 	}
 }
 
-static int sm_write(struct esc *esc, struct esc_sm *sm, enum esc_side side, int64_t t_ns, size_t at,
+/* Who writes, and when. */
+struct writer {
+	enum esc_side side;
+	int64_t t_ns;
+};
+
+static int sm_write(struct esc *esc, struct esc_sm *sm, const struct writer *by, size_t at,
 		    const uint8_t *buf, size_t len)
 {
-	if (!is_writer(sm, side) || (sm->is_mailbox && sm->is_full) ||
-	    (side == ESC_PDI && sm->is_mailbox && t_ns < esc->mailbox_stuck_until_ns)) {
+	if (!is_writer(sm, by->side) || (sm->is_mailbox && sm->is_full) ||
+	    (by->side == ESC_PDI && sm->is_mailbox && by->t_ns < esc->mailbox_stuck_until_ns)) {
 		return 0;
 	}
 	if (at == 0) {
 		sm->is_writer_open = 1;
 		sm->writer = sm->is_mailbox ? 0 : free_buffer(sm);
-		clear_event(esc, sm, side);
+		clear_event(esc, sm, by->side);
 		mark_status(esc, sm, 0, SM_STATUS_READ);
 	}
 	if (!sm->is_writer_open) {
@@ -211,7 +217,7 @@ static int sm_write(struct esc *esc, struct esc_sm *sm, enum esc_side side, int6
 	}
 	memcpy(esc->ram + buffer_offset(sm, sm->writer) + at, buf, len);
 	if (at + len == sm->len) {
-		close_writer(esc, sm, side, t_ns);
+		close_writer(esc, sm, by->side, by->t_ns);
 	}
 	return 1;
 }
@@ -266,6 +272,7 @@ int esc_ram_write(struct esc *esc, enum esc_side side, int64_t t_ns, uint16_t ad
 		  const uint8_t *buf, size_t len)
 {
 	size_t end = ram_end(esc) < (size_t)addr + len ? ram_end(esc) : (size_t)addr + len;
+	struct writer by = { .side = side, .t_ns = t_ns };
 	size_t piece;
 	int any = 0;
 
@@ -275,7 +282,7 @@ int esc_ram_write(struct esc *esc, enum esc_side side, int64_t t_ns, uint16_t ad
 		piece = end - at;
 		sm = sm_at(esc, at, &piece);
 		if (sm != NULL) {
-			any |= sm_write(esc, sm, side, t_ns, at - sm->start, buf + (at - addr), piece);
+			any |= sm_write(esc, sm, &by, at - sm->start, buf + (at - addr), piece);
 		} else {
 			memcpy(esc->ram + at - ESC_REG_PROCESS_RAM, buf + (at - addr), piece);
 			any = 1;

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "dc_master.h"
 
-#include "base/bytes.h"
 #include "harness/test.h"
 #include "wire/esc_reg.h"
 

@@ -2,7 +2,6 @@
 #include <errno.h>
 #include <unistd.h>
 
-#include "base/bytes.h"
 #include "harness/test.h"
 #include "sim/fault.h"
 #include "terminal.h"

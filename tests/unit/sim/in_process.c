@@ -5,7 +5,6 @@
 #include <errno.h>
 #include <time.h>
 
-#include "base/bytes.h"
 #include "bench.h"
 #include "harness/test.h"
 #include "wire/esc_reg.h"
