@@ -45,7 +45,8 @@ static void set_status(struct esc *esc, uint16_t clear, uint16_t set)
 
 static void fail_loading(struct esc *esc)
 {
-	/* The chip starts, but without a PDI; a reload that fails leaves it as it was (data sheet). */
+	/* The chip starts, but without a PDI; a reload that fails leaves it as it was (data sheet).
+	 */
 	set_status(esc, EEPROM_NOT_LOADED,
 		   EEPROM_CHECKSUM_ERROR | (esc->is_eeprom_loaded ? 0 : EEPROM_NOT_LOADED));
 }
@@ -64,7 +65,8 @@ static void load_configuration(struct esc *esc, int64_t t_ns)
 	memcpy(r + ESC_REG_PDI_CONFIG + 2, sii + 6, 2);
 	memcpy(r + ESC_REG_DC_PULSE_LENGTH, sii + 4, 2);
 	if (!esc->was_eeprom_loaded) {
-		/* Only after power-on, so that a new alias needs a power cycle (data sheet, 0x0012). */
+		/* Only after power-on, so that a new alias needs a power cycle (data sheet,
+		 * 0x0012). */
 		memcpy(r + ESC_REG_STATION_ALIAS, sii + 8, 2);
 	}
 	esc->is_eeprom_loaded = 1;
@@ -79,8 +81,7 @@ void esc_eeprom_power_on(struct esc *esc, int64_t t_ns)
 	put_le16(esc->reg + ESC_REG_EEPROM_CONTROL,
 		 (uint16_t)((esc->features.eeprom_bytes_a_read == 8 ? EEPROM_READS_8_BYTES : 0) |
 			    (esc->features.has_long_eeprom ? EEPROM_TWO_BYTE_ADDRESS : 0) |
-			    esc->features.eeprom_status |
-			    EEPROM_NOT_LOADED | EEPROM_BUSY));
+			    esc->features.eeprom_status | EEPROM_NOT_LOADED | EEPROM_BUSY));
 	esc->eeprom_command = EEPROM_RELOAD;
 	esc->eeprom_busy_until_ns = t_ns + RELOAD_NS;
 }
@@ -161,7 +162,8 @@ void esc_eeprom_done(struct esc *esc)
 		if (at + 2 <= esc->sii_bytes) {
 			memcpy(esc->sii + at, data, 2);
 		} else {
-			set_status(esc, 0, EEPROM_COMMAND_ERROR); /* no acknowledge from the EEPROM */
+			set_status(esc, 0, EEPROM_COMMAND_ERROR); /* no acknowledge from the EEPROM
+								   */
 		}
 		return;
 	}

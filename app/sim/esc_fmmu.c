@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* FMMUs: logical addresses to process RAM and registers, by bytes where possible, else bit by bit. */
+/* FMMUs: logical addresses to process RAM and registers, by bytes where possible, else bit by bit.
+ */
 #include "sim/esc_inside.h"
 
 #include <string.h>
@@ -20,8 +21,8 @@ void esc_fmmu_configure(struct esc *esc, unsigned n)
 	f->type = r[11] & 3;
 	f->is_active = (r[12] & 1) && f->len > 0 &&
 		       (f->len > 1 || f->logical_end_bit >= f->logical_start_bit);
-	f->is_bytewise = f->logical_start_bit == 0 && f->logical_end_bit == 7 &&
-			 f->physical_start_bit == 0;
+	f->is_bytewise =
+		f->logical_start_bit == 0 && f->logical_end_bit == 7 && f->physical_start_bit == 0;
 }
 
 /* Registers can be mapped, too (mailbox status); so a read may do what reading a register does. */

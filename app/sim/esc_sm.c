@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * SyncManagers. Buffered mode has three buffers: the writer has one, the reader one, the third is the
- * newest complete one or free; the first byte of the area opens a buffer, the last one closes it. So
- * either side always sees a whole, newest buffer. Mailbox mode is a handshake over one buffer.
+ * SyncManagers. Buffered mode has three buffers: the writer has one, the reader one, the third is
+ * the newest complete one or free; the first byte of the area opens a buffer, the last one closes
+ * it. So either side always sees a whole, newest buffer. Mailbox mode is a handshake over one
+ * buffer.
  */
 #include "sim/esc_inside.h"
 
@@ -132,7 +133,8 @@ static size_t buffer_offset(const struct esc_sm *sm, unsigned buffer)
 {
 	size_t offset = (size_t)sm->start - ESC_REG_PROCESS_RAM + (size_t)buffer * sm->len;
 
-	/* Three buffers that run out of the RAM are a mistake in the set-up; they share the first. */
+	/* Three buffers that run out of the RAM are a mistake in the set-up; they share the first.
+	 */
 	if (sm->is_mailbox || offset + sm->len > ESC_RAM_BYTES) {
 		offset = (size_t)sm->start - ESC_REG_PROCESS_RAM;
 	}

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The SYNC unit: SYNC0 at system times start, start + cycle, ...; once if the cycle time is 0. A start
- * time in the past is waited for until the counter comes round: 4.3 s with 32 bits, never with 64
- * (T10). SYNC1 follows a SYNC0 by 0x09a4, and not again before it has come. Start and cycle
+ * The SYNC unit: SYNC0 at system times start, start + cycle, ...; once if the cycle time is 0. A
+ * start time in the past is waited for until the counter comes round: 4.3 s with 32 bits, never
+ * with 64 (T10). SYNC1 follows a SYNC0 by 0x09a4, and not again before it has come. Start and cycle
  * times are taken over on activation.
  */
 #include "sim/esc_inside.h"
@@ -38,12 +38,13 @@ void esc_sync_replan(struct esc *esc, int64_t t_ns)
 	}
 }
 
-/* The start time was within the coming half of the counter's range, as it must be (0x0984 bit 2). */
+/* The start time was within the coming half of the counter's range, as it must be (0x0984 bit 2).
+ */
 static uint8_t plausibility(const struct esc *esc, int64_t t_ns)
 {
 	uint64_t ahead = esc->sync.next_local_ns - esc_system_time(esc, t_ns);
-	int is_near = esc->features.dc == ESC_DC_32 ? (uint32_t)ahead <= INT32_MAX
-						    : ahead <= INT64_MAX;
+	int is_near =
+		esc->features.dc == ESC_DC_32 ? (uint32_t)ahead <= INT32_MAX : ahead <= INT64_MAX;
 
 	return is_near ? 0 : STATUS_START_NOT_NEAR;
 }
@@ -82,7 +83,8 @@ void esc_sync_activate(struct esc *esc, int64_t t_ns)
 
 	s->activation = esc->reg[ESC_REG_DC_ACTIVATION];
 	is_on = has(esc, ACTIVATE_CYCLIC | ACTIVATE_SYNC0);
-	/* A shot that fired leaves the unit active: it must be switched off before it can fire again. */
+	/* A shot that fired leaves the unit active: it must be switched off before it can fire
+	 * again. */
 	if (is_on && !was_on) {
 		start(esc, t_ns);
 	} else if (!is_on) {
@@ -158,6 +160,5 @@ void esc_sync_to_registers(struct esc *esc)
 	if (s->is_running) {
 		put_le64(r + ESC_REG_DC_START_TIME, s->next_local_ns);
 	}
-	put_le64(r + ESC_REG_DC_NEXT_SYNC1,
-		 s->next1_true_ns != INT64_MAX ? s->next1_local_ns : 0);
+	put_le64(r + ESC_REG_DC_NEXT_SYNC1, s->next1_true_ns != INT64_MAX ? s->next1_local_ns : 0);
 }

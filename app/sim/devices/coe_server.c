@@ -184,8 +184,8 @@ static enum coe_abort write_all(struct coe_dictionary *d, const struct sdo *sdo,
 	}
 	code = coe_dictionary_write(d, sdo->index, 0, &none, 1);
 	for (unsigned i = 0; code == COE_OK && i < count; i++) {
-		code = coe_dictionary_write(d, sdo->index, (uint8_t)(i + 1), bytes + 2 + (size_t)2 * i,
-					    2);
+		code = coe_dictionary_write(d, sdo->index, (uint8_t)(i + 1),
+					    bytes + 2 + (size_t)2 * i, 2);
 	}
 	return code == COE_OK ? coe_dictionary_write(d, sdo->index, 0, &count, 1) : code;
 }
