@@ -2,9 +2,9 @@
 /*
  * One EtherCAT slave controller: register file, process RAM, SyncManagers, FMMUs, AL handshake, SII
  * interface, watchdogs, distributed clock. It has two sides, as the chip has: datagrams from the
- * wire (esc_datagram) and the PDI (esc_pdi_read, esc_pdi_write). All times are true time in ns, on one axis
- * for the whole segment; the ESC's own clock runs off it by its ppm. What rests on the data sheet,
- * on captures, or is our model is said in app/doc/SPECNOTES.md.
+ * wire (esc_datagram) and the PDI (esc_pdi_read, esc_pdi_write). All times are true time in ns, on
+ * one axis for the whole segment; the ESC's own clock runs off it by its ppm. What rests on the
+ * data sheet, on captures, or is our model is said in app/doc/SPECNOTES.md.
  */
 #ifndef SIM_ESC_H
 #define SIM_ESC_H
@@ -31,9 +31,9 @@ struct esc_features {
 	uint8_t port_descriptor;
 	uint16_t features;
 	enum esc_dc_kind dc;
-	int has_sync_unit;            /* 0x0980 to 0x09a7 */
-	int is_dc_by_eeprom;          /* 0x0141 bits 2 and 3, if both 0, leave the receive times alone */
-	int has_open_bits;            /* SyncManager status bits 6 and 7: a buffer is open */
+	int has_sync_unit;   /* 0x0980 to 0x09a7 */
+	int is_dc_by_eeprom; /* 0x0141 bits 2 and 3, if both 0, leave the receive times alone */
+	int has_open_bits;   /* SyncManager status bits 6 and 7: a buffer is open */
 	unsigned eeprom_bytes_a_read; /* 4 or 8 */
 	int has_long_eeprom;          /* two address bytes: 0x0502 bit 7 */
 	uint16_t eeprom_status;       /* bits of 0x0502 that read 1 and no data sheet names */
@@ -163,9 +163,12 @@ struct esc {
 	int64_t watchdog_deadline_ns;     /* process data; INT64_MAX: not running */
 	int64_t pdi_watchdog_deadline_ns; /* INT64_MAX: not running, or expired */
 	uint8_t is_pdi_expired;
-	int64_t mailbox_stuck_until_ns;   /* a fault: the PDI's mailbox writes are lost */
-	uint8_t ports;                    /* with a link */
-	uint8_t is_loop_changed;          /* 0x0101 was written: the segment looks */
+	int64_t mailbox_stuck_until_ns; /* a fault: the PDI's mailbox writes are lost */
+	uint8_t ports;                  /* with a link */
+	uint8_t is_write_enabled;       /* 0x0020 or 0x0030 came in this frame */
+	uint8_t reset_step[2];          /* of 'R' 'E' 'S', by the master, by the PDI */
+	uint8_t is_reset_wanted;
+	uint8_t is_loop_changed; /* 0x0101 was written: the segment looks */
 	esc_sync0_sink sink;
 	void *sink_ctx;
 };
@@ -187,6 +190,8 @@ void esc_clock_start(struct esc *esc, int64_t t_ns, uint64_t local_ns, double pp
 void esc_clock_drift(struct esc *esc, int64_t t_ns, double ppm);
 void esc_sync0_to(struct esc *esc, esc_sync0_sink sink, void *ctx);
 
+/** A new frame starts here; call before its first datagram. */
+void esc_frame_begin(struct esc *esc);
 /** Take part in one datagram of a frame; changes its address, IRQ, data and working counter. */
 void esc_datagram(struct esc *esc, const struct esc_frame *frame, struct ecat_datagram *dg);
 
@@ -199,12 +204,16 @@ void esc_advance(struct esc *esc, int64_t t_ns);
 uint64_t esc_system_time(const struct esc *esc, int64_t t_ns);
 
 /**
- * PDI access. The first byte of a SyncManager's area opens its buffer, the last one closes it; bytes
- * between are refused unless it is open. Nothing works before the EEPROM is loaded.
+ * PDI access. The first byte of a SyncManager's area opens its buffer, the last one closes it;
+ * bytes between are refused unless it is open. Nothing works before the EEPROM is loaded.
  */
 void esc_pdi_read(struct esc *esc, int64_t t_ns, uint16_t addr, void *buf, size_t len);
 void esc_pdi_write(struct esc *esc, int64_t t_ns, uint16_t addr, const void *buf, size_t len);
 int esc_eeprom_loaded(const struct esc *esc);
+/** 1 if the EEPROM makes the SYNC0 pin an output (0x0151 bit 2). */
+int esc_has_sync0_pin(const struct esc *esc);
+/** 1 once after the reset sequence was written to 0x0040 or 0x0041: start the slave anew. */
+int esc_take_reset(struct esc *esc);
 /** Level of the PDI's interrupt: AL event request and mask. */
 int esc_irq(const struct esc *esc);
 

@@ -13,8 +13,8 @@ enum esc_side { ESC_ECAT, ESC_PDI };
 /* --- esc_sm.c --- */
 
 /**
- * Process RAM from one side, SyncManagers minded. 1 if at least one byte was allowed. What was not is
- * left alone, in @buf too. @addr is 0x1000 or more.
+ * Process RAM from one side, SyncManagers minded. 1 if at least one byte was allowed. What was not
+ * is left alone, in @buf too. @addr is 0x1000 or more.
  */
 int esc_ram_read(struct esc *esc, enum esc_side side, uint16_t addr, uint8_t *buf, size_t len);
 int esc_ram_write(struct esc *esc, enum esc_side side, int64_t t_ns, uint16_t addr,
@@ -23,7 +23,8 @@ int esc_ram_write(struct esc *esc, enum esc_side side, int64_t t_ns, uint16_t ad
 void esc_sm_configure(struct esc *esc, unsigned n, enum esc_side side);
 /** The digital outputs at 0x0f00 were written up to before @end: what an SM over them does. */
 void esc_sm_outputs_written(struct esc *esc, int64_t t_ns, uint16_t addr, size_t len);
-/** The area of an active SM at @addr as it would be read back, for bits that a write leaves alone. */
+/** The area of an active SM at @addr as it would be read back, for bits that a write leaves alone.
+ */
 const uint8_t *esc_ram_last_written(struct esc *esc, uint16_t addr);
 
 /* --- esc_fmmu.c --- */
@@ -45,17 +46,22 @@ static inline int esc_touches(uint16_t addr, size_t len, unsigned reg, size_t re
 	return addr < reg + reg_len && reg < addr + len;
 }
 
+/** @value was written to 0x0040 (by the master) or 0x0041. */
+void esc_reset_step(struct esc *esc, enum esc_side side, uint8_t value);
+
 /* --- esc_clock.c --- */
 
 uint64_t esc_local_time(const struct esc *esc, int64_t t_ns);
-/** First true time at or after @t_ns at which the copy of the system time is @system_ns; INT64_MAX. */
+/** First true time at or after @t_ns at which the copy of the system time is @system_ns; INT64_MAX.
+ */
 int64_t esc_clock_when(const struct esc *esc, int64_t t_ns, uint64_t system_ns);
 /** Let the clock run with another correction from @t_ns on. */
 void esc_clock_correct(struct esc *esc, int64_t t_ns, int64_t correction);
 
 /* --- esc_dc.c --- */
 
-/** The master's time @received_ns came with a frame that started here at @t_ns: compare and regulate. */
+/** The master's time @received_ns came with a frame that started here at @t_ns: compare and
+ * regulate. */
 void esc_dc_compare(struct esc *esc, int64_t t_ns, uint64_t received_ns);
 /** 0x0930 was written: filters in force from now on, loop reset. */
 void esc_dc_reset_filter(struct esc *esc, int64_t t_ns);

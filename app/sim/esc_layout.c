@@ -16,7 +16,7 @@ static const struct range always_readable[] = {
 	{ ESC_REG_TYPE, 10 },
 	{ ESC_REG_STATION_ADDRESS, 4 },
 	{ ESC_REG_WRITE_ENABLE, 2 },
-	{ 0x0030, 2 },
+	{ ESC_REG_ESC_WRITE_ENABLE, 2 },
 	{ ESC_REG_RESET_ECAT, 2 },
 	{ ESC_REG_DL_CONTROL, 4 },
 	{ 0x0108, 2 },
@@ -46,7 +46,7 @@ static const struct range always_readable[] = {
 static const struct range always_writable[] = {
 	{ ESC_REG_STATION_ADDRESS, 2 },
 	{ ESC_REG_WRITE_ENABLE, 2 },
-	{ 0x0030, 2 },
+	{ ESC_REG_ESC_WRITE_ENABLE, 2 },
 	{ ESC_REG_RESET_ECAT, 1 },
 	{ ESC_REG_DL_CONTROL, 4 },
 	{ ESC_REG_AL_CONTROL, 2 },

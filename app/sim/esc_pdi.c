@@ -4,9 +4,24 @@
 
 #include <string.h>
 
+enum { SYNC0_IS_OUTPUT = 0x04 }; /* 0x0151 */
+
 int esc_eeprom_loaded(const struct esc *esc)
 {
 	return esc->is_eeprom_loaded;
+}
+
+int esc_has_sync0_pin(const struct esc *esc)
+{
+	return (esc->reg[ESC_REG_SYNC_LATCH_CONFIG] & SYNC0_IS_OUTPUT) != 0;
+}
+
+int esc_take_reset(struct esc *esc)
+{
+	int was = esc->is_reset_wanted;
+
+	esc->is_reset_wanted = 0;
+	return was;
 }
 
 int esc_irq(const struct esc *esc)
@@ -90,6 +105,10 @@ static void write_register(struct esc *esc, unsigned addr, uint8_t value)
 			esc->reg[addr] = value & 3;
 			esc_sm_configure(esc, sm, ESC_PDI);
 		}
+		return;
+	}
+	if (addr == ESC_REG_RESET_PDI) {
+		esc_reset_step(esc, ESC_PDI, value);
 		return;
 	}
 	if (!is_writable(esc, addr)) {

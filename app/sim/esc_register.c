@@ -32,7 +32,8 @@ static void refresh_times(struct esc *esc, enum esc_side side, int64_t t_ns, uin
 	if (esc_touches(addr, len, ESC_REG_DC_SYSTEM_TIME, 8)) {
 		uint64_t now = esc_system_time(esc, t_ns);
 
-		/* The master reads when the frame was at the reference clock (data sheet, 0x0910). */
+		/* The master reads when the frame was at the reference clock (data sheet, 0x0910).
+		 */
 		if (side == ESC_ECAT) {
 			now -= get_le32(esc->reg + ESC_REG_DC_SYSTEM_TIME_DELAY);
 		}
@@ -107,7 +108,7 @@ static void latch_receive_times(struct esc *esc, const struct esc_frame *frame)
 	for (unsigned port = 0; port < ESC_PORTS; port++) {
 		/* A port that the frame does not come through keeps what it had (captures). */
 		if (frame->ports_used >> port & 1) {
-			put_le32(esc->reg + ESC_REG_DC_RECEIVE_TIME_PORT + 4 * port,
+			put_le32(&esc->reg[ESC_REG_DC_RECEIVE_TIME_PORT + 4 * port],
 				 (uint32_t)esc_local_time(esc, frame->port_ns[port]));
 		}
 	}
@@ -174,8 +175,8 @@ static void clear_counters(struct esc *esc, uint16_t addr, size_t len)
 		uint16_t first;
 		uint16_t len;
 	} groups[] = {
-		{ ESC_REG_RX_ERROR_COUNTER, 12 }, { ESC_REG_ECAT_PU_ERROR, 1 },
-		{ ESC_REG_PDI_ERROR, 1 },         { ESC_REG_LOST_LINK_COUNTER, 4 },
+		{ ESC_REG_RX_ERROR_COUNTER, 12 },   { ESC_REG_ECAT_PU_ERROR, 1 },
+		{ ESC_REG_PDI_ERROR, 1 },           { ESC_REG_LOST_LINK_COUNTER, 4 },
 		{ ESC_REG_WATCHDOG_COUNTER_PD, 2 },
 	};
 
@@ -205,6 +206,13 @@ static void written(struct esc *esc, const struct esc_frame *frame, uint16_t add
 		    const uint8_t *buf, size_t len)
 {
 	clear_counters(esc, addr, len);
+	if (esc_touches(addr, len, ESC_REG_WRITE_ENABLE, 1) ||
+	    esc_touches(addr, len, ESC_REG_ESC_WRITE_ENABLE, 1)) {
+		esc->is_write_enabled = 1;
+	}
+	if (esc_touches(addr, len, ESC_REG_RESET_ECAT, 1)) {
+		esc_reset_step(esc, ESC_ECAT, esc->reg[ESC_REG_RESET_ECAT]);
+	}
 	if (esc_touches(addr, len, ESC_REG_AL_CONTROL, 1)) {
 		al_control_written(esc);
 	}
@@ -226,9 +234,41 @@ static void written(struct esc *esc, const struct esc_frame *frame, uint16_t add
 	dc_written(esc, frame, addr, len, buf);
 }
 
+void esc_frame_begin(struct esc *esc)
+{
+	esc->is_write_enabled = 0;
+}
+
+/* Protection (0x0021 for registers, 0x0031 for all) is lifted by 0x0020 or 0x0030 in the same
+ * frame. */
+static int is_protected(const struct esc *esc, unsigned at)
+{
+	int is_on = (esc->reg[ESC_REG_WRITE_PROTECT] | esc->reg[ESC_REG_ESC_WRITE_PROTECT]) & 1;
+
+	return is_on && !esc->is_write_enabled && at < ESC_REG_DIGITAL_OUTPUTS &&
+	       at != ESC_REG_WRITE_ENABLE && at != ESC_REG_ESC_WRITE_ENABLE;
+}
+
+void esc_reset_step(struct esc *esc, enum esc_side side, uint8_t value)
+{
+	static const uint8_t sequence[] = { 'R', 'E', 'S' };
+	uint8_t *step = &esc->reset_step[side];
+
+	*step = (uint8_t)(value == sequence[*step] ? *step + 1 : value == sequence[0]);
+	if (*step == sizeof(sequence)) {
+		*step = 0;
+		esc->is_reset_wanted = 1;
+	}
+	/* It reads as how far the sequence has come. */
+	esc->reg[ESC_REG_RESET_ECAT + (side == ESC_PDI)] = *step;
+}
+
 /* Is the byte, which the master may write in general, closed to it just now? */
 static int is_locked(const struct esc *esc, unsigned at)
 {
+	if (is_protected(esc, at)) {
+		return 1;
+	}
 	if (at == ESC_REG_AL_CONTROL || at == ESC_REG_AL_CONTROL + 1) {
 		/* A mailbox of one: the PDI must read it before it can be written again. */
 		return (esc->al_event & ESC_AL_EVENT_CONTROL) != 0;
@@ -252,7 +292,8 @@ static uint8_t kept_bits(const struct esc *esc, unsigned at)
 	if (at >= ESC_REG_SM && at < ESC_REG_DC_RECEIVE_TIME_PORT) {
 		unsigned n = (at - ESC_REG_SM) / ESC_SM_BYTES;
 
-		/* Status and PDI control are the slave's own; the set-up is fixed while it is active. */
+		/* Status and PDI control are the slave's own; the set-up is fixed while it is
+		 * active. */
 		if (at % ESC_SM_BYTES == 5 || at % ESC_SM_BYTES == 7) {
 			return 0xff;
 		}

@@ -168,7 +168,7 @@ static void apply(struct fault_plan *plan, const struct fault *f, struct segment
 		segment_power_on(segment, f->slave, t_ns);
 		break;
 	case FAULT_DRIFT:
-		esc_clock_drift(segment_esc(segment, f->slave), t_ns, f->ppm);
+		segment_drift(segment, f->slave, f->ppm, t_ns);
 		break;
 	case FAULT_AL_ERROR:
 		al_error(segment_esc(segment, f->slave), f->code);

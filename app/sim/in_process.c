@@ -198,8 +198,7 @@ static int ip_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadlin
 
 static int ip_is_up(void *ctx)
 {
-	(void)ctx;
-	return 1;
+	return segment_is_up(((struct in_process *)ctx)->spec.segment, SEGMENT_PRIMARY);
 }
 
 static void ip_destroy(void *ctx)

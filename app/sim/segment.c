@@ -5,129 +5,58 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "wire/datagram.h"
-#include "wire/esc_reg.h"
+#include "sim/segment_inside.h"
 
-enum { DATAGRAMS_MAX = 128, NO_CHILD = -1 };
-
-struct node {
-	struct segment *segment;
-	struct esc esc;
-	struct esc_features features;
-	struct sim_device *device;
-	struct signal_spec signal;
-	uint8_t *sii;
-	size_t sii_bytes;
-	double ppm;
-	uint64_t clock_start_ns;
-	int parent;
-	unsigned parent_port;
-	int child[4];
-	int64_t wire_ns;
-	int64_t processing_ns;
-	int64_t forwarding_ns;
-	int has_power;
-	int is_cut;           /* the cable towards the parent */
-	struct esc_frame way; /* when a frame passes, from the time it leaves the master */
-	int64_t next_ns;      /* of its ESC and its device */
-};
-
-struct segment {
-	struct node *node;
-	size_t count;
-	unsigned order[LIMIT_SLAVES]; /* in which a frame meets them */
-	size_t reached;
-	int64_t round_trip_ns;
-	int64_t now_ns;
-	void (*sink)(void *ctx, unsigned slave, int64_t t_ns, uint64_t system_time_ns);
-	void *sink_ctx;
-};
-
-/* --- the way of a frame --- */
-
-static int has_link(const struct segment *seg, int child)
-{
-	return child != NO_CHILD && seg->node[child].has_power && !seg->node[child].is_cut;
-}
-
-/* Depth first in the chip's port order 0, 3, 1, 2 (data sheet, frame processing order). */
-static int64_t visit(struct segment *seg, unsigned i, int64_t at_ns)
-{
-	static const unsigned port_order[] = { 3, 1, 2 };
-	struct node *n = &seg->node[i];
-	int64_t t = at_ns + n->processing_ns;
-	uint8_t links = 1;
-
-	n->way = (struct esc_frame){ .pu_ns = at_ns, .port_ns = { at_ns }, .ports_used = 1 };
-	seg->order[seg->reached++] = i;
-	for (unsigned k = 0; k < 3; k++) {
-		unsigned port = port_order[k];
-
-		if (!has_link(seg, n->child[port])) {
-			continue;
-		}
-		links |= (uint8_t)(1u << port);
-		if (esc_is_port_closed(&n->esc, port)) {
-			continue;
-		}
-		t += seg->node[n->child[port]].wire_ns;
-		t = visit(seg, (unsigned)n->child[port], t) + seg->node[n->child[port]].wire_ns;
-		n->way.port_ns[port] = t;
-		n->way.ports_used |= (uint8_t)(1u << port);
-		t += n->forwarding_ns;
-	}
-	esc_set_links(&n->esc, links);
-	n->esc.is_loop_changed = 0;
-	return t;
-}
-
-static void lay_way(struct segment *seg)
-{
-	seg->reached = 0;
-	seg->round_trip_ns = 0;
-	for (size_t i = 0; i < seg->count; i++) {
-		struct node *n = &seg->node[i];
-
-		if (n->parent < 0 && n->has_power && !n->is_cut) {
-			seg->round_trip_ns = visit(seg, (unsigned)i, n->wire_ns) + n->wire_ns;
-			return;
-		}
-	}
-}
+enum { WANDER_STEP_NS = 50000000, WANDER_STEPS = 40 };
 
 /* --- events --- */
 
-static void plan(struct node *n)
+void segment_plan(struct node *n)
 {
-	int64_t wake = n->device != NULL ? n->device->ops->next_wake_ns(n->device) : INT64_MAX;
-	int64_t own = esc_next_event_ns(&n->esc);
+	int64_t next = esc_next_event_ns(&n->esc);
 
-	n->next_ns = !n->has_power ? INT64_MAX : wake < own ? wake : own;
-}
-
-static void sync0_edge(void *ctx, int64_t t_ns, uint64_t system_time_ns)
-{
-	struct node *n = ctx;
-	struct segment *seg = n->segment;
-
+	if (!n->has_power) {
+		n->next_ns = INT64_MAX;
+		return;
+	}
 	if (n->device != NULL) {
-		n->device->ops->sync0(n->device, t_ns, system_time_ns);
+		int64_t wake = n->device->ops->next_wake_ns(n->device);
+
+		next = wake < next ? wake : next;
 	}
-	if (seg->sink != NULL) {
-		seg->sink(seg->sink_ctx, (unsigned)(n - seg->node), t_ns, system_time_ns);
-	}
+	n->next_ns = n->next_wander_ns < next ? n->next_wander_ns : next;
 }
 
-static void run_node(struct node *n, int64_t until_ns)
+/* A bounded random walk: the crystal in the draught. */
+static void wander(struct node *n)
 {
-	while (n->next_ns <= until_ns) {
+	double step = n->wander_ppm / WANDER_STEPS * (2.0 * prng_unit(&n->prng) - 1.0);
+	double to = n->wandered_ppm + step;
+
+	if (to > n->wander_ppm || to < -n->wander_ppm) {
+		to = n->wandered_ppm - step;
+	}
+	n->wandered_ppm = to;
+	esc_clock_drift(&n->esc, n->next_wander_ns, n->ppm + to);
+	n->next_wander_ns += WANDER_STEP_NS;
+}
+
+void segment_run_node(struct node *n, int64_t t_ns)
+{
+	while (n->next_ns <= t_ns) {
 		int64_t at = n->next_ns;
 
+		if (at >= n->next_wander_ns) {
+			wander(n);
+		}
 		esc_advance(&n->esc, at);
 		if (n->device != NULL && n->device->ops->next_wake_ns(n->device) <= at) {
 			n->device->ops->run(n->device, at);
 		}
-		plan(n);
+		if (esc_take_reset(&n->esc)) {
+			segment_start_node(n, at, 0);
+		}
+		segment_plan(n);
 	}
 }
 
@@ -151,121 +80,170 @@ int64_t segment_next_event_ns(const struct segment *segment)
 void segment_advance(struct segment *segment, int64_t t_ns)
 {
 	for (struct node *n = earliest(segment); n->next_ns <= t_ns; n = earliest(segment)) {
-		run_node(n, n->next_ns);
+		segment_run_node(n, n->next_ns);
 	}
 	if (t_ns > segment->now_ns) {
 		segment->now_ns = t_ns;
 	}
 }
 
-/* --- frames --- */
-
-static int is_ethercat(const uint8_t *frame, size_t frame_len)
+static void sync0_edge(void *ctx, int64_t t_ns, uint64_t system_time_ns)
 {
-	return frame_len >= ECAT_ETHERNET_BYTES && frame[12] == ECAT_ETHERTYPE >> 8 &&
-	       frame[13] == (ECAT_ETHERTYPE & 0xff);
+	struct node *n = ctx;
+	struct segment *seg = n->segment;
+
+	if (n->device != NULL && esc_has_sync0_pin(&n->esc)) {
+		n->device->ops->sync0(n->device, t_ns, system_time_ns);
+	}
+	if (seg->sink != NULL) {
+		seg->sink(seg->sink_ctx, (unsigned)(n - seg->node), t_ns, system_time_ns);
+	}
 }
 
-static int find_datagrams(uint8_t *frame, size_t frame_len, struct ecat_datagram *dg)
+void segment_sync0_to(struct segment *segment,
+		      void (*sink)(void *ctx, unsigned slave, int64_t t_ns,
+				   uint64_t system_time_ns),
+		      void *ctx)
 {
-	size_t pos = 0;
-	int count = 0;
-	int r;
+	segment->sink = sink;
+	segment->sink_ctx = ctx;
+}
 
-	if (!ecat_frame_is_valid(frame, frame_len)) {
-		return -1;
-	}
-	while ((r = ecat_frame_next(frame, frame_len, &pos, &dg[count])) == 1) {
-		if (++count == DATAGRAMS_MAX) {
-			return -1;
+/* --- wiring --- */
+
+static int is_live(const struct segment *seg, int slave)
+{
+	return slave != WAY_NOWHERE && seg->node[slave].has_power;
+}
+
+/* Both ends see the link; each may still hold its loop closed (DL control). */
+static void set_links(struct segment *seg)
+{
+	for (size_t i = 0; i < seg->count; i++) {
+		struct node *n = &seg->node[i];
+		uint8_t links = 0;
+
+		for (unsigned port = 0; port < WAY_PORTS; port++) {
+			const struct way_link *l = &seg->wiring[i].link[port];
+			int is_cut = port == 0 ? n->is_cut : 0;
+
+			if (l->is_master && l->master == SEGMENT_SECONDARY) {
+				is_cut = seg->is_ring_cut;
+			} else if (port != 0 && l->slave != WAY_NOWHERE) {
+				is_cut = seg->node[l->slave].is_cut;
+			}
+			if (!is_cut && (l->is_master || is_live(seg, l->slave))) {
+				links |= (uint8_t)(1u << port);
+			}
+		}
+		esc_set_links(&n->esc, n->has_power ? links : 0);
+		n->esc.is_loop_changed = 0;
+		for (unsigned port = 0; port < WAY_PORTS; port++) {
+			seg->wiring[i].link[port].is_open =
+				(links >> port & 1) && !esc_is_port_closed(&n->esc, port);
 		}
 	}
-	return r < 0 ? -1 : count;
 }
 
-/* The first slave finds it and spoils the check sum, by which the others know that it was found. */
-static void count_damaged(struct segment *seg)
+void segment_lay_ways(struct segment *segment)
 {
-	for (size_t k = 0; k < seg->reached; k++) {
-		esc_count_error(&seg->node[seg->order[k]].esc, 0,
-				k == 0 ? ESC_ERROR_UNIT : ESC_ERROR_FORWARDED);
+	const struct node *first = &segment->node[segment->first];
+	int has_ring = segment->ring_slave != WAY_NOWHERE && !segment->is_ring_cut &&
+		       segment->node[segment->ring_slave].has_power;
+
+	set_links(segment);
+	memset(segment->way, 0, sizeof(segment->way));
+	if (segment_is_up(segment, SEGMENT_PRIMARY) &&
+	    segment->wiring[segment->first].link[0].is_open) {
+		way_lay(segment->wiring, (unsigned)segment->first, 0, first->wire_ns,
+			&segment->way[SEGMENT_PRIMARY]);
+	}
+	if (has_ring && segment->wiring[segment->ring_slave].link[segment->ring_port].is_open) {
+		way_lay(segment->wiring, (unsigned)segment->ring_slave, segment->ring_port,
+			segment->ring_wire_ns, &segment->way[SEGMENT_SECONDARY]);
+	}
+	for (size_t i = 0; i < segment->count; i++) {
+		segment_plan(&segment->node[i]);
 	}
 }
 
-static int pass(struct node *n, int64_t t_ns, struct ecat_datagram *dg, int count)
+int segment_is_up(const struct segment *segment, enum segment_port port)
 {
-	struct esc_frame way = n->way;
-
-	way.pu_ns += t_ns;
-	for (unsigned port = 0; port < ESC_PORTS; port++) {
-		way.port_ns[port] += t_ns;
+	if (port == SEGMENT_SECONDARY) {
+		return segment->ring_slave != WAY_NOWHERE && !segment->is_ring_cut &&
+		       segment->node[segment->ring_slave].has_power;
 	}
-	run_node(n, way.pu_ns);
-	for (int i = 0; i < count; i++) {
-		esc_datagram(&n->esc, &way, &dg[i]);
-	}
-	if (n->device != NULL && n->device->ops->frame_passed != NULL) {
-		n->device->ops->frame_passed(n->device, way.pu_ns);
-	}
-	plan(n);
-	return n->esc.is_loop_changed;
+	return segment->node[segment->first].has_power && !segment->node[segment->first].is_cut;
 }
 
-int segment_frame(struct segment *segment, int64_t t_ns, uint8_t *frame, size_t frame_len,
-		  int64_t *ret_back_ns)
+int segment_close_ring(struct segment *segment, size_t slave, unsigned port, int64_t wire_ns)
 {
-	struct ecat_datagram dg[DATAGRAMS_MAX];
-	int is_loop_changed = 0;
-	int count;
+	struct way_link *l;
 
-	segment_advance(segment, t_ns);
-	if (segment->reached == 0) {
-		return -ENOLINK;
+	if (slave >= segment->count || port < 1 || port >= WAY_PORTS ||
+	    segment->ring_slave != WAY_NOWHERE) {
+		return -EINVAL;
 	}
-	if (!is_ethercat(frame, frame_len)) {
-		return -EBADMSG; /* not theirs: slaves take it off the wire (0x0100 bit 0) */
+	l = &segment->wiring[slave].link[port];
+	if (l->slave != WAY_NOWHERE || l->is_master) {
+		return -EINVAL;
 	}
-	count = find_datagrams(frame, frame_len, dg);
-	if (count < 0) {
-		count_damaged(segment);
-		return -EBADMSG;
-	}
-	for (size_t k = 0; k < segment->reached; k++) {
-		is_loop_changed |= pass(&segment->node[segment->order[k]], t_ns, dg, count);
-	}
-	frame[6] |= 0x02; /* every ESC marks the source address of what it has processed */
-	*ret_back_ns = t_ns + segment->round_trip_ns;
-	if (is_loop_changed) {
-		lay_way(segment);
-	}
+	*l = (struct way_link){ .slave = WAY_NOWHERE,
+				.is_master = 1,
+				.master = SEGMENT_SECONDARY,
+				.wire_ns = wire_ns };
+	segment->ring_slave = (int)slave;
+	segment->ring_port = port;
+	segment->ring_wire_ns = wire_ns;
+	segment_lay_ways(segment);
 	return 0;
 }
 
-/* --- making and breaking --- */
+/* --- making --- */
 
-static void power_on(struct node *n, int64_t t_ns, uint64_t clock_start_ns)
+void segment_start_node(struct node *n, int64_t t_ns, uint64_t clock_ns)
 {
+	uint8_t links = n->esc.ports;
+
 	n->has_power = 1;
 	esc_init(&n->esc, &n->features, n->sii, n->sii_bytes, t_ns);
-	esc_clock_start(&n->esc, t_ns, clock_start_ns, n->ppm);
+	esc_clock_start(&n->esc, t_ns, clock_ns, n->ppm + n->wandered_ppm);
 	esc_sync0_to(&n->esc, sync0_edge, n);
+	esc_set_links(&n->esc, links);
+	n->next_wander_ns = n->wander_ppm > 0 ? t_ns + WANDER_STEP_NS : INT64_MAX;
 	if (n->device != NULL) {
 		n->device->esc = &n->esc;
 		n->device->signal = &n->signal;
 		n->device->ops->power_on(n->device, t_ns);
 	}
-	plan(n);
+	segment_plan(n);
 }
 
-/* The first slave hangs on the master, every other one on a free port of one before it. */
-static int is_place_free(const struct segment *seg, unsigned i,
-			 const struct segment_slave_spec *spec)
+static int connect(struct segment *seg, unsigned i, const struct segment_slave_spec *spec)
 {
-	if (i == 0 || spec->parent < 0) {
-		return i == 0 && spec->parent < 0;
+	struct way_link *up = &seg->wiring[i].link[0];
+	struct way_link *down;
+
+	*up = (struct way_link){ .slave = spec->parent,
+				 .port = spec->parent_port,
+				 .wire_ns = spec->wire_ns };
+	if (spec->parent < 0) {
+		/* One slave only is at the master's port. */
+		up->slave = WAY_NOWHERE;
+		up->is_master = 1;
+		up->master = SEGMENT_PRIMARY;
+		seg->first = (int)i;
+		return i == 0 ? 0 : -EINVAL;
 	}
-	return spec->parent < (int)i && spec->parent_port >= 1 && spec->parent_port < ESC_PORTS &&
-	       seg->node[spec->parent].child[spec->parent_port] == NO_CHILD;
+	if (spec->parent >= (int)i || spec->parent_port < 1 || spec->parent_port >= WAY_PORTS) {
+		return -EINVAL;
+	}
+	down = &seg->wiring[spec->parent].link[spec->parent_port];
+	if (down->slave != WAY_NOWHERE) {
+		return -EINVAL;
+	}
+	*down = (struct way_link){ .slave = (int)i, .port = 0, .wire_ns = spec->wire_ns };
+	return 0;
 }
 
 static int add_slave(struct segment *seg, unsigned i, const struct segment_slave_spec *spec)
@@ -278,16 +256,18 @@ static int add_slave(struct segment *seg, unsigned i, const struct segment_slave
 		.device = spec->device,
 		.signal = spec->signal,
 		.ppm = spec->ppm,
+		.wander_ppm = spec->wander_ppm,
 		.clock_start_ns = spec->clock_start_ns,
+		.prng = { .state = spec->seed },
+		.jitter_ns = spec->jitter_ns,
 		.parent = spec->parent,
 		.parent_port = spec->parent_port,
-		.child = { NO_CHILD, NO_CHILD, NO_CHILD, NO_CHILD },
 		.wire_ns = spec->wire_ns,
-		.processing_ns = spec->processing_ns,
-		.forwarding_ns = spec->forwarding_ns,
 		.sii_bytes = spec->sii_bytes,
 	};
-	if (spec->sii_bytes > SEGMENT_SII_BYTES || !is_place_free(seg, i, spec)) {
+	seg->wiring[i].processing_ns = spec->processing_ns;
+	seg->wiring[i].forwarding_ns = spec->forwarding_ns;
+	if (spec->sii_bytes > SEGMENT_SII_BYTES || connect(seg, i, spec) < 0) {
 		return -EINVAL;
 	}
 	n->sii = malloc(spec->sii_bytes > 0 ? spec->sii_bytes : 1);
@@ -295,9 +275,6 @@ static int add_slave(struct segment *seg, unsigned i, const struct segment_slave
 		return -ENOMEM;
 	}
 	memcpy(n->sii, spec->sii, spec->sii_bytes);
-	if (spec->parent >= 0) {
-		seg->node[spec->parent].child[spec->parent_port] = (int)i;
-	}
 	return 0;
 }
 
@@ -310,23 +287,39 @@ static void destroy_devices(const struct segment_slave_spec *slaves, size_t from
 	}
 }
 
+static struct segment *allocate(size_t count)
+{
+	struct segment *seg = calloc(1, sizeof(*seg));
+
+	if (seg == NULL) {
+		return NULL;
+	}
+	seg->node = calloc(count, sizeof(*seg->node));
+	seg->wiring = calloc(count, sizeof(*seg->wiring));
+	if (seg->node == NULL || seg->wiring == NULL) {
+		segment_destroy(seg);
+		return NULL;
+	}
+	for (size_t i = 0; i < count * WAY_PORTS; i++) {
+		seg->wiring[i / WAY_PORTS].link[i % WAY_PORTS].slave = WAY_NOWHERE;
+	}
+	seg->ring_slave = WAY_NOWHERE;
+	return seg;
+}
+
 int segment_create(const struct segment_slave_spec *slaves, size_t count, int64_t t_ns,
 		   struct segment **ret_segment)
 {
 	int is_count_right = count >= 1 && count <= LIMIT_SLAVES;
-	struct segment *seg = calloc(1, sizeof(*seg));
+	struct segment *seg = is_count_right ? allocate(count) : NULL;
 	int r = 0;
 
-	if (seg != NULL && is_count_right) {
-		seg->node = calloc(count, sizeof(*seg->node));
-	}
-	if (seg == NULL || seg->node == NULL) {
-		free(seg);
+	if (seg == NULL) {
 		destroy_devices(slaves, 0, count);
 		return is_count_right ? -ENOMEM : -EINVAL;
 	}
 	seg->now_ns = t_ns;
-	for (unsigned i = 0; i < count && r == 0; i++) {
+	for (unsigned i = 0; r == 0 && i < count; i++) {
 		r = add_slave(seg, i, &slaves[i]);
 		seg->count = i + 1u;
 	}
@@ -336,9 +329,9 @@ int segment_create(const struct segment_slave_spec *slaves, size_t count, int64_
 		return r;
 	}
 	for (size_t i = 0; i < count; i++) {
-		power_on(&seg->node[i], t_ns, seg->node[i].clock_start_ns);
+		segment_start_node(&seg->node[i], t_ns, seg->node[i].clock_start_ns);
 	}
-	lay_way(seg);
+	segment_lay_ways(seg);
 	*ret_segment = seg;
 	return 0;
 }
@@ -357,56 +350,8 @@ void segment_destroy(struct segment *segment)
 		free(n->sii);
 	}
 	free(segment->node);
+	free(segment->wiring);
 	free(segment);
-}
-
-static void lose_link(struct segment *seg, const struct node *n)
-{
-	if (n->parent >= 0) {
-		esc_count_error(&seg->node[n->parent].esc, n->parent_port, ESC_ERROR_LOST_LINK);
-	}
-}
-
-void segment_cut(struct segment *segment, size_t slave, int64_t t_ns)
-{
-	struct node *n = &segment->node[slave];
-
-	segment_advance(segment, t_ns);
-	if (!n->is_cut) {
-		n->is_cut = 1;
-		lose_link(segment, n);
-		esc_count_error(&n->esc, 0, ESC_ERROR_LOST_LINK);
-		lay_way(segment);
-	}
-}
-
-void segment_heal(struct segment *segment, size_t slave, int64_t t_ns)
-{
-	segment_advance(segment, t_ns);
-	segment->node[slave].is_cut = 0;
-	lay_way(segment);
-}
-
-void segment_power_off(struct segment *segment, size_t slave, int64_t t_ns)
-{
-	struct node *n = &segment->node[slave];
-
-	segment_advance(segment, t_ns);
-	if (n->has_power) {
-		n->has_power = 0;
-		n->next_ns = INT64_MAX;
-		lose_link(segment, n);
-		lay_way(segment);
-	}
-}
-
-void segment_power_on(struct segment *segment, size_t slave, int64_t t_ns)
-{
-	segment_advance(segment, t_ns);
-	if (!segment->node[slave].has_power) {
-		power_on(&segment->node[slave], t_ns, 0);
-		lay_way(segment);
-	}
 }
 
 size_t segment_slave_count(const struct segment *segment)
@@ -427,13 +372,4 @@ struct sim_device *segment_device(struct segment *segment, size_t slave)
 int64_t segment_now_ns(const struct segment *segment)
 {
 	return segment->now_ns;
-}
-
-void segment_sync0_to(struct segment *segment,
-		      void (*sink)(void *ctx, unsigned slave, int64_t t_ns,
-				   uint64_t system_time_ns),
-		      void *ctx)
-{
-	segment->sink = sink;
-	segment->sink_ctx = ctx;
 }

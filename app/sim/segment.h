@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A line of slaves on one axis of true time: their ESCs, clocks and applications, the wires between
+ * A segment on one axis of true time: their ESCs, clocks and applications, the wires between
  * them. Nothing here reads a clock or waits: segment_advance() runs everything that is due,
  * segment_frame() sends a frame through. Same calls, same results.
  */
@@ -24,6 +24,9 @@ struct segment_slave_spec {
 	struct sim_device *device; /* taken over; NULL: the ESC alone */
 	struct signal_spec signal;
 	double ppm;              /* of its crystal */
+	double wander_ppm;       /* how far the crystal wanders from that; 0: not */
+	int64_t jitter_ns;       /* its time stamps are off by up to this, either way; 0: exact */
+	uint64_t seed;           /* of wander and jitter */
 	uint64_t clock_start_ns; /* its local time at power-on */
 	int parent;              /* index of the slave towards the master; -1: the master */
 	unsigned parent_port;    /* 1, 2 or 3 of the parent */
@@ -42,18 +45,41 @@ int segment_create(const struct segment_slave_spec *slaves, size_t count, int64_
 		   struct segment **ret_segment);
 void segment_destroy(struct segment *segment);
 
+/** Connect a free port of @slave to the master's second port. 0, or -EINVAL. */
+int segment_close_ring(struct segment *segment, size_t slave, unsigned port, int64_t wire_ns);
+
 /** Run every event up to and including @t_ns, in order. Time never goes back. */
 void segment_advance(struct segment *segment, int64_t t_ns);
 /** True time of the next event of anything; INT64_MAX: none. */
 int64_t segment_next_event_ns(const struct segment *segment);
 
+enum segment_port { SEGMENT_PRIMARY, SEGMENT_SECONDARY, SEGMENT_PORTS };
+
+/* Where and when the start of a frame comes back to the master. */
+struct segment_return {
+	enum segment_port port;
+	int64_t t_ns;
+};
+
 /**
- * A frame whose start leaves the master at @t_ns: changed in place. 0 and the time at which its
- * start is back; -ENOLINK: it does not come back; -EBADMSG: it was no whole EtherCAT frame (slaves
- * destroy it). The segment is advanced to @t_ns first.
+ * A frame whose start leaves the master's port @from at @t_ns, or as soon as the wire is free:
+ * changed in place. 0 with the time at which its start is back, and at which port; -ENOLINK: it
+ * does not come back; -EBADMSG: it was no whole EtherCAT frame (slaves destroy it). The segment is
+ * advanced to @t_ns first; slaves that the frame passes are run until it has passed them.
  */
+int segment_frame_from(struct segment *segment, enum segment_port from, int64_t t_ns,
+		       uint8_t *frame, size_t frame_len, struct segment_return *ret);
+/** The same from the primary port of a segment that is no ring. */
 int segment_frame(struct segment *segment, int64_t t_ns, uint8_t *frame, size_t frame_len,
 		  int64_t *ret_back_ns);
+/**
+ * A frame that is damaged on the wire towards @slave: nobody from there on takes it, each counts
+ * it, and the master's NIC drops it.
+ */
+void segment_damaged_frame(struct segment *segment, int64_t t_ns, size_t slave);
+
+/** 1 if the master's port has a link. */
+int segment_is_up(const struct segment *segment, enum segment_port port);
 
 size_t segment_slave_count(const struct segment *segment);
 struct esc *segment_esc(struct segment *segment, size_t slave);
@@ -75,5 +101,13 @@ void segment_heal(struct segment *segment, size_t slave, int64_t t_ns);
 /** A slave without power passes nothing on. Power-on starts it anew, with its clock at 0. */
 void segment_power_off(struct segment *segment, size_t slave, int64_t t_ns);
 void segment_power_on(struct segment *segment, size_t slave, int64_t t_ns);
+
+/** The same for the cable that closes the ring. */
+void segment_cut_ring(struct segment *segment, int64_t t_ns);
+void segment_heal_ring(struct segment *segment, int64_t t_ns);
+/** The crystal of @slave is @ppm off from now on. */
+void segment_drift(struct segment *segment, size_t slave, double ppm, int64_t t_ns);
+/** Power-on reset of the chip and its application, without a loss of links. */
+void segment_reset(struct segment *segment, size_t slave, int64_t t_ns);
 
 #endif

@@ -52,6 +52,11 @@ void bench_run_to(struct bench *b, int64_t t_ns)
 	CHECK(t_ns >= b->now_ns);
 	b->now_ns = t_ns;
 	segment_advance(b->segment, t_ns);
+	for (unsigned i = 0; i < BENCH_SLAVES; i++) {
+		int64_t copy_ns = fb1111_piccolo_copy_ns(segment_device(b->segment, i));
+
+		b->copy_ns_max[i] = copy_ns > b->copy_ns_max[i] ? copy_ns : b->copy_ns_max[i];
+	}
 }
 
 void bench_run(struct bench *b, int64_t span_ns)
@@ -149,7 +154,9 @@ static void exchange(struct bench *b, unsigned slave, const uint8_t *sdo, uint8_
 	memcpy(box + 6, sdo, 10);
 	CHECK_EQ(bench_write(b, slave, 0x1000, box, sizeof(box)), 1);
 	for (unsigned i = 0; i < 100; i++) {
-		bench_run(b, MS / 10);
+		for (unsigned step = 0; step < 5; step++) {
+			bench_run(b, MS / 50); /* fine enough to see each sample */
+		}
 		if (bench_read(b, slave, 0x1080, answer, 128) == 1) {
 			CHECK_EQ(answer[5] & 15, COE);
 			return;

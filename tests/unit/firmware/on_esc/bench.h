@@ -29,6 +29,7 @@ struct bench {
 	int64_t edge_ns[BENCH_SLAVES];
 	uint64_t edge_system_ns[BENCH_SLAVES];
 	unsigned edges[BENCH_SLAVES];
+	int64_t copy_ns_max[BENCH_SLAVES]; /* longest time from an edge to its sample in SM3 */
 };
 
 void bench_begin(struct bench *b);
