@@ -236,46 +236,37 @@ static int oneshot_time(const struct admin_target *t, const struct admin_request
 				   at_ns - now_ns, margin_ns);
 		return reply->result;
 	}
+	if (at_ns - now_ns > ADMIN_ONESHOT_AHEAD_NS) {
+		admin_reply_refuse(reply, -ERANGE,
+				   "%" PRId64 " s ahead, at most %" PRId64 " s are taken",
+				   (at_ns - now_ns) / NS_PER_S, ADMIN_ONESHOT_AHEAD_NS / NS_PER_S);
+		return reply->result;
+	}
 	*ret_time_ns = at_ns;
 	return 0;
 }
 
-static int place_oneshot(const struct admin_target *t, const struct admin_request *rq,
+static int place_oneshot(const struct admin_target *t, uint16_t slave_pos, int64_t at_ns,
 			 struct placed *ret_placed, struct admin_reply *reply)
 {
-	int channel;
-	int64_t at_ns = 0;
+	int channel = find_oneshot(t, slave_pos);
 	int r;
 
-	if (!has_op(t, reply)) {
-		return reply->result;
-	}
-	if (rq->slave_pos >= t->slave_count) {
-		admin_reply_refuse(reply, -ENODEV, "slave %u: there are %zu slaves", rq->slave_pos,
-				   t->slave_count);
-		return reply->result;
-	}
-	channel = find_oneshot(t, rq->slave_pos);
 	if (channel < 0) {
 		admin_reply_refuse(reply, -EOPNOTSUPP, "%s: has no output " ONESHOT_ENTRY,
-				   t->slaves[rq->slave_pos].name);
+				   t->slaves[slave_pos].name);
 		return reply->result;
 	}
-	if (!is_oneshot(t->cfg, rq->slave_pos)) {
+	if (!is_oneshot(t->cfg, slave_pos)) {
 		admin_reply_refuse(reply, -EOPNOTSUPP,
 				   "%s: is in periodic mode (slaves[%u].mode: oneshot)",
-				   t->slaves[rq->slave_pos].name, rq->slave_pos);
+				   t->slaves[slave_pos].name, slave_pos);
 		return reply->result;
-	}
-	r = oneshot_time(t, rq, &at_ns, reply);
-	if (r < 0) {
-		return r;
 	}
 	r = check_output(t, (size_t)channel, (uint64_t)at_ns, reply);
 	if (r < 0) {
 		return r;
 	}
-	reply->dc_time_ns = at_ns;
 	*ret_placed = (struct placed){
 		.channel = (size_t)channel,
 		.output = output_index(t, (size_t)channel),
@@ -284,17 +275,61 @@ static int place_oneshot(const struct admin_target *t, const struct admin_reques
 	return 0;
 }
 
+/* One slave, or all that have a one-shot output. Returns how many are placed, or the refusal. */
+static int place_oneshots(const struct admin_target *t, const struct admin_request *rq,
+			  struct placed *ret_placed, struct admin_reply *reply)
+{
+	int is_all = rq->slave_pos == ADMIN_ALL_SLAVES;
+	int64_t at_ns = 0;
+	int count = 0;
+
+	if (!has_op(t, reply)) {
+		return reply->result;
+	}
+	if (!is_all && rq->slave_pos >= t->slave_count) {
+		admin_reply_refuse(reply, -ENODEV, "slave %u: there are %zu slaves", rq->slave_pos,
+				   t->slave_count);
+		return reply->result;
+	}
+	for (uint16_t pos = 0; pos < t->slave_count; pos++) {
+		if (is_all ? find_oneshot(t, pos) < 0 : pos != rq->slave_pos) {
+			continue;
+		}
+		/* The time last: what can never be armed is said first. */
+		if (place_oneshot(t, pos, 0, &ret_placed[count], reply) < 0) {
+			return reply->result;
+		}
+		count++;
+	}
+	if (count == 0) {
+		admin_reply_refuse(reply, -EOPNOTSUPP, "no slave has an output " ONESHOT_ENTRY);
+		return reply->result;
+	}
+	if (oneshot_time(t, rq, &at_ns, reply) < 0) {
+		return reply->result;
+	}
+	for (int i = 0; i < count; i++) {
+		ret_placed[i].raw = (uint64_t)at_ns;
+		if (check_output(t, ret_placed[i].channel, (uint64_t)at_ns, reply) < 0) {
+			return reply->result;
+		}
+	}
+	reply->dc_time_ns = at_ns;
+	return count;
+}
+
 static enum admin_outcome run_oneshot(const struct admin_target *t, const struct admin_request *rq,
 				      uint32_t uid, struct admin_reply *reply,
 				      uint64_t *ret_sequence)
 {
-	struct placed placed = { .channel = 0 };
+	struct placed placed[LIMIT_SLAVES];
+	int count = place_oneshots(t, rq, placed, reply);
 
-	if (place_oneshot(t, rq, &placed, reply) < 0) {
+	if (count < 0) {
 		emit(t, EVENT_COMMAND_REFUSED, rq->slave_pos, -1, reply->result, (int32_t)uid);
 		return ADMIN_DONE;
 	}
-	*ret_sequence = put_all(t, &placed, 1);
+	*ret_sequence = put_all(t, placed, (size_t)count);
 	emit(t, EVENT_COMMAND, rq->slave_pos, reply->dc_time_ns, ADMIN_ONESHOT, (int32_t)uid);
 	return ADMIN_DEFERRED;
 }

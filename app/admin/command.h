@@ -11,12 +11,15 @@
 
 #include "admin/protocol.h"
 #include "base/board.h"
+#include "base/clock.h"
 #include "base/event.h"
 #include "base/sample.h"
 #include "config/config.h"
 
 /* A one-shot time must be so many periods ahead: the value travels in the next frames first. */
 enum { ADMIN_ONESHOT_MARGIN_CYCLES = 5 };
+/* Nor further away than this: more likely a slip of the pen than a wish. */
+#define ADMIN_ONESHOT_AHEAD_NS (3600 * NS_PER_S)
 
 /* What the commands work on. All of it belongs to the session; it may change between two requests.
  */

@@ -17,12 +17,16 @@
 enum admin_verb {
 	ADMIN_PING = 1,
 	ADMIN_SET = 2,       /* output channels to raw values: count, item[] */
-	ADMIN_ONESHOT = 3,   /* slave_pos, dc_time_ns (absolute) or relative if is_relative */
+	ADMIN_ONESHOT = 3,   /* slave_pos or ADMIN_ALL_SLAVES, dc_time_ns (absolute) or relative if
+				is_relative */
 	ADMIN_SDO_READ = 4,  /* slave_pos, index, subindex */
 	ADMIN_SDO_WRITE = 5, /* slave_pos, index, subindex, data */
 	ADMIN_STOP = 6,      /* orderly stop of the bus and the daemon */
 	ADMIN_CLEAR = 7,     /* histograms and counters to zero */
 };
+
+/* Every slave with a one-shot output, all in one cycle or none. */
+#define ADMIN_ALL_SLAVES UINT16_C(0xffff)
 
 enum { ADMIN_ITEMS = 64, ADMIN_DATA_BYTES = 1024, ADMIN_TEXT_BYTES = 256 };
 

@@ -66,7 +66,7 @@ static int check_verb(const struct admin_request *rq, char *why)
 		if (rq->is_relative > 1) {
 			return refuse(why, -EINVAL, "is_relative is neither 0 nor 1");
 		}
-		return check_slave(rq, why);
+		return rq->slave_pos == ADMIN_ALL_SLAVES ? 0 : check_slave(rq, why);
 	case ADMIN_SDO_READ:
 		return check_slave(rq, why);
 	case ADMIN_SDO_WRITE:

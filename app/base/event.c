@@ -3,6 +3,7 @@
 
 #include <inttypes.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "status.h"
 
@@ -92,6 +93,29 @@ static const char *command_name(int32_t verb)
 }
 
 /* NOLINTNEXTLINE(readability-function-size): a table, one text an event */
+/* An errno of either sign in words. */
+static const char *reason(int32_t error)
+{
+	const char *text = strerrordesc_np(error < 0 ? -error : error);
+
+	return text != NULL ? text : "unknown reason";
+}
+
+static int format_refusal(const struct event *ev, char *buf, size_t buf_len)
+{
+	char slave[24] = "";
+	char channel[40] = "";
+
+	if (ev->slave_pos != EVENT_NO_SLAVE) {
+		snprintf(slave, sizeof(slave), "slave %u: ", ev->slave_pos);
+	}
+	if (ev->value >= 0) {
+		snprintf(channel, sizeof(channel), " for channel %" PRId64, ev->value);
+	}
+	return snprintf(buf, buf_len, "%scommand of user %" PRId32 "%s refused: %s", slave,
+			ev->arg[1], channel, reason(ev->arg[0]));
+}
+
 int event_format(const struct event *ev, char *buf, size_t buf_len)
 {
 	const int32_t *a = ev->arg;
@@ -161,16 +185,17 @@ int event_format(const struct event *ev, char *buf, size_t buf_len)
 	case EVENT_OUTPUT_FAIL_SAFE:
 		return snprintf(buf, buf_len, "outputs go to fail-safe");
 	case EVENT_COMMAND_REFUSED:
-		return snprintf(buf, buf_len,
-				"command of user %" PRId32 " refused, channel %" PRId64
-				", error %" PRId32,
-				a[1], ev->value, a[0]);
+		return format_refusal(ev, buf, buf_len);
 	case EVENT_COMMAND:
+		if (ev->slave_pos == EVENT_NO_SLAVE) {
+			return snprintf(buf, buf_len, "%s by user %" PRId32, command_name(a[0]),
+					a[1]);
+		}
 		return snprintf(buf, buf_len, "slave %u: %s by user %" PRId32 ", 0x%" PRIx64, slave,
 				command_name(a[0]), a[1], (uint64_t)ev->value);
 	case EVENT_RT_DEGRADED:
-		return snprintf(buf, buf_len, "degraded: no %s, error %" PRId32,
-				event_rt_to_str((uint32_t)a[0]), a[1]);
+		return snprintf(buf, buf_len, "degraded: no %s: %s",
+				event_rt_to_str((uint32_t)a[0]), reason(a[1]));
 	case EVENT_SDO_ABORT:
 		return snprintf(buf, buf_len,
 				"slave %u: SDO 0x%04" PRIx32 ":%02" PRIx32 " abort 0x%08" PRIx64,

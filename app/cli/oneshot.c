@@ -44,6 +44,7 @@ struct oneshot {
 	int is_json;
 	struct shot shot[LIMIT_SLAVES];
 	unsigned count;
+	int is_all; /* "all", not a list of one */
 };
 
 static int find_entry(const struct samples *samples, uint16_t slave_pos, const char *entry)
@@ -90,6 +91,7 @@ static enum cli_exit choose(struct oneshot *one, const char *word)
 		}
 		return result;
 	}
+	one->is_all = 1;
 	for (uint32_t i = 0; i < samples->meta->slave_count; i++) {
 		if (find_entry(samples, (uint16_t)i, ENTRY_TIME) >= 0) {
 			add(one, (uint16_t)i);
@@ -101,24 +103,23 @@ static enum cli_exit choose(struct oneshot *one, const char *word)
 	return CLI_OK;
 }
 
-/* The first slave turns a relative time into an instant; the others get the same instant. */
+/* One request: all of them are armed in the same cycle, or none is. */
 static enum cli_exit arm(struct oneshot *one)
 {
-	for (unsigned i = 0; i < one->count; i++) {
-		int is_relative = !one->has_at && i == 0;
-		struct admin_request request = {
-			.verb = ADMIN_ONESHOT,
-			.slave_pos = one->shot[i].slave_pos,
-			.is_relative = (uint8_t)is_relative,
-			.dc_time_ns = is_relative ? one->in_ns : one->at_ns,
-		};
-		struct admin_reply reply;
-		enum cli_exit result = admin_do(one->cli, &request, &reply);
+	struct admin_request request = {
+		.verb = ADMIN_ONESHOT,
+		.slave_pos = one->is_all ? ADMIN_ALL_SLAVES : one->shot[0].slave_pos,
+		.is_relative = !one->has_at,
+		.dc_time_ns = one->has_at ? one->at_ns : one->in_ns,
+	};
+	struct admin_reply reply;
+	enum cli_exit result = admin_do(one->cli, &request, &reply);
 
-		if (result != CLI_OK) {
-			return result;
-		}
-		one->at_ns = reply.dc_time_ns;
+	if (result != CLI_OK) {
+		return result;
+	}
+	one->at_ns = reply.dc_time_ns;
+	for (unsigned i = 0; i < one->count; i++) {
 		one->shot[i].at_ns = reply.dc_time_ns;
 		one->shot[i].cycle = reply.cycle;
 	}

@@ -123,6 +123,7 @@ static mono_t wake(struct cycle *cy)
 	pf->sleep_until(pf->ctx, cy->deadline);
 	now = pf->now(pf->ctx);
 	change_phase(cy);
+	cy->has_overrun = 0;
 	cy->sample = (struct sample_header){
 		.cycle = cy->numbering.next,
 		.wake_mono_ns = now.ns,

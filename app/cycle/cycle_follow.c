@@ -115,7 +115,7 @@ int64_t cycle_follow(struct cycle *cy, const struct exchange_result *res)
 		if (cy->sample.frame_dc_ns != 0) {
 			histogram_add(&st->phase, servo.error_ns);
 		}
-		if (res->dc_diff_ns > st->dc_diff_max_ns) {
+		if (cy->phase == CYCLE_OP && res->dc_diff_ns > st->dc_diff_max_ns) {
 			SET(st->dc_diff_max_ns, res->dc_diff_ns);
 		}
 	} else {

@@ -39,6 +39,7 @@ struct cycle {
 	enum cycle_phase phase;
 	int has_started;
 	int was_fail_safe;
+	int has_overrun;     /* this step has passed edges */
 	int is_latched_safe; /* overrun policy fail_safe */
 	unsigned lost_in_row;
 	unsigned wkc_low_in_row;

@@ -35,7 +35,14 @@ struct info {
 
 static char *copy_text(const char *text, size_t len)
 {
-	return strndup(text, len);
+	char *copy = malloc(len + 1); /* not strndup(): the text in a record has no zero behind it
+				       */
+
+	if (copy != NULL) {
+		memcpy(copy, text, len);
+		copy[len] = '\0';
+	}
+	return copy;
 }
 
 static struct topic *find_topic(const struct info *in, uint16_t id)

@@ -71,7 +71,11 @@ static void answer_oneshot(struct fake *f, const struct admin_request *rq,
 		refuse(reply, -ETIME, "the time is in the past");
 		return;
 	}
-	f->armed_ns[rq->slave_pos % SLAVES] = at_ns;
+	for (unsigned i = 0; i < SLAVES; i++) {
+		if (rq->slave_pos == ADMIN_ALL_SLAVES || rq->slave_pos % SLAVES == i) {
+			f->armed_ns[i] = at_ns;
+		}
+	}
 	reply->dc_time_ns = at_ns;
 	reply->cycle = f->cycle;
 }

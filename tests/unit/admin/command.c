@@ -206,6 +206,60 @@ TEST(admin, a_one_shot_needs_a_slave_that_can_and_is_in_that_mode)
 	CHECK_EQ(run(&fake, &right, ADMIN_DONE).result, -EAGAIN);
 }
 
+/* Both slaves of the fake with a one-shot output: its LED's channel becomes the first one's. */
+static void make_both_oneshot(struct fake *fake)
+{
+	fake_init(fake);
+	fake->channels[FAKE_LED] = fake->channels[FAKE_ONESHOT];
+	fake->channels[FAKE_LED].slave_pos = 0;
+	snprintf(fake->channels[FAKE_LED].name, sizeof(fake->channels[FAKE_LED].name),
+		 "a.oneshot_time");
+	fake->cfg.slave_count = 2;
+	fake->cfg.slave[0].mode = CONFIG_MODE_ONESHOT;
+}
+
+TEST(admin, a_one_shot_of_all_slaves_is_one_set)
+{
+	struct fake fake;
+	struct admin_request all = oneshot(ADMIN_ALL_SLAVES, 1, 20 * FAKE_PERIOD_NS);
+	struct admin_reply reply;
+
+	make_both_oneshot(&fake);
+	reply = run(&fake, &all, ADMIN_DEFERRED);
+	CHECK_EQ(fake.board.sequence, 2);
+	CHECK_EQ(fake.board.output[OUTPUT_LED].raw, reply.dc_time_ns);
+	CHECK_EQ(fake.board.output[OUTPUT_ONESHOT].raw, reply.dc_time_ns);
+}
+
+TEST(admin, a_one_shot_of_all_slaves_arms_none_if_one_cannot)
+{
+	struct fake fake;
+	struct admin_request all = oneshot(ADMIN_ALL_SLAVES, 1, 20 * FAKE_PERIOD_NS);
+
+	make_both_oneshot(&fake);
+	fake.cfg.slave[1].mode = CONFIG_MODE_PERIODIC;
+	CHECK_STR(run(&fake, &all, ADMIN_DONE).text,
+		  "b: is in periodic mode (slaves[1].mode: oneshot)");
+	CHECK_EQ(fake.board.sequence, 0);
+	fake.channels[FAKE_LED].name[0] = 'x';
+	fake.channels[FAKE_LED].direction = CHANNEL_INPUT;
+	fake.channels[FAKE_ONESHOT].direction = CHANNEL_INPUT;
+	CHECK_EQ(run(&fake, &all, ADMIN_DONE).result, -EOPNOTSUPP);
+	CHECK_EQ(fake.board.sequence, 0);
+}
+
+TEST(admin, a_one_shot_more_than_an_hour_ahead_is_refused)
+{
+	struct fake fake;
+	struct admin_request far = oneshot(1, 1, ADMIN_ONESHOT_AHEAD_NS + FAKE_PERIOD_NS);
+	struct admin_request just = oneshot(1, 1, ADMIN_ONESHOT_AHEAD_NS);
+
+	fake_init(&fake);
+	CHECK_STR(run(&fake, &far, ADMIN_DONE).text, "3600 s ahead, at most 3600 s are taken");
+	CHECK_EQ(fake.board.sequence, 0);
+	CHECK_EQ(run(&fake, &just, ADMIN_DEFERRED).result, 0);
+}
+
 TEST(admin, an_sdo_gives_data_or_its_abort_code)
 {
 	struct fake fake;

@@ -83,3 +83,32 @@ TEST(status, every_state_has_a_name)
 	CHECK_STR(dc_state_to_str(DC_LOCKED), "locked");
 	CHECK_STR(record_state_to_str(RECORD_FAILED), "failed");
 }
+
+TEST(event, an_event_without_a_slave_names_none)
+{
+	for (uint16_t id = EVENT_NONE + 1; id < EVENT_COUNT; id++) {
+		struct event ev = {
+			.id = id, .slave_pos = EVENT_NO_SLAVE, .value = -1, .arg = { -34, 7 }
+		};
+		char text[200];
+
+		event_format(&ev, text, sizeof(text));
+		if (id == EVENT_COMMAND || id == EVENT_COMMAND_REFUSED) {
+			CHECK(strstr(text, "65535") == NULL);
+			CHECK(strstr(text, "slave") == NULL);
+		}
+	}
+}
+
+TEST(event, a_refusal_says_why_in_words)
+{
+	struct event ev = {
+		.id = EVENT_COMMAND_REFUSED, .slave_pos = 2, .value = 5, .arg = { -34, 7 }
+	};
+	char text[200];
+
+	event_format(&ev, text, sizeof(text));
+	CHECK_STR(
+		text,
+		"slave 2: command of user 7 for channel 5 refused: Numerical result out of range");
+}

@@ -497,3 +497,16 @@ TEST(cycle, the_overrun_policy_counts_in_op_only)
 	CHECK_EQ(count_events(EVENT_OUTPUT_FAIL_SAFE), 1);
 	cfg.cycle_overrun = CONFIG_OVERRUN_COUNT;
 }
+
+TEST(cycle, a_stall_found_at_the_wake_and_again_by_the_frame_is_one_overrun)
+{
+	start_in_op();
+	world.late_ns = 2 * PERIOD_NS + 400000;
+	world.transit_ns = 200000;
+	steps(1);
+	world.transit_ns = 20000;
+	CHECK_EQ(stats.overruns, 1);
+	CHECK_EQ(stats.cycles_skipped, 3);
+	steps(3);
+	CHECK_EQ(stats.overruns, 1);
+}
