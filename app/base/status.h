@@ -83,17 +83,17 @@ struct status_page {
 	uint64_t session; /* same as in the ring's meta */
 	uint64_t period_ns;
 	char version[32];
-	char interface[32];               /* NIC name */
-	_Atomic uint64_t text_sequence;   /* [service] odd: message is being written */
-	char message[256];                /* [service] newest trouble, one line; "" for none */
-	_Atomic uint32_t bus_state;       /* [service] enum bus_state */
+	char interface[32];                 /* NIC name */
+	_Atomic uint64_t text_sequence;     /* [service] odd: message is being written */
+	char message[256];                  /* [service] newest trouble, one line; "" for none */
+	_Atomic uint32_t bus_state;         /* [service] enum bus_state */
 	_Atomic uint32_t bus_state_at_stop; /* [service] what it was when the orderly stop began */
-	_Atomic uint32_t slave_count;     /* [service] */
-	_Atomic uint32_t slaves_expected; /* [service] 0: whatever is there */
-	_Atomic uint32_t exit_code;       /* [service] valid in STOPPED and FAILED */
-	_Atomic uint64_t heartbeat;       /* [service] counts up about ten times a second */
-	_Atomic uint32_t rt_degraded;     /* [service] bit per enum event_rt that failed */
-	_Atomic uint32_t cycle_cpu;       /* [service] core of the cycle thread; ~0: not pinned */
+	_Atomic uint32_t slave_count;       /* [service] */
+	_Atomic uint32_t slaves_expected;   /* [service] 0: whatever is there */
+	_Atomic uint32_t exit_code;         /* [service] valid in STOPPED and FAILED */
+	_Atomic uint64_t heartbeat;         /* [service] counts up about ten times a second */
+	_Atomic uint32_t rt_degraded;       /* [service] bit per enum event_rt that failed */
+	_Atomic uint32_t cycle_cpu;         /* [service] core of the cycle thread; ~0: not pinned */
 	struct slave_status slave[LIMIT_SLAVES];
 	struct cycle_stats cycle;
 };

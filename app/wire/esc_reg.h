@@ -73,10 +73,10 @@ enum esc_reg {
 	ESC_REG_DC_ACTIVATION_STATUS = 0x0984,
 	ESC_REG_DC_SYNC0_STATUS = 0x098e,
 	ESC_REG_DC_SYNC1_STATUS = 0x098f,
-	ESC_REG_DC_START_TIME = 0x0990,  /* 8; reads the time of the next SYNC0 */
-	ESC_REG_DC_NEXT_SYNC1 = 0x0998,  /* 8 */
-	ESC_REG_DC_SYNC0_CYCLE = 0x09a0, /* 4; 0: one shot */
-	ESC_REG_DC_SYNC1_CYCLE = 0x09a4, /* 4 */
+	ESC_REG_DC_START_TIME = 0x0990,   /* 8; reads the time of the next SYNC0 */
+	ESC_REG_DC_NEXT_SYNC1 = 0x0998,   /* 8 */
+	ESC_REG_DC_SYNC0_CYCLE = 0x09a0,  /* 4; 0: one shot */
+	ESC_REG_DC_SYNC1_CYCLE = 0x09a4,  /* 4 */
 	ESC_REG_DIGITAL_OUTPUTS = 0x0f00, /* 4; of a chip with a digital PDI */
 	ESC_REG_GENERAL_OUTPUTS = 0x0f10, /* 8; and 8 of inputs behind them */
 	ESC_REG_USER_RAM = 0x0f80,        /* 128 bytes */

@@ -23,7 +23,8 @@ uint8_t sii_checksum(const uint8_t *image)
 	for (size_t i = 0; i < CHECKSUM_BYTES; i++) {
 		crc ^= image[i];
 		for (unsigned bit = 0; bit < 8; bit++) {
-			crc = (uint8_t)(crc & 0x80 ? (unsigned)crc << 1 ^ 0x07 : (unsigned)crc << 1);
+			crc = (uint8_t)(crc & 0x80 ? (unsigned)crc << 1 ^ 0x07
+						   : (unsigned)crc << 1);
 		}
 	}
 	return crc;
@@ -52,8 +53,8 @@ static int next_category(const uint8_t *image, size_t image_bytes, size_t *pos, 
 	return 1;
 }
 
-int sii_find_category(const uint8_t *image, size_t image_bytes, uint16_t wanted,
-		      size_t *ret_offset, size_t *ret_bytes)
+int sii_find_category(const uint8_t *image, size_t image_bytes, uint16_t wanted, size_t *ret_offset,
+		      size_t *ret_bytes)
 {
 	size_t pos = SII_CATEGORIES_BYTE;
 	uint16_t type;
@@ -72,7 +73,7 @@ int sii_find_category(const uint8_t *image, size_t image_bytes, uint16_t wanted,
 }
 
 void sii_text(const uint8_t *image, size_t image_bytes, unsigned number,
-		char ret_text[SII_NAME_BYTES])
+	      char ret_text[SII_NAME_BYTES])
 {
 	size_t offset;
 	size_t bytes;
@@ -119,7 +120,8 @@ static void parse_general(const uint8_t *p, size_t bytes, struct sii *sii)
 
 static void parse_sm(const uint8_t *p, size_t bytes, struct sii *sii)
 {
-	for (; bytes >= SM_BYTES && sii->sm_count < SII_LIMIT_SM; bytes -= SM_BYTES, p += SM_BYTES) {
+	for (; bytes >= SM_BYTES && sii->sm_count < SII_LIMIT_SM;
+	     bytes -= SM_BYTES, p += SM_BYTES) {
 		sii->sm[sii->sm_count++] = (struct sii_sm){
 			.start = get_le16(p),
 			.len = get_le16(p + 2),
@@ -160,7 +162,8 @@ static int parse_pdo(const uint8_t *p, size_t bytes, int is_tx, struct sii *sii)
 		sii->pdo_count++;
 		p += PDO_HEADER_BYTES;
 		bytes -= PDO_HEADER_BYTES;
-		for (size_t i = 0; i < entries; i++, p += PDO_ENTRY_BYTES, bytes -= PDO_ENTRY_BYTES) {
+		for (size_t i = 0; i < entries;
+		     i++, p += PDO_ENTRY_BYTES, bytes -= PDO_ENTRY_BYTES) {
 			sii->entry[sii->entry_count++] = (struct sii_entry){ .index = get_le16(p),
 									     .subindex = p[2],
 									     .name = p[3],
@@ -174,7 +177,8 @@ static int parse_pdo(const uint8_t *p, size_t bytes, int is_tx, struct sii *sii)
 
 static void parse_dc(const uint8_t *p, size_t bytes, struct sii *sii)
 {
-	/* ETG.2010 table 16: SYNC0 cycle (4), shift (4), SYNC1 shift (4), ..., AssignActivate at 14. */
+	/* ETG.2010 table 16: SYNC0 cycle (4), shift (4), SYNC1 shift (4), ..., AssignActivate
+	 * at 14. */
 	for (; bytes >= DC_MODE_BYTES; bytes -= DC_MODE_BYTES, p += DC_MODE_BYTES) {
 		sii->has_dc = 1;
 		if (get_le16(p + 14) != 0 && sii->dc_assign_activate == 0) {

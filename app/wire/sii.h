@@ -57,8 +57,8 @@ struct sii_entry {
 
 struct sii_pdo {
 	uint16_t index;
-	uint8_t sm;        /* 0xff: not assigned by default */
-	uint8_t is_tx;     /* TxPDO: the slave's, inputs of the master */
+	uint8_t sm;    /* 0xff: not assigned by default */
+	uint8_t is_tx; /* TxPDO: the slave's, inputs of the master */
 	uint8_t name;
 	uint16_t first_entry;
 	uint16_t entry_count;
@@ -80,7 +80,7 @@ struct sii {
 	uint16_t mailbox_protocols; /* enum sii_mailbox_protocol */
 	uint32_t size_bytes;
 	uint8_t coe_details;
-	uint8_t group_name;   /* string numbers */
+	uint8_t group_name; /* string numbers */
 	uint8_t order_name;
 	uint8_t device_name;
 	uint8_t has_general;
@@ -98,22 +98,23 @@ struct sii {
 };
 
 /**
- * The first category of kind @wanted. 0 and where its body is; -ENOENT; -EBADMSG: the walk ran into a category
- * past the end of the image.
+ * The first category of kind @wanted. 0 and where its body is; -ENOENT; -EBADMSG: the walk ran into
+ * a category past the end of the image.
  */
-int sii_find_category(const uint8_t *image, size_t image_bytes, uint16_t wanted,
-		      size_t *ret_offset, size_t *ret_bytes);
+int sii_find_category(const uint8_t *image, size_t image_bytes, uint16_t wanted, size_t *ret_offset,
+		      size_t *ret_bytes);
 
 /**
- * Parse an image. 0; -EBADMSG with one line in @error if it is too short, blank, or a category is damaged.
- * On failure @ret holds what stood before the damage.
+ * Parse an image. 0; -EBADMSG with one line in @error if it is too short, blank, or a category is
+ * damaged. On failure @ret holds what stood before the damage.
  */
 int sii_parse(const uint8_t *image, size_t image_bytes, struct sii *ret, char *error,
 	      size_t error_bytes);
 
-/** String @number (1-based) as text, unprintable bytes as '_'; "" for 0 or one that is not there. */
+/** String @number (1-based) as text, unprintable bytes as '_'; "" for 0 or one that is not there.
+ */
 void sii_text(const uint8_t *image, size_t image_bytes, unsigned number,
-		char ret_text[SII_NAME_BYTES]);
+	      char ret_text[SII_NAME_BYTES]);
 
 /** CRC-8 over words 0 to 6, which stands in word 7 (ETG.2010). */
 uint8_t sii_checksum(const uint8_t *image);

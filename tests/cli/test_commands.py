@@ -7,7 +7,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-
 from ecdaq import FAILED, NO_DAEMON, OK, REFUSED, USAGE, Fake, fails, json_of, works
 
 

@@ -13,7 +13,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-
 from ecdaq import NO_DAEMON, OK, Fake, fails, json_lines, json_of, wait_until, works
 
 # What scripts and `build.sh run --json` rely on.

@@ -16,7 +16,6 @@ import time
 from collections.abc import Callable, Iterator
 
 import pytest
-
 from ecdaq import ECDAQ, NO_DAEMON, OK, Fake, environment
 
 ENTER, LEAVE = "\x1b[?1049h", "\x1b[?1049l"

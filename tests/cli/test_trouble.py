@@ -10,7 +10,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-
 from ecdaq import ECDAQ, FAILED, NOBODY, PERMISSION, Fake, ecdaq, fails, json_of, works
 
 READING = [

@@ -6,7 +6,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-
 from ecdaq import NO_DAEMON, OK, ROOT, USAGE, Fake, ecdaq, fails, works
 
 VERBS = {
