@@ -21,6 +21,7 @@ sdk=$cache/sdk/ecdaq-arm64
 	exit 1
 }
 mkdir -p "$cache/mount"
+# shellcheck disable=SC2016  # expanded by the inner shell
 exec unshare --mount --propagation private sh -euc '
 	sdk=$1 folder=$2 scratch=$3
 	shift 3
