@@ -23,6 +23,14 @@ static const char *data_folder(void)
 	return folder == NULL || folder[0] == '\0' ? REPLAY_DEFAULT_DATA : folder;
 }
 
+const char *capture_folder(const char *name)
+{
+	static char path[PATH_BYTES];
+
+	snprintf(path, sizeof(path), "%s/%s", data_folder(), name);
+	return path;
+}
+
 struct bytes capture_load(const char *name)
 {
 	struct bytes b = { .at = NULL };

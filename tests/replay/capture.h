@@ -18,6 +18,9 @@ struct bytes {
  */
 struct bytes capture_load(const char *name);
 
+/** Path of a folder of them, e.g. "sii". Good until the next call. */
+const char *capture_folder(const char *name);
+
 /**
  * What a capture shows of the EEPROM of station @station: every word that the master read, all
  * others 0, the configuration word 0 as APRD/FPRD of 0x0140 gave it at @position, the checksum made

@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: MIT */
+#include "wire/al.h"
+
+#include <ctype.h>
+
+#include "harness/test.h"
+
+TEST(al, states_have_the_fields_names_and_the_error_bit_does_not_matter)
+{
+	CHECK_STR(al_state_to_str(AL_INIT), "INIT");
+	CHECK_STR(al_state_to_str(AL_PREOP | AL_ERROR), "PRE-OP");
+	CHECK_STR(al_state_to_str(AL_BOOT), "BOOT");
+	CHECK_STR(al_state_to_str(AL_SAFEOP | AL_ERROR | AL_ID_REQUEST), "SAFE-OP");
+	CHECK_STR(al_state_to_str(AL_OP), "OP");
+	CHECK_STR(al_state_to_str(0), "none");
+	CHECK_STR(al_state_to_str(AL_INIT | AL_SAFEOP), "none");
+	CHECK_STR(al_state_to_str(0xffff), "none");
+}
+
+TEST(al, codes_that_a_user_meets_say_what_they_mean)
+{
+	CHECK_STR(al_status_code_to_str(AL_CODE_NONE), "no error");
+	CHECK_STR(al_status_code_to_str(AL_CODE_INVALID_MAILBOX_CONFIG),
+		  "invalid mailbox configuration (PRE-OP)");
+	CHECK_STR(al_status_code_to_str(AL_CODE_SM_WATCHDOG), "SyncManager watchdog");
+	CHECK_STR(al_status_code_to_str(AL_CODE_FATAL_SYNC_ERROR), "fatal synchronisation error");
+	CHECK_STR(al_status_code_to_str(AL_CODE_INVALID_DC_SYNC_CONFIG),
+		  "invalid DC SYNC configuration");
+	CHECK_STR(al_status_code_to_str(0x0099), "unknown");
+	CHECK_STR(al_status_code_to_str(0xffff), "unknown");
+}
+
+TEST(al, every_code_of_the_enum_has_a_text_and_every_text_is_printable)
+{
+	static const uint16_t named[] = {
+		AL_CODE_UNSPECIFIED,
+		AL_CODE_NO_MEMORY,
+		AL_CODE_INVALID_DEVICE_SETUP,
+		AL_CODE_INVALID_STATE_CHANGE,
+		AL_CODE_UNKNOWN_STATE,
+		AL_CODE_BOOT_NOT_SUPPORTED,
+		AL_CODE_INVALID_SM_CONFIG,
+		AL_CODE_NO_VALID_INPUTS,
+		AL_CODE_NO_VALID_OUTPUTS,
+		AL_CODE_SYNC_ERROR,
+		AL_CODE_INVALID_SM_TYPES,
+		AL_CODE_INVALID_OUTPUT_CONFIG,
+		AL_CODE_INVALID_INPUT_CONFIG,
+		AL_CODE_INVALID_WATCHDOG_CONFIG,
+		AL_CODE_NO_SYNC_ERROR,
+		AL_CODE_INVALID_DC_LATCH_CONFIG,
+		AL_CODE_PLL_ERROR,
+		AL_CODE_DC_SYNC_TIMEOUT,
+		AL_CODE_DC_INVALID_SYNC_CYCLE,
+		AL_CODE_EEPROM_NO_ACCESS,
+		AL_CODE_EEPROM_ERROR,
+		AL_CODE_RESTARTED_LOCALLY,
+		AL_CODE_INVALID_MAILBOX_CONFIG_BOOT,
+	};
+
+	for (size_t i = 0; i < sizeof(named) / sizeof(named[0]); i++) {
+		CHECK(strcmp(al_status_code_to_str(named[i]), "unknown") != 0);
+	}
+	for (unsigned code = 0; code <= UINT16_MAX; code++) {
+		const char *text = al_status_code_to_str((uint16_t)code);
+
+		CHECK(text[0] != '\0');
+		for (; *text != '\0'; text++) {
+			CHECK(isprint((unsigned char)*text));
+		}
+	}
+}
