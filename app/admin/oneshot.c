@@ -152,7 +152,7 @@ static int place_oneshots(const struct admin_target *t, const struct admin_reque
 enum admin_outcome command_oneshot(const struct admin_target *t, const struct admin_request *rq,
 				   uint32_t uid, struct admin_reply *reply, uint64_t *ret_sequence)
 {
-	struct placed placed[LIMIT_SLAVES];
+	struct placed placed[LIMIT_SLAVES] = { { .channel = 0 } };
 	int count = place_oneshots(t, rq, placed, reply);
 
 	if (count < 0) {

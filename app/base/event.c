@@ -92,7 +92,6 @@ static const char *command_name(int32_t verb)
 									       : "unknown";
 }
 
-/* NOLINTNEXTLINE(readability-function-size): a table, one text an event */
 /* An errno of either sign in words. */
 static const char *reason(int32_t error)
 {
@@ -116,6 +115,7 @@ static int format_refusal(const struct event *ev, char *buf, size_t buf_len)
 			ev->arg[1], channel, reason(ev->arg[0]));
 }
 
+/* NOLINTNEXTLINE(readability-function-size): a table, one text an event */
 int event_format(const struct event *ev, char *buf, size_t buf_len)
 {
 	const int32_t *a = ev->arg;

@@ -49,7 +49,7 @@ static void reset_registers(struct esc *esc)
 	r[ESC_REG_DC_TIME_FILTER] = 4;
 	r[ESC_REG_DC_SPEED_FILTER] = 12;
 	for (unsigned port = 0; port < ESC_PORTS; port++) {
-		put_le32(r + ESC_REG_DC_RECEIVE_TIME_PORT + 4 * port,
+		put_le32(r + ESC_REG_DC_RECEIVE_TIME_PORT + (size_t)4 * port,
 			 f->receive_time_at_power_on[port]);
 	}
 }

@@ -3,7 +3,8 @@
 
 #include <errno.h>
 #include <math.h>
-#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
 #define ADC_FULL_SCALE_V 3.3
 #define ADC_MAX 4095.0
@@ -17,12 +18,12 @@ struct signal_spec signal_default(void)
 double signal_volt(const struct signal_spec *signal, int64_t t_ns)
 {
 	/* Whole seconds apart: at t = years the fraction of a turn needs all digits. */
-	double s = (double)(t_ns / 1000000000);
+	int64_t whole_s = t_ns / 1000000000;
+	double s = (double)whole_s;
 	double ns = (double)(t_ns % 1000000000);
 	double turns = fmod(s * signal->frequency_hz, 1.0) + ns * 1e-9 * signal->frequency_hz;
 
-	return signal->offset_v +
-	       signal->amplitude_v * sin(2.0 * PI * turns + signal->phase_rad);
+	return signal->offset_v + signal->amplitude_v * sin(2.0 * PI * turns + signal->phase_rad);
 }
 
 uint16_t signal_adc(const struct signal_spec *signal, int64_t t_ns)
@@ -32,16 +33,36 @@ uint16_t signal_adc(const struct signal_spec *signal, int64_t t_ns)
 	return (uint16_t)fmin(fmax(counts, 0.0), ADC_MAX);
 }
 
+/* A finite number that ends at a colon or the text's end; moves *text behind it. */
+static int parse_part(const char **text, double *ret)
+{
+	char *end;
+	double value = strtod(*text, &end);
+
+	if (end == *text || !isfinite(value) || (*end != ':' && *end != '\0') ||
+	    (*end == ':' && end[1] == '\0')) {
+		return -EINVAL;
+	}
+	*ret = value;
+	*text = *end == ':' ? end + 1 : end;
+	return 0;
+}
+
 int signal_parse(const char *text, struct signal_spec *ret_signal)
 {
 	struct signal_spec s = signal_default();
 	double phase_deg = 0;
-	int used = 0;
-	int n = sscanf(text, "sine:%lf:%lf:%lf%n:%lf%n", &s.frequency_hz, &s.amplitude_v,
-		       &s.offset_v, &used, &phase_deg, &used);
 
-	if (n < 3 || text[used] != '\0' || !isfinite(s.frequency_hz) || !isfinite(s.amplitude_v) ||
-	    !isfinite(s.offset_v) || !isfinite(phase_deg) || s.frequency_hz < 0) {
+	if (strncmp(text, "sine:", 5) != 0) {
+		return -EINVAL;
+	}
+	text += 5;
+	if (parse_part(&text, &s.frequency_hz) < 0 || parse_part(&text, &s.amplitude_v) < 0 ||
+	    parse_part(&text, &s.offset_v) < 0) {
+		return -EINVAL;
+	}
+	if ((*text != '\0' && parse_part(&text, &phase_deg) < 0) || *text != '\0' ||
+	    s.frequency_hz < 0) {
 		return -EINVAL;
 	}
 	s.phase_rad = phase_deg * PI / 180.0;

@@ -3,6 +3,7 @@
 
 #include <errno.h>
 #include <net/if.h>
+#include <netinet/in.h>
 #include <poll.h>
 #include <stdio.h>
 #include <string.h>
@@ -10,7 +11,6 @@
 #include <time.h>
 #include <unistd.h>
 
-#include <arpa/inet.h>
 #include <linux/if_packet.h>
 
 #include "wire/datagram.h"
@@ -47,7 +47,8 @@ int wire_socket_open(const char *interface, char *error, size_t error_bytes)
 	}
 	if (setsockopt(fd, SOL_PACKET, PACKET_IGNORE_OUTGOING, &one, sizeof(one)) < 0 ||
 	    setsockopt(fd, SOL_PACKET, PACKET_QDISC_BYPASS, &one, sizeof(one)) < 0 ||
-	    setsockopt(fd, SOL_PACKET, PACKET_ADD_MEMBERSHIP, &promiscuous, sizeof(promiscuous)) < 0 ||
+	    setsockopt(fd, SOL_PACKET, PACKET_ADD_MEMBERSHIP, &promiscuous, sizeof(promiscuous)) <
+		    0 ||
 	    bind(fd, (struct sockaddr *)&address, sizeof(address)) < 0) {
 		return fail(fd, error, error_bytes, interface, strerror(errno));
 	}
@@ -79,9 +80,9 @@ int wire_socket_receive(int fd, uint8_t *frame, size_t capacity, int64_t timeout
 		}
 		n = recv(fd, frame, capacity, 0);
 	}
-	*ret_t_ns = wire_socket_now_ns();
 	if (n < 0) {
 		return errno == EAGAIN || errno == EINTR ? 0 : -errno;
 	}
+	*ret_t_ns = wire_socket_now_ns();
 	return (int)n;
 }
