@@ -263,7 +263,7 @@ int esc_ram_read(struct esc *esc, enum esc_side side, uint16_t addr, uint8_t *bu
 		if (sm != NULL) {
 			any |= sm_read(esc, sm, side, at - sm->start, buf + (at - addr), piece);
 		} else {
-			memcpy(buf + (at - addr), esc->ram + at - ESC_REG_PROCESS_RAM, piece);
+			memcpy(buf + (at - addr), esc->ram + (at - ESC_REG_PROCESS_RAM), piece);
 			any = 1;
 		}
 	}
@@ -286,7 +286,7 @@ int esc_ram_write(struct esc *esc, enum esc_side side, int64_t t_ns, uint16_t ad
 		if (sm != NULL) {
 			any |= sm_write(esc, sm, &by, at - sm->start, buf + (at - addr), piece);
 		} else {
-			memcpy(esc->ram + at - ESC_REG_PROCESS_RAM, buf + (at - addr), piece);
+			memcpy(esc->ram + (at - ESC_REG_PROCESS_RAM), buf + (at - addr), piece);
 			any = 1;
 		}
 	}
@@ -299,7 +299,7 @@ const uint8_t *esc_ram_last_written(struct esc *esc, uint16_t addr)
 	const struct esc_sm *sm = sm_at(esc, addr, &piece);
 
 	if (sm == NULL) {
-		return esc->ram + addr - ESC_REG_PROCESS_RAM;
+		return esc->ram + (addr - ESC_REG_PROCESS_RAM);
 	}
 	return esc->ram + buffer_offset(sm, sm->newest) + (addr - sm->start);
 }
