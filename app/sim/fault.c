@@ -132,8 +132,8 @@ static void change_identity(struct esc *esc, uint32_t product)
 	}
 }
 
-static void apply(struct fault_plan *plan, const struct fault *f, struct segment *segment,
-		  int64_t t_ns, size_t frame_len, struct fault_verdict *v)
+static void apply_to_frame(struct fault_plan *plan, const struct fault *f, struct segment *segment,
+			   int64_t t_ns, size_t frame_len, struct fault_verdict *v)
 {
 	switch (f->action) {
 	case FAULT_LOSE:
@@ -145,16 +145,43 @@ static void apply(struct fault_plan *plan, const struct fault *f, struct segment
 	case FAULT_DELAY:
 		v->delay_ns += f->by_ns;
 		break;
+	case FAULT_HOLD:
+		v->is_held = 1;
+		break;
 	case FAULT_DOUBLE:
 		v->is_doubled = 1;
 		break;
 	case FAULT_TRUNCATE:
 		v->truncate_to = 1 + (size_t)prng_below(&plan->prng, frame_len - 1);
 		break;
+	case FAULT_DAMAGE:
+		segment_damaged_frame(segment, t_ns, f->slave);
+		v->is_dropped = 1;
+		break;
 	case FAULT_CORRUPT:
 		v->corrupt_at = 14 + (size_t)prng_below(&plan->prng, frame_len - 14);
 		v->corrupt_xor = (uint8_t)(1 + prng_below(&plan->prng, 255));
 		break;
+	case FAULT_CUT:
+	case FAULT_HEAL:
+	case FAULT_POWER_OFF:
+	case FAULT_POWER_ON:
+	case FAULT_RESET:
+	case FAULT_DRIFT:
+	case FAULT_AL_ERROR:
+	case FAULT_PORT_ERROR:
+	case FAULT_WATCHDOG:
+	case FAULT_MAILBOX_STUCK:
+	case FAULT_IDENTITY:
+		break;
+	}
+}
+
+static void apply_to_slave(const struct fault *f, struct segment *segment, int64_t t_ns)
+{
+	struct esc *esc = segment_esc(segment, f->slave);
+
+	switch (f->action) {
 	case FAULT_CUT:
 		segment_cut(segment, f->slave, t_ns);
 		break;
@@ -167,24 +194,35 @@ static void apply(struct fault_plan *plan, const struct fault *f, struct segment
 	case FAULT_POWER_ON:
 		segment_power_on(segment, f->slave, t_ns);
 		break;
+	case FAULT_RESET:
+		segment_reset(segment, f->slave, t_ns);
+		break;
 	case FAULT_DRIFT:
 		segment_drift(segment, f->slave, f->ppm, t_ns);
 		break;
 	case FAULT_AL_ERROR:
-		al_error(segment_esc(segment, f->slave), f->code);
+		al_error(esc, f->code);
 		break;
 	case FAULT_WATCHDOG:
-		esc_force_watchdog(segment_esc(segment, f->slave));
+		esc_force_watchdog(esc);
 		break;
 	case FAULT_MAILBOX_STUCK:
-		segment_esc(segment, f->slave)->mailbox_stuck_until_ns =
-			f->for_ns > 0 ? t_ns + f->for_ns : INT64_MAX;
+		esc->mailbox_stuck_until_ns = f->for_ns > 0 ? t_ns + f->for_ns : INT64_MAX;
 		break;
 	case FAULT_IDENTITY:
-		change_identity(segment_esc(segment, f->slave), f->product);
+		change_identity(esc, f->product);
 		break;
 	case FAULT_PORT_ERROR:
-		esc_count_error(segment_esc(segment, f->slave), f->port, ESC_ERROR_RX);
+		esc_count_error(esc, f->port, ESC_ERROR_RX);
+		break;
+	case FAULT_LOSE:
+	case FAULT_DROP:
+	case FAULT_DELAY:
+	case FAULT_HOLD:
+	case FAULT_DOUBLE:
+	case FAULT_TRUNCATE:
+	case FAULT_DAMAGE:
+	case FAULT_CORRUPT:
 		break;
 	}
 }
@@ -198,7 +236,8 @@ struct fault_verdict fault_plan_judge(struct fault_plan *plan, struct segment *s
 	segment_advance(segment, t_ns);
 	for (size_t i = 0; i < plan->count; i++) {
 		if (is_due(plan, &plan->fault[i], t_ns)) {
-			apply(plan, &plan->fault[i], segment, t_ns, frame_len, &v);
+			apply_to_frame(plan, &plan->fault[i], segment, t_ns, frame_len, &v);
+			apply_to_slave(&plan->fault[i], segment, t_ns);
 		}
 	}
 	return v;

@@ -6,10 +6,13 @@
  *   WHEN ACTION [KEY=VALUE...]
  *   at=2s lose                         one frame, the first after 2 s
  *   frame=1000 delay by=300us          the 1000th frame
+ *   frame=1000 hold                    it comes back only when the next frame is sent
+ *   at=2s damage slave=1               its check sum is wrong from the wire towards slave 1 on
  *   every=500 double                   each 500th frame
  *   p=0.001 corrupt                    each frame with this probability
  *   at=1s for=200ms lose               all frames of that time
  *   at=3s cut slave=1 / heal slave=1 / power-off slave=0 / power-on slave=0
+ *   at=3s reset slave=1                as if RES was written to 0x0040
  *   at=3s drift slave=1 ppm=80
  *   at=3s al-error slave=1 code=0x001b
  *   at=3s port-error slave=1 port=0
@@ -29,13 +32,16 @@ enum fault_action {
 	FAULT_LOSE,     /* the frame goes through the slaves and is lost on the way back */
 	FAULT_DROP,     /* the frame is lost before the first slave */
 	FAULT_DELAY,    /* it comes back later by @by_ns */
+	FAULT_HOLD,     /* it comes back when the next frame is sent */
 	FAULT_DOUBLE,   /* it comes back twice */
 	FAULT_TRUNCATE, /* it comes back short */
+	FAULT_DAMAGE,   /* nobody from @slave on takes it, and it is lost */
 	FAULT_CORRUPT,  /* one byte of it is changed */
 	FAULT_CUT,
 	FAULT_HEAL,
 	FAULT_POWER_OFF,
 	FAULT_POWER_ON,
+	FAULT_RESET,
 	FAULT_DRIFT,
 	FAULT_AL_ERROR,
 	FAULT_PORT_ERROR,
@@ -67,6 +73,7 @@ struct fault_verdict {
 	int is_dropped; /* before the slaves */
 	int is_lost;    /* behind them */
 	int is_doubled;
+	int is_held; /* until the next frame is sent */
 	int64_t delay_ns;
 	size_t truncate_to; /* 0: not */
 	size_t corrupt_at;  /* 0: not */

@@ -124,6 +124,16 @@ static void put_in_flight(struct in_process *ip, const uint8_t *frame, size_t le
 	/* A wire holds no more: it is lost. */
 }
 
+/* What was held back comes with the next frame. */
+static void release_held(struct in_process *ip)
+{
+	for (unsigned i = 0; i < IN_FLIGHT_MAX; i++) {
+		if (ip->flight[i].is_used && ip->flight[i].arrives.ns == INT64_MAX) {
+			ip->flight[i].arrives = ip->now;
+		}
+	}
+}
+
 static int ip_send(void *ctx, const uint8_t *frame, size_t frame_len)
 {
 	struct in_process *ip = ctx;
@@ -139,6 +149,7 @@ static int ip_send(void *ctx, const uint8_t *frame, size_t frame_len)
 	memcpy(copy, frame, frame_len);
 	ip->sent++;
 	if (ip->spec.faults != NULL) {
+		release_held(ip);
 		v = fault_plan_judge(ip->spec.faults, ip->spec.segment, out_ns, frame_len);
 	}
 	if (v.is_dropped ||
@@ -149,9 +160,9 @@ static int ip_send(void *ctx, const uint8_t *frame, size_t frame_len)
 		copy[v.corrupt_at] ^= v.corrupt_xor;
 	}
 	back_ns += (int64_t)(frame_len + PREAMBLE_AND_GAP_BYTES) * NS_A_BYTE + ip->spec.transmit_ns;
-	arrives = host_time(ip, back_ns + v.delay_ns);
+	arrives = v.is_held ? (mono_t){ INT64_MAX } : host_time(ip, back_ns + v.delay_ns);
 	put_in_flight(ip, copy, v.truncate_to > 0 ? v.truncate_to : frame_len, arrives);
-	if (v.is_doubled) {
+	if (v.is_doubled && !v.is_held) {
 		put_in_flight(ip, copy, frame_len, mono_add(arrives, (span_t){ 10000 }));
 	}
 	return 0;
@@ -208,10 +219,9 @@ static void ip_destroy(void *ctx)
 
 struct platform in_process_platform(struct in_process *ip)
 {
-	return (struct platform){ .now = ip_now,
-				  .tai_ns = ip_tai_ns,
-				  .sleep_until = ip_sleep_until,
-				  .ctx = ip };
+	return (struct platform){
+		.now = ip_now, .tai_ns = ip_tai_ns, .sleep_until = ip_sleep_until, .ctx = ip
+	};
 }
 
 struct transport in_process_transport(struct in_process *ip)

@@ -10,23 +10,22 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "base/clock.h"
-#include "base/prng.h"
-#include "sim/catalogue.h"
 #include "sim/control.h"
-#include "sim/devices/fb1111_piccolo.h"
 #include "sim/fault.h"
+#include "sim/line_up.h"
 #include "sim/options.h"
 #include "sim/segment.h"
 #include "sim/wire_socket.h"
 
 enum {
-	PIECE_BYTES = 96,
-	SII_PATH_BYTES = 1024,
-	CATCH_UP_NS = 1000000,
+	WAKE_MIN_NS = 200000, /* so near to each other events are run together */
+	WAKE_MAX_NS = 10000000,
+	CONTROL_NS = 10000000, /* how often the control socket is looked at */
 	HELD_MAX = 64,
-	FRAME_BYTES = 1600
+	FRAME_BYTES = 1600,
 };
+
+#define HELD_TO_NEXT INT64_MAX
 
 /* A frame that a fault holds back. */
 struct held {
@@ -41,10 +40,10 @@ struct simulation {
 	struct segment *segment;
 	struct fault_plan *faults;
 	struct held held[HELD_MAX];
-	uint8_t *sii[LIMIT_SLAVES];
 	FILE *edges;
 	int fd;
 	int control_fd;
+	int64_t control_ns; /* when it was looked at last */
 	uint64_t frames;
 	uint64_t bad_frames;
 };
@@ -57,130 +56,7 @@ static void on_signal(int number)
 	atomic_store_explicit(&stop_wanted, 1, memory_order_relaxed);
 }
 
-/* --- making the segment --- */
-
-static int read_sii(struct simulation *sim, const char *name, unsigned i, size_t *ret_bytes)
-{
-	char path[SII_PATH_BYTES];
-	char line[SII_PATH_BYTES + 64];
-	FILE *file;
-	int len;
-
-	if (sim->opt.sii_dir == NULL) {
-		snprintf(line, sizeof(line), "slave '%.60s': --sii DIR is missing", name);
-		return sim_complain(line);
-	}
-	len = snprintf(path, sizeof(path), "%s/%s.bin", sim->opt.sii_dir, name);
-	if (len >= (int)sizeof(path)) {
-		return sim_complain("--sii: path too long");
-	}
-	file = fopen(path, "rb");
-	sim->sii[i] = malloc(SEGMENT_SII_BYTES);
-	if (file == NULL || sim->sii[i] == NULL) {
-		snprintf(line, sizeof(line), "%s: %s", path, strerror(errno));
-		if (file != NULL) {
-			fclose(file);
-		}
-		return sim_complain(line);
-	}
-	*ret_bytes = fread(sim->sii[i], 1, SEGMENT_SII_BYTES, file);
-	fclose(file);
-	return 0;
-}
-
-static int make_slave(struct simulation *sim, const char *name, unsigned i,
-		      struct segment_slave_spec *spec)
-{
-	size_t bytes = 0;
-	int r;
-
-	if (strcmp(name, "fb1111_piccolo") == 0) {
-		r = fb1111_piccolo_slave((int)i, spec);
-	} else {
-		r = read_sii(sim, name, i, &bytes);
-		r = r < 0 ? -EIO : catalogue_sii_slave(sim->sii[i], bytes, (int)i, spec);
-	}
-	if (r == 0) {
-		spec->signal = sim->opt.signal;
-	}
-	return r;
-}
-
-static int list_slaves(struct simulation *sim, char names[LIMIT_SLAVES][PIECE_BYTES])
-{
-	const char *text = sim->opt.slaves;
-	char *end;
-	long count = strtol(text, &end, 10);
-	int n = 0;
-
-	if (*end == '\0' && end != text) {
-		if (count < 1 || count > LIMIT_SLAVES) {
-			return sim_complain("--slaves: not 1 to 64");
-		}
-		for (; n < count; n++) {
-			snprintf(names[n], PIECE_BYTES, "fb1111_piccolo");
-		}
-		return n;
-	}
-	while (*text != '\0') {
-		size_t len = strcspn(text, ",");
-
-		if (n == LIMIT_SLAVES || len == 0 || len >= PIECE_BYTES ||
-		    memchr(text, '/', len) != NULL) {
-			return sim_complain(
-				"--slaves: a list of at most 64 names is NAME,NAME,...");
-		}
-		snprintf(names[n++], PIECE_BYTES, "%.*s", (int)len, text);
-		text += len + (text[len] == ',');
-	}
-	return n > 0 ? n : sim_complain("--slaves: nothing given");
-}
-
-static int set_crystals(const struct simulation *sim, struct segment_slave_spec *specs, int count)
-{
-	struct prng prng = { sim->opt.seed };
-	const char *text = sim->opt.ppm;
-
-	for (int i = 0; i < count; i++) {
-		specs[i].ppm = (prng_unit(&prng) - 0.5) * 100.0;
-		specs[i].clock_start_ns = prng_below(&prng, 10 * (uint64_t)NS_PER_S);
-		if (text != NULL && *text != '\0') {
-			char *end;
-
-			specs[i].ppm = strtod(text, &end);
-			if (end == text || (*end != ',' && *end != '\0') || specs[i].ppm < -1000 ||
-			    specs[i].ppm > 1000) {
-				return sim_complain(
-					"--ppm: numbers from -1000 to 1000, with commas");
-			}
-			text = *end == ',' ? end + 1 : end;
-		}
-	}
-	return 0;
-}
-
-static int make_segment(struct simulation *sim)
-{
-	static char names[LIMIT_SLAVES][PIECE_BYTES];
-	static struct segment_slave_spec specs[LIMIT_SLAVES];
-	int count = list_slaves(sim, names);
-
-	if (count < 0) {
-		return -1;
-	}
-	for (int i = 0; i < count; i++) {
-		if (make_slave(sim, names[i], (unsigned)i, &specs[i]) < 0) {
-			return -1;
-		}
-	}
-	if (set_crystals(sim, specs, count) < 0) {
-		return -1;
-	}
-	if (segment_create(specs, (size_t)count, wire_socket_now_ns(), &sim->segment) < 0) {
-		return sim_complain("the segment cannot be made: no memory");
-	}
-	return 0;
-}
+/* --- files and sockets --- */
 
 static void write_edge(void *ctx, unsigned slave, int64_t t_ns, uint64_t system_time_ns)
 {
@@ -256,11 +132,34 @@ static void hold(struct simulation *sim, const uint8_t *frame, size_t len, int64
 	}
 }
 
+static void send_back(struct simulation *sim, const uint8_t *frame, size_t len)
+{
+	/* A master that is gone, or a link that is down, is no fault of ours. */
+	(void)!send(sim->fd, frame, len, 0);
+}
+
+static void release_one(struct simulation *sim, struct held *h)
+{
+	send_back(sim, h->bytes, h->len);
+	h->is_used = 0;
+}
+
+static void release_for_next(struct simulation *sim)
+{
+	for (unsigned i = 0; i < HELD_MAX; i++) {
+		if (sim->held[i].is_used && sim->held[i].due_ns == HELD_TO_NEXT) {
+			release_one(sim, &sim->held[i]);
+		}
+	}
+}
+
 static void answer(struct simulation *sim, uint8_t *frame, size_t len, int64_t t_ns)
 {
-	struct fault_verdict v = fault_plan_judge(sim->faults, sim->segment, t_ns, len);
+	struct fault_verdict v;
 	int64_t back_ns;
 
+	release_for_next(sim);
+	v = fault_plan_judge(sim->faults, sim->segment, t_ns, len);
 	sim->frames++;
 	if (v.is_dropped) {
 		return;
@@ -278,18 +177,18 @@ static void answer(struct simulation *sim, uint8_t *frame, size_t len, int64_t t
 	if (v.truncate_to > 0) {
 		len = v.truncate_to < 14 ? 14 : v.truncate_to;
 	}
-	if (v.delay_ns > 0) {
-		hold(sim, frame, len, t_ns + v.delay_ns);
+	if (v.is_held || v.delay_ns > 0) {
+		hold(sim, frame, len, v.is_held ? HELD_TO_NEXT : t_ns + v.delay_ns);
 		return;
 	}
-	/* A master that is gone, or a link that is down, is no fault of ours. */
-	(void)!send(sim->fd, frame, len, 0);
+	send_back(sim, frame, len);
 	if (v.is_doubled) {
-		(void)!send(sim->fd, frame, len, 0);
+		send_back(sim, frame, len);
 	}
 }
 
-static int64_t release_held(struct simulation *sim, int64_t now_ns)
+/* Send what is due; when is the next? */
+static int64_t release_due(struct simulation *sim, int64_t now_ns)
 {
 	int64_t next_ns = INT64_MAX;
 
@@ -297,13 +196,44 @@ static int64_t release_held(struct simulation *sim, int64_t now_ns)
 		struct held *h = &sim->held[i];
 
 		if (h->is_used && h->due_ns <= now_ns) {
-			(void)!send(sim->fd, h->bytes, h->len, 0);
-			h->is_used = 0;
+			release_one(sim, h);
 		} else if (h->is_used && h->due_ns < next_ns) {
 			next_ns = h->due_ns;
 		}
 	}
 	return next_ns;
+}
+
+static void look_at_control(struct simulation *sim, int64_t now_ns)
+{
+	if (sim->control_fd >= 0 && now_ns - sim->control_ns >= CONTROL_NS) {
+		sim->control_ns = now_ns;
+		control_serve(sim->control_fd, sim->faults, segment_slave_count(sim->segment),
+			      now_ns);
+	}
+}
+
+/*
+ * The slaves live on between the frames, at their own times, so that no frame has to wait until
+ * what has happened since the last one is caught up with.
+ */
+static int64_t live_on(struct simulation *sim)
+{
+	int64_t now_ns = wire_socket_now_ns();
+	int64_t due_ns = release_due(sim, now_ns);
+	int64_t event_ns;
+	int64_t wait_ns;
+
+	look_at_control(sim, now_ns);
+	segment_advance(sim->segment, now_ns);
+	event_ns = segment_next_event_ns(sim->segment);
+	wait_ns = event_ns == INT64_MAX ? WAKE_MAX_NS : event_ns - now_ns;
+	if (wait_ns < WAKE_MIN_NS) {
+		wait_ns = WAKE_MIN_NS;
+	} else if (wait_ns > WAKE_MAX_NS) {
+		wait_ns = WAKE_MAX_NS;
+	}
+	return due_ns - now_ns < wait_ns ? due_ns - now_ns : wait_ns;
 }
 
 static int serve(struct simulation *sim)
@@ -312,27 +242,15 @@ static int serve(struct simulation *sim)
 	char line[256];
 
 	while (!atomic_load_explicit(&stop_wanted, memory_order_relaxed)) {
-		int64_t now_ns = wire_socket_now_ns();
-		int64_t due_ns = release_held(sim, now_ns);
-		int64_t wait_ns = due_ns - now_ns < CATCH_UP_NS ? due_ns - now_ns : CATCH_UP_NS;
 		int64_t t_ns = 0;
-		int n = wire_socket_receive(sim->fd, frame, sizeof(frame), wait_ns, &t_ns);
+		int n = wire_socket_receive(sim->fd, frame, sizeof(frame), live_on(sim), &t_ns);
 
 		if (n > 0) {
 			answer(sim, frame, (size_t)n, t_ns);
-			continue;
-		}
-		if (n < 0 && n != -ENETDOWN) {
+		} else if (n < 0 && n != -ENETDOWN) {
 			snprintf(line, sizeof(line), "interface %s: %s", sim->opt.interface,
 				 strerror(-n));
 			return sim_complain(line);
-		}
-		/* Nobody asks: let the slaves live on meanwhile, so that no frame has to wait for
-		 * them. */
-		segment_advance(sim->segment, wire_socket_now_ns());
-		if (sim->control_fd >= 0) {
-			control_serve(sim->control_fd, sim->faults,
-				      segment_slave_count(sim->segment), wire_socket_now_ns());
 		}
 	}
 	return 0;
@@ -341,7 +259,7 @@ static int serve(struct simulation *sim)
 int main(int argc, char **argv)
 {
 	static struct simulation sim = {
-		.opt = { .slaves = "2", .seed = 1, .cpu = -1 },
+		.opt = { .slaves = "2", .seed = 1, .cpu = -1, .jitter_ns = 10, .wander_ppm = 0.5 },
 		.control_fd = -1,
 	};
 	struct sigaction action = { .sa_handler = on_signal };
@@ -351,7 +269,8 @@ int main(int argc, char **argv)
 	sim_options_read(argc, argv, &sim.opt);
 	sigaction(SIGTERM, &action, NULL);
 	sigaction(SIGINT, &action, NULL);
-	if (make_segment(&sim) < 0 || open_all(&sim) < 0) {
+	if (line_up_create(&sim.opt, wire_socket_now_ns(), &sim.segment) < 0 ||
+	    open_all(&sim) < 0) {
 		return 1;
 	}
 	go_real_time(&sim.opt);
@@ -366,8 +285,5 @@ int main(int argc, char **argv)
 	}
 	segment_destroy(sim.segment);
 	fault_plan_destroy(sim.faults);
-	for (unsigned i = 0; i < LIMIT_SLAVES; i++) {
-		free(sim.sii[i]);
-	}
 	return r < 0 ? 1 : 0;
 }

@@ -1,29 +1,39 @@
 /* SPDX-License-Identifier: MIT */
 #include "sim/options.h"
 
-#include <getopt.h>
+#include <getopt.h> /* IWYU pragma: keep */
 #include <stdio.h>
 #include <stdlib.h>
 
 static const char usage_text[] =
 	"usage: ecdaq-sim --interface NIC [OPTION...]\n"
 	"\n"
-	"A simulated EtherCAT segment on a network interface.\n"
+	"A simulated EtherCAT segment on a network interface. Ends at SIGINT or SIGTERM.\n"
 	"\n"
 	"  --interface NIC    where the master is: a veth, a tap, a real NIC\n"
-	"  --slaves WHAT      1 to 64: so many FB1111+Piccolo slaves (default 2); or names in "
-	"order, of\n"
-	"                     SII images in --sii: ek1100,el2828; fb1111_piccolo is built in\n"
-	"  --sii DIR          folder of SII images NAME.bin\n"
+	"  --slaves WHAT      1 to 64: so many FB1111+Piccolo slaves (default 2); or names, in\n"
+	"                     order, of SII images: ek1100,el2828; fb1111_piccolo is built in\n"
+	"  --sii DIR          folder of the SII images NAME.bin\n"
 	"  --ppm A,B,...      crystals of the slaves, ppm (default: seeded, +-50)\n"
+	"  --wander PPM       crystals wander by so much (default 0.5)\n"
+	"  --jitter NS        time stamps of frames are off by up to this (default 10)\n"
 	"  --signal SPEC      sine:HZ:V:OFFSET_V[:PHASE_DEG] at every ADC (default sine:1:0.5:1)\n"
 	"  --seed N           of everything that is random (default 1)\n"
-	"  --faults FILE      fault plan; times count from the first frame\n"
-	"  --control SOCKET   take fault lines at run time, one a datagram, times from now\n"
+	"  --faults FILE      fault plan, a line a fault; times count from the start\n"
+	"  --control SOCKET   take fault lines at run time, one a datagram, times from then;\n"
+	"                     answered with \"ok\" or why not\n"
 	"  --edges FILE       write every SYNC0 edge: slave, CLOCK_MONOTONIC ns, DC ns\n"
 	"  --priority N       SCHED_FIFO\n"
 	"  --cpu N            run on this core only\n"
 	"  --help, --version\n"
+	"\n"
+	"fault lines: WHEN WHAT [KEY=VALUE...]\n"
+	"  WHEN   at=TIME [for=TIME], frame=N, every=N, p=CHANCE; times as 2s, 300us\n"
+	"  WHAT   to frames: lose, drop, delay by=TIME, hold, double, truncate, corrupt,\n"
+	"         damage slave=N\n"
+	"         to slaves (slave=N): cut, heal, power-off, power-on, reset, drift ppm=X,\n"
+	"         al-error code=X, port-error port=N, watchdog, mailbox-stuck [for=TIME],\n"
+	"         identity product=X\n"
 	"\n"
 	"exit codes: 0 ended by a signal, 1 failed, 2 wrong options\n";
 
@@ -45,6 +55,18 @@ static int number_of(const char *text, const char *what, long low, long high, lo
 		return sim_complain(line);
 	}
 	*ret = v;
+	return 0;
+}
+
+static int take_wander(const char *text, struct sim_options *opt)
+{
+	char *end;
+	double ppm = strtod(text, &end);
+
+	if (end == text || *end != '\0' || !(ppm >= 0 && ppm <= 100)) {
+		return sim_complain("--wander: not 0 to 100 ppm");
+	}
+	opt->wander_ppm = ppm;
 	return 0;
 }
 
@@ -78,6 +100,14 @@ static int take_option(int c, const char *value, struct sim_options *opt)
 		return signal_parse(value, &opt->signal) < 0
 			       ? sim_complain("--signal: not sine:HZ:V:OFFSET_V[:PHASE_DEG]")
 			       : 0;
+	case 'j':
+		if (number_of(value, "--jitter", 0, 10000, &n) < 0) {
+			return -1;
+		}
+		opt->jitter_ns = n;
+		return 0;
+	case 'w':
+		return take_wander(value, opt);
 	case 's':
 		if (number_of(value, "--seed", 0, INT32_MAX, &n) < 0) {
 			return -1;
@@ -108,6 +138,8 @@ void sim_options_read(int argc, char **argv, struct sim_options *opt)
 		{ "slaves", required_argument, NULL, 'n' },
 		{ "sii", required_argument, NULL, 'd' },
 		{ "ppm", required_argument, NULL, 'p' },
+		{ "wander", required_argument, NULL, 'w' },
+		{ "jitter", required_argument, NULL, 'j' },
 		{ "signal", required_argument, NULL, 'g' },
 		{ "seed", required_argument, NULL, 's' },
 		{ "faults", required_argument, NULL, 'f' },

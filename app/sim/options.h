@@ -16,6 +16,8 @@ struct sim_options {
 	const char *control;
 	const char *edges;
 	struct signal_spec signal;
+	double wander_ppm;
+	int64_t jitter_ns;
 	uint64_t seed;
 	int priority;
 	int cpu;

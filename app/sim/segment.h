@@ -63,9 +63,10 @@ struct segment_return {
 
 /**
  * A frame whose start leaves the master's port @from at @t_ns, or as soon as the wire is free:
- * changed in place. 0 with the time at which its start is back, and at which port; -ENOLINK: it
- * does not come back; -EBADMSG: it was no whole EtherCAT frame (slaves destroy it). The segment is
- * advanced to @t_ns first; slaves that the frame passes are run until it has passed them.
+ * changed in place. 0 with when and where its start is back; -ENOLINK: it does not come back;
+ * -EBADMSG: it was no whole EtherCAT frame (slaves destroy it); -ENOBUFS: 5 ms of frames stand
+ * before the wire. The segment is advanced to @t_ns first; slaves are run until the frame has
+ * passed them.
  */
 int segment_frame_from(struct segment *segment, enum segment_port from, int64_t t_ns,
 		       uint8_t *frame, size_t frame_len, struct segment_return *ret);

@@ -10,6 +10,7 @@ enum {
 	NS_A_BYTE = 80, /* 100 Mbit/s */
 	PREAMBLE_BYTES = 8,
 	FCS_AND_GAP_BYTES = 16,
+	QUEUE_NS = 5000000, /* more does not stand in the queue of a NIC */
 };
 
 static int find_datagrams(uint8_t *frame, size_t frame_len, struct ecat_datagram *dg)
@@ -127,6 +128,9 @@ int segment_frame_from(struct segment *segment, enum segment_port from, int64_t 
 	if (count < 0) {
 		count_errors(segment, way, way->slave[0], ESC_ERROR_UNIT);
 		return -EBADMSG;
+	}
+	if (segment->wire_free_ns[from] > t_ns + QUEUE_NS) {
+		return -ENOBUFS;
 	}
 	t_ns = start_of(segment, from, t_ns, frame_len);
 	for (unsigned k = 0; k < way->count; k++) {
