@@ -39,7 +39,8 @@ void control_serve(int fd, struct fault_plan *plan, size_t slave_count, int64_t 
 		socklen_t from_len = sizeof(from);
 		char line[300];
 		char answer[200];
-		ssize_t n = recvfrom(fd, line, sizeof(line) - 1, 0, (struct sockaddr *)&from, &from_len);
+		ssize_t n = recvfrom(fd, line, sizeof(line) - 1, 0, (struct sockaddr *)&from,
+				     &from_len);
 
 		if (n < 0) {
 			return;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A slave's application: what sits on the PDI of an ESC. It lives on the segment's time axis and is called when its
- * time has come; it never waits.
+ * A slave's application: what sits on the PDI of an ESC. It lives on the segment's time axis and is
+ * called when its time has come; it never waits.
  */
 #ifndef SIM_DEVICE_H
 #define SIM_DEVICE_H
@@ -16,7 +16,8 @@ struct sim_device;
 struct sim_device_ops {
 	/** Power came on at @t_ns; the ESC has just been initialised. */
 	void (*power_on)(struct sim_device *dev, int64_t t_ns);
-	/** True time at which run() wants to be called next; INT64_MAX: not before something happens. */
+	/** True time at which run() wants to be called next; INT64_MAX: not before something
+	 * happens. */
 	int64_t (*next_wake_ns)(const struct sim_device *dev);
 	void (*run)(struct sim_device *dev, int64_t t_ns);
 	/** A SYNC0 edge. */
@@ -34,8 +35,9 @@ struct sim_device {
 };
 
 /**
- * The generic slave that is nothing but an SII image: AL states with the checks a real one makes, a CoE
- * server if its SII says CoE, inputs that count. Its ESC has device emulation off. NULL: no memory.
+ * The generic slave that is nothing but an SII image: AL states with the checks a real one makes, a
+ * CoE server if its SII says CoE, inputs that count. Its ESC has device emulation off. NULL: no
+ * memory.
  */
 struct sim_device *sii_device_create(const uint8_t *sii, size_t sii_bytes);
 

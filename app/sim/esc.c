@@ -93,7 +93,8 @@ void esc_set_links(struct esc *esc, uint8_t ports)
 
 	for (unsigned port = 0; port < ESC_PORTS; port++) {
 		unsigned has_link = (unsigned)ports >> port & 1u;
-		/* Bit 0 the loop is closed (without a link by itself), bit 1 there is communication. */
+		/* Bit 0 the loop is closed (without a link by itself), bit 1 there is
+		 * communication. */
 		unsigned loop = has_link && !esc_is_port_closed(esc, port) ? 2 : 1;
 
 		status |= (uint16_t)(has_link << (4 + port));

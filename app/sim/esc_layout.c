@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Which bytes of the register file an ESC has, and which of them the master may write (data sheet). */
+/* Which bytes of the register file an ESC has, and which of them the master may write (data sheet).
+ */
 #include "sim/esc_inside.h"
 
 #include <string.h>
@@ -44,35 +45,23 @@ static const struct range always_readable[] = {
 };
 
 static const struct range always_writable[] = {
-	{ ESC_REG_STATION_ADDRESS, 2 },
-	{ ESC_REG_WRITE_ENABLE, 2 },
-	{ ESC_REG_ESC_WRITE_ENABLE, 2 },
-	{ ESC_REG_RESET_ECAT, 1 },
-	{ ESC_REG_DL_CONTROL, 4 },
-	{ ESC_REG_AL_CONTROL, 2 },
-	{ ESC_REG_ECAT_EVENT_MASK, 2 },
-	{ ESC_REG_RX_ERROR_COUNTER, 14 },
-	{ ESC_REG_LOST_LINK_COUNTER, 4 },
-	{ ESC_REG_WATCHDOG_DIVIDER, 2 },
-	{ ESC_REG_WATCHDOG_TIME_PDI, 2 },
-	{ ESC_REG_WATCHDOG_TIME_PD, 2 },
-	{ ESC_REG_WATCHDOG_COUNTER_PD, 2 },
-	{ ESC_REG_EEPROM_CONFIG, 1 },
-	{ ESC_REG_EEPROM_CONTROL, 14 },
-	{ ESC_REG_MII_CONTROL, 6 },
-	{ ESC_REG_DIGITAL_OUTPUTS, 4 },
-	{ ESC_REG_GENERAL_OUTPUTS, 8 },
+	{ ESC_REG_STATION_ADDRESS, 2 },     { ESC_REG_WRITE_ENABLE, 2 },
+	{ ESC_REG_ESC_WRITE_ENABLE, 2 },    { ESC_REG_RESET_ECAT, 1 },
+	{ ESC_REG_DL_CONTROL, 4 },          { ESC_REG_AL_CONTROL, 2 },
+	{ ESC_REG_ECAT_EVENT_MASK, 2 },     { ESC_REG_RX_ERROR_COUNTER, 14 },
+	{ ESC_REG_LOST_LINK_COUNTER, 4 },   { ESC_REG_WATCHDOG_DIVIDER, 2 },
+	{ ESC_REG_WATCHDOG_TIME_PDI, 2 },   { ESC_REG_WATCHDOG_TIME_PD, 2 },
+	{ ESC_REG_WATCHDOG_COUNTER_PD, 2 }, { ESC_REG_EEPROM_CONFIG, 1 },
+	{ ESC_REG_EEPROM_CONTROL, 14 },     { ESC_REG_MII_CONTROL, 6 },
+	{ ESC_REG_DIGITAL_OUTPUTS, 4 },     { ESC_REG_GENERAL_OUTPUTS, 8 },
 	{ ESC_REG_USER_RAM, 128 },
 };
 
 /* Times are 8 bytes; an ESC with 32 bits has the lower four. */
 static const struct range system_time_readable[] = {
-	{ ESC_REG_DC_SYSTEM_TIME, 8 },
-	{ ESC_REG_DC_RECEIVE_TIME_PU, 8 },
-	{ ESC_REG_DC_SYSTEM_TIME_OFFSET, 8 },
-	{ ESC_REG_DC_SYSTEM_TIME_DELAY, 4 },
-	{ ESC_REG_DC_SYSTEM_TIME_DIFF, 4 },
-	{ ESC_REG_DC_SPEED_COUNTER_START, 6 },
+	{ ESC_REG_DC_SYSTEM_TIME, 8 },        { ESC_REG_DC_RECEIVE_TIME_PU, 8 },
+	{ ESC_REG_DC_SYSTEM_TIME_OFFSET, 8 }, { ESC_REG_DC_SYSTEM_TIME_DELAY, 4 },
+	{ ESC_REG_DC_SYSTEM_TIME_DIFF, 4 },   { ESC_REG_DC_SPEED_COUNTER_START, 6 },
 };
 
 static const struct range system_time_writable[] = {
@@ -95,7 +84,7 @@ static const struct range sync_writable[] = {
 
 /* Where a time has only its lower half. */
 static const struct range upper_halves[] = {
-	{ ESC_REG_DC_SYSTEM_TIME + 4, 4 },  { ESC_REG_DC_RECEIVE_TIME_PU + 4, 4 },
+	{ ESC_REG_DC_SYSTEM_TIME + 4, 4 },        { ESC_REG_DC_RECEIVE_TIME_PU + 4, 4 },
 	{ ESC_REG_DC_SYSTEM_TIME_OFFSET + 4, 4 }, { ESC_REG_DC_START_TIME + 4, 4 },
 	{ ESC_REG_DC_NEXT_SYNC1 + 4, 4 },
 };
@@ -105,7 +94,8 @@ static const struct range upper_halves[] = {
 static void mark(uint8_t *map, const struct range *ranges, size_t count)
 {
 	for (size_t i = 0; i < count; i++) {
-		for (unsigned n = ranges[i].first; n < (unsigned)ranges[i].first + ranges[i].len; n++) {
+		for (unsigned n = ranges[i].first; n < (unsigned)ranges[i].first + ranges[i].len;
+		     n++) {
 			map[n / 8] |= (uint8_t)(1u << (n % 8));
 		}
 	}
@@ -124,7 +114,8 @@ static void mark_units(struct esc *esc, uint16_t first, unsigned unit_bytes, uns
 static void unmark(uint8_t *map, const struct range *ranges, size_t count)
 {
 	for (size_t i = 0; i < count; i++) {
-		for (unsigned n = ranges[i].first; n < (unsigned)ranges[i].first + ranges[i].len; n++) {
+		for (unsigned n = ranges[i].first; n < (unsigned)ranges[i].first + ranges[i].len;
+		     n++) {
 			map[n / 8] &= (uint8_t)~(1u << (n % 8));
 		}
 	}

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A segment as the master's platform and transport, in one process on virtual time: nothing waits, a sleep moves the clock, and
- * the same seed gives the same run. The host's clock runs off true time by its ppm; its wakes are late by a seeded latency.
+ * A segment as the master's platform and transport, in one process on virtual time: nothing waits,
+ * a sleep moves the clock, and the same seed gives the same run. The host's clock runs off true
+ * time by its ppm; its wakes are late by a seeded latency.
  */
 #ifndef SIM_IN_PROCESS_H
 #define SIM_IN_PROCESS_H
@@ -15,15 +16,15 @@
 struct in_process;
 
 struct in_process_spec {
-	struct segment *segment;      /* not taken over */
+	struct segment *segment; /* not taken over */
 	uint64_t seed;
-	double host_ppm;              /* of the host's monotonic clock against true time */
-	int64_t tai_start_ns;         /* CLOCK_TAI when the host's clock is 0 */
-	int64_t wake_sigma_ns;        /* wake latency: |N(0, sigma)| ... */
-	int64_t wake_spike_ns;        /* ... and now and then uniform up to this */
+	double host_ppm;       /* of the host's monotonic clock against true time */
+	int64_t tai_start_ns;  /* CLOCK_TAI when the host's clock is 0 */
+	int64_t wake_sigma_ns; /* wake latency: |N(0, sigma)| ... */
+	int64_t wake_spike_ns; /* ... and now and then uniform up to this */
 	uint32_t spikes_per_million;
-	int64_t transmit_ns;          /* send to the wire, and the wire to receive */
-	struct fault_plan *faults;    /* NULL: none; not taken over */
+	int64_t transmit_ns;       /* send to the wire, and the wire to receive */
+	struct fault_plan *faults; /* NULL: none; not taken over */
 };
 
 int in_process_create(const struct in_process_spec *spec, struct in_process **ret);

@@ -6,12 +6,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/** A packet socket on @interface, type 0x88A4, without own outgoing frames. The fd or -errno with one line in @error. */
+/** A packet socket on @interface, type 0x88A4, without own outgoing frames. The fd or -errno with
+ * one line in @error. */
 int wire_socket_open(const char *interface, char *error, size_t error_bytes);
 
 /**
- * Wait up to @timeout_ns for a frame. Its length, 0 for none, -errno. @ret_t_ns is CLOCK_MONOTONIC at which the kernel
- * took it in, as near as is to be had.
+ * Wait up to @timeout_ns for a frame. Its length, 0 for none, -errno. @ret_t_ns is CLOCK_MONOTONIC
+ * at which the kernel took it in, as near as is to be had.
  */
 int wire_socket_receive(int fd, uint8_t *frame, size_t capacity, int64_t timeout_ns,
 			int64_t *ret_t_ns);
