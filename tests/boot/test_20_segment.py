@@ -19,7 +19,9 @@ def in_operation(machine: Machine) -> bool:
 def test_two_slaves_come_to_op_without_a_hand_on_it(machine: Machine) -> None:
     wait_for("OP", OP_S, lambda: in_operation(machine))
     status = machine.json("ecdaq status --json")
-    assert len(status["slaves"]) == 2
+    assert status["slaves"] == 2
+    assert status["rt_degraded"] == []
+    assert status["cycle_cpu"] == 1
 
 
 def cycle_thread(machine: Machine) -> str:
@@ -66,13 +68,15 @@ def test_its_memory_is_locked(machine: Machine) -> None:
 
 def test_the_cycle_goes_on_and_is_recorded(machine: Machine) -> None:
     before = machine.json("ecdaq status --json")["cycles"]
-    wait_for(
-        "3,000 cycles more",
-        OP_S,
-        lambda: machine.json("ecdaq status --json")["cycles"] > before + 3000,
-    )
-    files = machine.run("sudo find /data/record -name '*.mcap*' -size +4k")
-    assert files.strip()
+    wait_for("3,000 cycles more", OP_S, lambda: cycles(machine) > before + 3000)
+    status = machine.json("ecdaq status --json")
+    assert status["page_faults"] == 0
+    assert status["recorded_gaps"] == 0
+    assert machine.run("sudo find /data/record -name '*.mcap*' -size +4k").strip()
+
+
+def cycles(machine: Machine) -> int:
+    return int(machine.json("ecdaq status --json")["cycles"])
 
 
 def test_a_killed_master_comes_back_by_itself(machine: Machine) -> None:

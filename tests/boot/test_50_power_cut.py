@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The power goes at random moments: the machine boots again by itself every time, and its file
-system is mended by the journal alone."""
+"""The power goes at random moments: the machine boots again by itself, its file system is
+mended by its journal alone, and the recordings open."""
 
 from __future__ import annotations
 
@@ -31,3 +31,10 @@ def test_the_machine_comes_back_after_every_cut(machine: Machine) -> None:
         assert "memory instead of the data partition" not in console, f"cut {cut}"
         assert machine.run("mount | grep -c ' /data '").strip() == "1"
         machine.run("sudo test -s /etc/ssh/ssh_host_ed25519_key")
+        # The recorder mends what the cut left open; then every file is whole, up to its last sync.
+        wait_for("a finished recording", 120, lambda: finished(machine))
+        machine.run("sudo find /data/record -name '*.mcap' -print0 | sudo xargs -0 ecdaq log check")
+
+
+def finished(machine: Machine) -> str:
+    return machine.try_run("sudo find /data/record -name '*.mcap' -size +1k").stdout
