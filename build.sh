@@ -63,7 +63,8 @@ Without GROUP all groups run, the fast ones first:
   sim      the whole master on virtual time; also under ASan+UBSan
   fuzz     every fuzz target: its corpus, then some seconds of search
   live     everything over a veth pair, in real time
-  dds      samples and commands over DDS between two namespaces, in real time
+Only when named:
+  dds      samples and commands over DDS between two namespaces; needs CycloneDDS
 To come: control sync0 recipes boot.
 
   --keep-going      run all groups even if one fails (default)
