@@ -13,7 +13,7 @@ from project import Source, functions
 
 LONG_FUNCTION = "int f(void)\n{\n" + "\tg();\n" * 68 + "}\n"
 SPDX_C = "/* SPDX-License-Identifier: MIT */\n"
-HOST = "https://pypi." + "org/simple"
+HOST = "https://" + "py" + "pi.org/simple"
 PLACE = "/" + "work/main/x"
 
 
