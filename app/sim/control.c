@@ -5,8 +5,19 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
+
+/* A socket that a run before left there goes; anything else of that name stays. */
+static void remove_socket(const char *path)
+{
+	struct stat st;
+
+	if (lstat(path, &st) == 0 && S_ISSOCK(st.st_mode)) {
+		unlink(path);
+	}
+}
 
 int control_open(const char *path, char *error, size_t error_bytes)
 {
@@ -20,7 +31,7 @@ int control_open(const char *path, char *error, size_t error_bytes)
 	}
 	snprintf(address.sun_path, sizeof(address.sun_path), "%s", path);
 	fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-	unlink(path);
+	remove_socket(path);
 	if (fd < 0 || bind(fd, (struct sockaddr *)&address, sizeof(address)) < 0) {
 		r = -errno;
 		snprintf(error, error_bytes, "--control %s: %s", path, strerror(errno));

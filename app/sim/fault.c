@@ -42,10 +42,27 @@ void fault_plan_restart(struct fault_plan *plan, int64_t start_ns)
 	plan->start_ns = start_ns;
 }
 
+/* A fault that cannot happen any more makes room for another. */
+static struct fault *free_slot(struct fault_plan *plan)
+{
+	if (plan->count < FAULTS_MAX) {
+		return &plan->fault[plan->count++];
+	}
+	for (size_t i = 0; i < plan->count; i++) {
+		struct fault *f = &plan->fault[i];
+
+		if (f->is_done || (f->trigger == FAULT_FRAME && f->frame < plan->frames)) {
+			return f;
+		}
+	}
+	return NULL;
+}
+
 int fault_plan_add(struct fault_plan *plan, const char *line, size_t slave_count, char *error,
 		   size_t error_bytes)
 {
 	struct fault f;
+	struct fault *slot;
 	char copy[LINE_BYTES];
 	int r;
 
@@ -57,12 +74,13 @@ int fault_plan_add(struct fault_plan *plan, const char *line, size_t slave_count
 	if (r <= 0) {
 		return r;
 	}
-	if (plan->count == FAULTS_MAX) {
+	slot = free_slot(plan);
+	if (slot == NULL) {
 		snprintf(error, error_bytes, "more than FAULTS_MAX = %d faults", FAULTS_MAX);
 		return -EINVAL;
 	}
 	f.at_ns += plan->start_ns;
-	plan->fault[plan->count++] = f;
+	*slot = f;
 	return 0;
 }
 

@@ -141,3 +141,25 @@ TEST(fault_actions, a_cable_cut_at_the_master_is_no_link)
 	CHECK_EQ(l.wire.is_up(l.wire.ctx), 0);
 	close_line(&l);
 }
+
+TEST(fault_actions, what_has_happened_makes_room_in_a_full_plan)
+{
+	struct line l = open_line();
+	char error[128];
+	uint16_t wkc = 0;
+	int added = 0;
+
+	while (fault_plan_add(l.plan, "at=0s lose", 3, error, sizeof(error)) == 0) {
+		added++;
+	}
+	CHECK(added > 100);
+	CHECK(strstr(error, "FAULTS_MAX") != NULL);
+	send_one(&l, 1); /* all of them */
+	CHECK_EQ(receive_one(&l, &wkc), -1);
+	CHECK_EQ(fault_plan_add(l.plan, "at=0s lose", 3, error, sizeof(error)), 0);
+	send_one(&l, 2);
+	CHECK_EQ(receive_one(&l, &wkc), -1);
+	send_one(&l, 3);
+	CHECK_EQ(receive_one(&l, &wkc), 3);
+	close_line(&l);
+}
