@@ -26,7 +26,7 @@ enum {
 
 static size_t load_sii(const char *name, uint8_t *image, size_t capacity)
 {
-	const char *dir = getenv("ECDAQ_DATA_DIR");
+	const char *dir = getenv("ECDAQ_DATA");
 	char path[512];
 	FILE *file;
 	size_t len;
@@ -35,7 +35,7 @@ static size_t load_sii(const char *name, uint8_t *image, size_t capacity)
 		 dir != NULL ? dir : ECDAQ_SOURCE_DIR "/" DATA_FOLDER, name);
 	file = fopen(path, "rb");
 	if (file == NULL) {
-		SKIP("no SII images: set ECDAQ_DATA_DIR to their folder");
+		SKIP("no SII images: set ECDAQ_DATA to their folder");
 	}
 	len = fread(image, 1, capacity, file);
 	fclose(file);
