@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: MIT
+"""The command line of ecdaq-sim: what goes wrong before there is a segment, one line each."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+from ecdaq import BIN, environment
+
+SEGMENT = BIN / "ecdaq-sim"
+FAILED, USAGE = 1, 2
+# The loopback interface takes a packet socket like any other; no master is needed here.
+NIC = ["--interface", "lo"]
+
+MISTAKES = [
+    (USAGE, [], "--interface is missing"),
+    (FAILED, ["--interface", "nosuchnic"], "nosuchnic: no such interface"),
+    (FAILED, [*NIC, "--slaves", "0"], "not 1 to 64"),
+    (FAILED, [*NIC, "--slaves", "65"], "not 1 to 64"),
+    (FAILED, [*NIC, "--slaves", ""], "nothing given"),
+    (FAILED, [*NIC, "--slaves", "a/b"], "NAME,NAME"),
+    (FAILED, [*NIC, "--slaves", "ek1100"], "--sii DIR is missing"),
+    (FAILED, [*NIC, "--ppm", "1,x"], "--ppm"),
+    (FAILED, [*NIC, "--ppm", "1,2,3"], "more numbers than slaves"),
+    (FAILED, [*NIC, "--ppm", "nan"], "--ppm"),
+    (USAGE, [*NIC, "--jitter", "-1"], "--jitter"),
+    (USAGE, [*NIC, "--wander", "inf"], "--wander"),
+    (USAGE, [*NIC, "--signal", "square"], "--signal"),
+    (USAGE, [*NIC, "--seed", "many"], "--seed"),
+    (USAGE, [*NIC, "--priority", "100"], "--priority"),
+    (FAILED, [*NIC, "--faults", "/nonexistent"], "/nonexistent: No such file"),
+    (USAGE, [*NIC, "word"], "more words than options"),
+]
+
+
+def segment(*words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [SEGMENT, *words],
+        env=environment(None),
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+def one_line(stderr: str) -> str:
+    assert stderr.startswith("ecdaq-sim: "), stderr
+    assert stderr.count("\n") == 1, stderr
+    return stderr
+
+
+@pytest.mark.parametrize(("code", "words", "said"), MISTAKES)
+def test_a_mistake_is_one_line(code: int, words: list[str], said: str) -> None:
+    result = segment(*words)
+    assert result.returncode == code, result.stderr
+    assert said in one_line(result.stderr)
+    assert result.stdout == ""
+
+
+def test_help_names_every_option_and_every_fault() -> None:
+    result = segment("--help")
+    assert result.returncode == 0
+    for option in ("interface", "slaves", "sii", "ppm", "wander", "jitter", "signal", "seed"):
+        assert f"--{option} " in result.stdout
+    for option in ("faults", "control", "edges", "priority", "cpu"):
+        assert f"--{option} " in result.stdout
+    for fault in ("lose", "hold", "damage", "power-off", "mailbox-stuck", "identity"):
+        assert fault in result.stdout
+    assert "exit codes" in result.stdout
+
+
+@pytest.mark.parametrize("length", [0, 127])
+def test_a_file_that_is_no_image_is_refused(tmp_path: Path, length: int) -> None:
+    (tmp_path / "short.bin").write_bytes(b"\0" * length)
+    result = segment(*NIC, "--sii", str(tmp_path), "--slaves", "short")
+    assert result.returncode == FAILED
+    assert f"short.bin: no SII image: {length} bytes" in one_line(result.stderr)
+
+
+def test_an_image_larger_than_any_eeprom_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "big.bin").write_bytes(b"\xff" * 65537)
+    result = segment(*NIC, "--sii", str(tmp_path), "--slaves", "big")
+    assert result.returncode == FAILED
+    assert "big.bin: File too large" in one_line(result.stderr)
+
+
+def test_a_fault_plan_names_the_line_of_its_mistake(tmp_path: Path) -> None:
+    plan = tmp_path / "plan"
+    plan.write_text("# fine\nat=1s lose\nat=2s bogus\n")
+    result = segment(*NIC, "--faults", str(plan))
+    assert result.returncode == FAILED
+    assert f"{plan}:3: " in one_line(result.stderr)
+
+
+def ask(path: Path, here: Path, line: str) -> str:
+    """One fault line to the control socket, and its answer."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as s:
+        s.bind(str(here))
+        s.settimeout(10)
+        s.sendto(line.encode(), str(path))
+        answer = s.recv(300).decode()
+    here.unlink()
+    return answer
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="a packet socket needs CAP_NET_RAW")
+def test_it_takes_faults_while_it_runs_and_ends_with_a_summary(run_dir: Path) -> None:
+    control = run_dir / "control"
+    with subprocess.Popen(
+        [SEGMENT, *NIC, "--control", control], stderr=subprocess.PIPE, text=True
+    ) as running:
+        wait_for(control)
+        assert ask(control, run_dir / "me", "at=1s cut slave=1") == "ok"
+        assert "slave" in ask(control, run_dir / "me", "at=1s cut slave=2")
+        assert "no fault" in ask(control, run_dir / "me", "at=1s bogus")
+        running.send_signal(signal.SIGTERM)
+        _, stderr = running.communicate(timeout=10)
+    assert running.returncode == 0
+    assert one_line(stderr) == "ecdaq-sim: 0 frames, 0 damaged\n"
+    assert not control.exists()
+
+
+def wait_for(path: Path) -> None:
+    until = time.monotonic() + 10
+    while not path.exists():
+        assert time.monotonic() < until, path
+        time.sleep(0.01)
