@@ -43,6 +43,8 @@ def machine(
     files = dict(getattr(request.module, "BOOT_FILES", {}))
     if getattr(request.module, "WITH_KEY", True):
         files["authorized_keys"] = key.with_suffix(".pub").read_text()
+    if getattr(request.module, "IN_GUEST_TIME", False):
+        vm.accelerator = ["-accel", "tcg,thread=single", "-icount", "shift=0,sleep=off"]
     failed_before = request.session.testsfailed
     try:
         vm.lay_boot_files(files)

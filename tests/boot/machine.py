@@ -64,6 +64,8 @@ class Machine:
         self.port = free_port()
         self.process: subprocess.Popen[bytes] | None = None
         self.boots = 0
+        # What the processor emulation is told; see test_20_segment.py for guest time.
+        self.accelerator = ["-accel", "tcg,thread=multi"]
 
     def tool(self, *command: str | Path) -> subprocess.CompletedProcess[str]:
         """A program of the SDK chroot, in the folder of this machine."""
@@ -87,7 +89,7 @@ class Machine:
         log = self.folder / f"console-{self.boots}.log"
         command: list[str | Path] = [QEMU_SH, self.folder, "qemu-system-aarch64"]
         command += ["-M", "virt,gic-version=3", "-cpu", "cortex-a72", "-smp", "2", "-m", "1024"]
-        command += ["-accel", "tcg,thread=multi", "-display", "none", "-no-reboot"]
+        command += [*self.accelerator, "-display", "none", "-no-reboot"]
         command += ["-kernel", "vmlinux", "-append", f"{self.cmdline} {extra}".strip()]
         command += ["-drive", "file=disk.img,if=none,format=raw,id=disk"]
         command += ["-device", "virtio-blk-pci,drive=disk", "-device", "virtio-rng-pci"]

