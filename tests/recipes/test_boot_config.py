@@ -41,7 +41,7 @@ class Place:
             "ECDAQ_ISOLATED": str(base / "isolated"),
             "ECDAQ_DAEMON": str(base / "daemon"),
             "ECDAQ_STANDARD": str(base / "standard.yaml"),
-            "ECDAQ_DATA": str(base),
+            "ECDAQ_RECORD_ROOT": str(base),
             "ECDAQ_HOSTS": str(base / "hosts"),
             "ECDAQ_CONSOLE": str(self.console),
         }
