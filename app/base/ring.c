@@ -13,6 +13,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "pages.h"
+
 #define RING_MAGIC UINT64_C(0x31676e6972716463) /* "cdqring1" */
 #define PAGE_BYTES 4096u
 #define WORD_BYTES sizeof(uint64_t)
@@ -141,6 +143,7 @@ int ring_create(const struct ring_spec *spec, struct ring **ret_ring)
 		return r;
 	}
 	assert(map != NULL);
+	pages_touch(map, header.total_bytes);
 	memcpy(map, &header, sizeof(header));
 	if (spec->meta_bytes > 0) {
 		memcpy((char *)map + header.meta_offset, spec->meta, spec->meta_bytes);

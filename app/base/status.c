@@ -9,6 +9,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "pages.h"
+
 static const char *const bus_names[] = { "DOWN", "SCANNING",   "PREOP",   "SAFEOP",
 					 "OP",   "RECOVERING", "STOPPED", "FAILED" };
 static const char *const dc_names[] = { "off", "acquiring", "locked", "lost" };
@@ -56,6 +58,7 @@ void *status_create(const char *path, uint64_t magic, uint32_t bytes, unsigned f
 	}
 	close(fd);
 	if (r == 0) {
+		pages_touch(map, bytes);
 		memcpy(map, &magic, sizeof(magic));
 		memcpy((char *)map + sizeof(magic), &bytes, sizeof(bytes));
 		r = rename(temporary, path) < 0 ? errno : 0;

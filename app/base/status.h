@@ -124,6 +124,28 @@ struct record_status {
 	_Atomic uint64_t heartbeat;
 };
 
+#define DDS_STATUS_MAGIC UINT64_C(0x3173646473716463) /* "cdqsdds1" */
+
+/* What ecdaq-dds says of itself ("dds-status" in the run directory). [publisher] */
+struct dds_status {
+	uint64_t magic;
+	uint32_t bytes;
+	uint32_t domain;
+	int64_t pid;
+	char interface[32];
+	char tag[64];             /* discovery tag; "" for none */
+	uint32_t is_secure;       /* DDS Security is in use */
+	uint32_t are_commands_on; /* commands are taken at all */
+	_Atomic uint64_t session; /* of the master that is published; 0: none */
+	_Atomic uint64_t published_cycles;
+	_Atomic uint64_t missed_cycles;   /* had left the ring */
+	_Atomic uint64_t failed_messages; /* that DDS did not take */
+	_Atomic uint64_t subscribers;     /* readers of samples and blocks */
+	_Atomic uint64_t commands_accepted;
+	_Atomic uint64_t commands_refused;
+	_Atomic uint64_t heartbeat;
+};
+
 enum record_state {
 	RECORD_WAITING = 0,
 	RECORD_RUNNING,

@@ -21,6 +21,7 @@ enum {
 	DIFF_MAGNITUDE = 0x7fffffff,
 	SETTLE_FRAMES = 500, /* between two looks at 0x092C */
 	GOOD_LOOKS = 2,
+	SILENT_FRAMES_MAX = 8, /* of the burst in a row, each tried as often as any access */
 };
 
 static int is_follower(const struct bus *bus, size_t pos)
@@ -185,18 +186,41 @@ static int set_clocks(struct bus *bus)
 
 /* --- static drift --- */
 
-/* One FRMW a frame: several in one frame measure the same moment and count as one. */
+static int64_t silence_ms(const struct bus *bus)
+{
+	int64_t ns = 0;
+
+	for (unsigned i = 0; i < LINE_TRIES; i++) {
+		ns += line_patience(bus->line, i).ns;
+	}
+	return SILENT_FRAMES_MAX * ns / NS_PER_MS;
+}
+
+/*
+ * One FRMW a frame: several in one frame measure the same moment and count as one. A frame that is
+ * lost costs nothing but itself; only a wire that stays silent ends the burst.
+ */
 static int burst(struct bus *bus, uint32_t frames)
 {
 	struct access access = { .cmd = ECAT_CMD_FRMW,
 				 .adp = bus->slave[bus->reference].info.station_addr,
 				 .reg = ESC_REG_DC_SYSTEM_TIME,
 				 .len = 8 };
+	unsigned silent = 0;
 
 	for (uint32_t i = 0; i < frames; i++) {
 		if (registers_run(bus, &access, 1) < 0) {
-			return bus_fail(bus, -EIO, "no frame comes back during drift compensation");
+			if (++silent < SILENT_FRAMES_MAX) {
+				continue;
+			}
+			return bus_fail(bus, -EIO,
+					"no frame has come back for %" PRId64
+					" ms during drift compensation (bus.frame_timeout is "
+					"%" PRId64 " us)",
+					silence_ms(bus),
+					line_patience(bus->line, 0).ns / NS_PER_US);
 		}
+		silent = 0;
 		if (access.wkc == 0) {
 			return bus_fail_slave(bus, (size_t)bus->reference, -EIO,
 					      "the reference clock does not answer any more");

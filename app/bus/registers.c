@@ -6,10 +6,7 @@
 
 #include "base/bytes.h"
 
-enum { TRIES = 3, LOOK_TRIES = 2, ACCESSES_PER_FRAME = 128 };
-
-/* A late answer to the first try is thrown away, so that later tries wait longer. */
-static const int64_t try_ns[TRIES] = { 2 * NS_PER_MS, 10 * NS_PER_MS, 50 * NS_PER_MS };
+enum { LOOK_TRIES = 2, ACCESSES_PER_FRAME = 128 };
 
 static const uint8_t source[6] = { 0x10, 0x10, 0x10, 0x10, 0x10, 0x10 };
 
@@ -57,21 +54,20 @@ int registers_run(struct bus *bus, struct access *access, size_t count)
 {
 	uint8_t frame[LIMIT_FRAME_BYTES];
 	uint8_t answer[LIMIT_FRAME_BYTES];
-
-	int tries = bus->is_looking ? LOOK_TRIES : TRIES;
+	unsigned tries = bus->is_looking ? LOOK_TRIES : LINE_TRIES;
 
 	while (count > 0) {
 		struct ecat_frame_builder fb;
 		size_t packed = 0;
 		int r = -EMSGSIZE;
 
-		for (int i = 0; i < tries && r < 0; i++) {
+		for (unsigned i = 0; i < tries && r < 0; i++) {
 			packed = pack(&fb, frame, access, count, bus->sequence++);
 			if (packed == 0) {
 				return -EMSGSIZE;
 			}
 			r = line_transact(bus->line, frame, ecat_frame_end(&fb), answer,
-					  sizeof(answer), (span_t){ try_ns[i] });
+					  sizeof(answer), line_patience(bus->line, i));
 		}
 		if (r < 0) {
 			return r;

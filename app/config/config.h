@@ -61,6 +61,7 @@ struct config {
 	char interface[32];
 	int64_t bus_scan_timeout_ns;
 	int64_t bus_op_timeout_ns;
+	int64_t bus_frame_timeout_ns;
 	int64_t bus_watchdog_ns; /* SM watchdog of the slaves; 0 = leave */
 	uint32_t bus_wkc_miss_limit_cycles;
 	uint32_t bus_monitor; /* 1: BRD of AL status and 0x092C in every cycle */
@@ -110,6 +111,8 @@ struct config {
 	uint32_t dds_block_cycles;         /* 0 = no blocks */
 	uint32_t dds_allow_insecure_commands;
 	uint32_t dds_command_rate; /* commands a second and commander */
+	char dds_security[CONFIG_PATH_BYTES]; /* folder of our keys; "" = no DDS Security */
+	uint32_t dds_ros2_mirror;
 	/* lists */
 	struct config_slave slave[LIMIT_SLAVES];
 	size_t slave_count;
@@ -154,6 +157,7 @@ int config_parse_duration(const char *text, int64_t *ret_ns, char *why);
 #define CONFIG_RUN_EVENTS "events"                   /* ring of events */
 #define CONFIG_RUN_STATUS "status"                   /* struct status_page */
 #define CONFIG_RUN_RECORD_STATUS "record-status"     /* struct record_status */
+#define CONFIG_RUN_DDS_STATUS "dds-status"           /* struct dds_status */
 #define CONFIG_RUN_COMMANDS_REMOTE "commands-remote" /* struct board, for ecdaq-dds */
 #define CONFIG_RUN_ADMIN "admin"                     /* socket, admin/protocol.h */
 

@@ -83,6 +83,16 @@ const struct option option_table[] = {
 	  .max = "5min",
 	  .unit = "s",
 	  .prose = "How long all slaves may take for each step from PRE-OP to OP." },
+	{ .name = "bus.frame_timeout",
+	  .type = OPTION_DURATION,
+	  FIELD(bus_frame_timeout_ns),
+	  .standard = "2ms",
+	  .min = "100us",
+	  .max = "100ms",
+	  .unit = "ms",
+	  .prose = "How long a frame of bring-up and service may take to come back; it is sent "
+		   "again, then with 5 and with 25 times as long. The cycle's own frame has "
+		   "cycle.receive. Longer where the wire or the machine is an emulated one." },
 	{ .name = "bus.watchdog",
 	  .type = OPTION_DURATION,
 	  FIELD(bus_watchdog_ns),
@@ -445,6 +455,20 @@ const struct option option_table[] = {
 	  .max = "10000",
 	  .unit = "commands/s",
 	  .prose = "Commands that one commander may send in a second; those above are refused." },
+	{ .name = "dds.security",
+	  .type = OPTION_TEXT,
+	  FIELD(dds_security),
+	  .standard = "",
+	  .unit = "",
+	  .prose = "Folder of this participant's keys (ecdaq security init makes it): DDS Security "
+		   "is used, and commands are taken from commanders that have a key. Empty: none." },
+	{ .name = "dds.ros2_mirror",
+	  .type = OPTION_SWITCH,
+	  FIELD(dds_ros2_mirror),
+	  .standard = "off",
+	  .unit = "",
+	  .prose = "Publish samples for ROS 2 as well: topic /ecdaq/sample, type "
+		   "ecdaq_msgs/msg/Sample." },
 	/* slaves[] */
 	{ .name = "slaves[].name",
 	  .type = OPTION_NAME,

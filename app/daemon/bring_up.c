@@ -40,6 +40,8 @@ static int open_line(struct session *s, struct failure *failure)
 		return failure_set(failure, EXIT_CODE_RESOURCES, r, "line: %s", strerror(-r));
 	}
 	line_bind(s->line);
+	line_patience_set(s->line, (span_t){ s->spec.cfg->bus_frame_timeout_ns });
+	line_attend(s->line, s->spec.hooks.alive, s->spec.hooks.ctx);
 	r = bus_create(s->spec.cfg, s->line, &s->bus);
 	return r < 0 ? failure_set(failure, EXIT_CODE_RESOURCES, r, "bus: %s", strerror(-r)) : 0;
 }

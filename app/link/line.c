@@ -23,6 +23,11 @@ enum ride_state { RIDE_FREE, RIDE_WAITING, RIDE_TAKING, RIDE_OUT, RIDE_ANSWERING
  * period. */
 #define RIDE_PATIENCE_NS (100 * NS_PER_MS)
 
+#define PATIENCE_NS (2 * NS_PER_MS)
+
+/* A late answer to one try is not taken for the next, so that later tries wait longer. */
+static const unsigned char patience_times[LINE_TRIES] = { 1, 5, 25 };
+
 struct frame_buffer {
 	size_t len;
 	uint8_t bytes[LIMIT_FRAME_BYTES];
@@ -32,6 +37,9 @@ struct line {
 	struct platform platform;
 	struct transport transport;
 	struct line_waiter waiter;   /* [service] */
+	span_t patience;             /* [service] */
+	void (*attend)(void *ctx);   /* [service] */
+	void *attend_ctx;            /* [service] */
 	int is_riding;               /* [service] */
 	uint64_t thrown_away;        /* [service] */
 	struct frame_buffer in;      /* [service] direct mode */
@@ -52,6 +60,7 @@ int line_create(struct platform platform, struct transport transport, struct lin
 	}
 	line->platform = platform;
 	line->transport = transport;
+	line->patience = (span_t){ PATIENCE_NS };
 	atomic_init(&line->state, RIDE_FREE);
 	*ret_line = line;
 	return 0;
@@ -84,6 +93,30 @@ const struct transport *line_transport(const struct line *line)
 uint64_t line_thrown_away(const struct line *line)
 {
 	return line->thrown_away;
+}
+
+void line_patience_set(struct line *line, span_t patience)
+{
+	line->patience = patience;
+}
+
+span_t line_patience(const struct line *line, unsigned try)
+{
+	assert(try < LINE_TRIES);
+	return (span_t){ line->patience.ns * patience_times[try] };
+}
+
+void line_attend(struct line *line, void (*attend)(void *ctx), void *ctx)
+{
+	line->attend = attend;
+	line->attend_ctx = ctx;
+}
+
+static void get_on(const struct line *line)
+{
+	if (line->attend != NULL) {
+		line->attend(line->attend_ctx);
+	}
 }
 
 void line_bind(struct line *line)
@@ -191,6 +224,7 @@ int line_transact(struct line *line, const uint8_t *frame, size_t frame_len, uin
 	if (frame_len > LIMIT_FRAME_BYTES || !ecat_frame_is_valid(frame, frame_len)) {
 		return -EINVAL;
 	}
+	get_on(line);
 	if (line->is_riding) {
 		return transact_riding(line, frame, frame_len, ret_answer, capacity, timeout);
 	}
@@ -201,6 +235,7 @@ void line_sleep(struct line *line, span_t span)
 {
 	mono_t until = mono_add(now(line), span);
 
+	get_on(line);
 	if (!line->is_riding) {
 		line->platform.sleep_until(line->platform.ctx, until);
 		return;

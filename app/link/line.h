@@ -29,6 +29,8 @@ struct line_waiter {
 	void *ctx;
 };
 
+enum { LINE_TRIES = 3 };
+
 /** Takes over @transport (destroyed with the line). Free with line_destroy(). */
 int line_create(struct platform platform, struct transport transport, struct line **ret_line);
 void line_destroy(struct line *line);
@@ -51,6 +53,17 @@ struct line *line_bound(void);
  */
 int line_transact(struct line *line, const uint8_t *frame, size_t frame_len, uint8_t *ret_answer,
 		  size_t capacity, span_t timeout);
+
+/**
+ * How long the first try of a frame waits for its echo; what repeats a frame waits 5 and then 25
+ * times as long. 2 ms unless set.
+ */
+void line_patience_set(struct line *line, span_t patience);
+/** For try 0 to LINE_TRIES - 1. */
+span_t line_patience(const struct line *line, unsigned try);
+
+/** @attend is called whenever this thread sends or waits: a sign that it gets on. NULL: nobody. */
+void line_attend(struct line *line, void (*attend)(void *ctx), void *ctx);
 
 /** Frames that line_transact() met and threw away in direct mode. */
 uint64_t line_thrown_away(const struct line *line);

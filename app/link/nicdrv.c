@@ -20,12 +20,8 @@ const uint16 secMAC[3] = { 0x1010, 0x1010, 0x1014 };
 enum {
 	FIRST_DATAGRAM = ECAT_ETHERNET_BYTES + ECAT_FRAME_HEADER_BYTES,
 	LENGTH_MASK = 0x07ff,
-	TRIES = 3,
 	MAILBOX_US = 50000,
 };
-
-/* A late answer to one try is not taken for the next, so that later tries wait longer. */
-static const int try_us[TRIES] = { EC_TIMEOUTRET, 5 * EC_TIMEOUTRET, 25 * EC_TIMEOUTRET };
 
 static void write_ethernet_header(uint8_t *frame)
 {
@@ -142,9 +138,9 @@ int ecx_srconfirm(ecx_portt *port, uint8 idx, int timeout)
 	if (!may_be_repeated(port->txbuf[idx])) {
 		return transact(port, idx, whole_us * NS_PER_US);
 	}
-	for (int i = 0; i < TRIES && wkc < 0; i++) {
+	for (unsigned i = 0; i < LINE_TRIES && port->line != NULL && wkc < 0; i++) {
 		port->retries += i > 0;
-		wkc = transact(port, idx, (int64_t)try_us[i] * NS_PER_US);
+		wkc = transact(port, idx, line_patience(port->line, i).ns);
 	}
 	return wkc;
 }

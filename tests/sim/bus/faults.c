@@ -212,3 +212,36 @@ TEST(faults, slave_that_refuses_is_named_with_code_and_text)
 		  "invalid DC SYNC configuration");
 	bench_destroy(b);
 }
+
+static int clocks_with(const char *fault, char *ret_error)
+{
+	static const char *const settings[] = { "dc.burst_frames=2000", NULL };
+	struct bus_bench *b = bench_create(
+		&(struct bench_spec){ .piccolos = 2, .seed = 31, .settings = settings });
+	int r;
+
+	CHECK_EQ(bench_find(b), 0);
+	CHECK_EQ(bus_map(b->bus, b->error), 0);
+	bench_fault(b, fault);
+	r = bus_dc_setup(b->bus, b->error);
+	memcpy(ret_error, b->error, BUS_ERROR_BYTES);
+	bench_destroy(b);
+	return r;
+}
+
+TEST(faults, drift_burst_goes_on_over_a_wire_that_is_silent_for_a_while)
+{
+	char error[BUS_ERROR_BYTES];
+
+	/* Longer than all three tries of one frame take together. */
+	CHECK_EQ(clocks_with("at=5ms for=200ms lose", error), 0);
+}
+
+TEST(faults, drift_burst_on_a_dead_wire_ends_and_says_for_how_long_nothing_came)
+{
+	char error[BUS_ERROR_BYTES];
+
+	CHECK_EQ(clocks_with("at=5ms for=60s lose", error), -EIO);
+	CHECK(strstr(error, "no frame has come back for 496 ms during drift compensation") != NULL);
+	CHECK(strstr(error, "bus.frame_timeout is 2000 us") != NULL);
+}

@@ -346,3 +346,42 @@ TEST(line, handover_between_two_threads_never_mixes_frames)
 	CHECK(answered > 0);
 	line_destroy(st.line);
 }
+
+TEST(line, each_try_waits_longer_than_the_one_before)
+{
+	struct fake_wire wire = { 0 };
+	struct line *line = line_on(&wire);
+
+	CHECK_EQ(line_patience(line, 0).ns, 2 * NS_PER_MS);
+	line_patience_set(line, (span_t){ 20 * NS_PER_MS });
+	CHECK_EQ(line_patience(line, 0).ns, 20 * NS_PER_MS);
+	CHECK_EQ(line_patience(line, 1).ns, 100 * NS_PER_MS);
+	CHECK_EQ(line_patience(line, LINE_TRIES - 1).ns, 500 * NS_PER_MS);
+	line_destroy(line);
+}
+
+static void count_call(void *ctx)
+{
+	(*(unsigned *)ctx)++;
+}
+
+TEST(line, who_attends_hears_of_every_frame_and_every_pause_even_on_a_dead_wire)
+{
+	struct fake_wire wire = { .drop = 1 };
+	struct line *line = line_on(&wire);
+	uint8_t frame[LIMIT_FRAME_BYTES];
+	uint8_t answer[LIMIT_FRAME_BYTES];
+	size_t len = make_frame(frame, ECAT_CMD_BRD, 0, 0, 0);
+	unsigned calls = 0;
+
+	line_attend(line, count_call, &calls);
+	CHECK_EQ(line_transact(line, frame, len, answer, sizeof(answer), (span_t){ NS_PER_MS }),
+		 -ETIMEDOUT);
+	CHECK_EQ(calls, 1);
+	line_sleep(line, (span_t){ NS_PER_MS });
+	CHECK_EQ(calls, 2);
+	line_attend(line, NULL, NULL);
+	line_sleep(line, (span_t){ NS_PER_MS });
+	CHECK_EQ(calls, 2);
+	line_destroy(line);
+}

@@ -142,3 +142,20 @@ TEST(osal, timers_and_sleep_run_on_the_lines_clock)
 	CHECK_EQ(osal_current_time().sec, DC_EPOCH_UNIX_S);
 	nic_destroy(nic);
 }
+
+TEST(nicdrv, a_slow_wire_is_waited_for_as_long_as_the_line_says)
+{
+	struct nic *nic = nic_create();
+	uint16 value = 0;
+
+	line_patience_set(nic->line, (span_t){ 20 * NS_PER_MS });
+	nic->wire.travel_ns = 15 * NS_PER_MS;
+	CHECK_EQ(ecx_FPRD(&nic->port, 0x1001, ESC_REG_AL_STATUS, 2, &value, EC_TIMEOUTRET), 1);
+	CHECK_EQ(nic->port.retries, 0);
+	nic->wire.drop = 3;
+	nic->wire.now_ns = 0;
+	CHECK_EQ(ecx_FPRD(&nic->port, 0x1001, ESC_REG_AL_STATUS, 2, &value, EC_TIMEOUTRET),
+		 EC_NOFRAME);
+	CHECK_EQ(nic->wire.now_ns, (20 + 100 + 500) * NS_PER_MS);
+	nic_destroy(nic);
+}
