@@ -19,8 +19,8 @@ usage: ./build.sh VERB [OPTION...]
   fuzz     search for inputs that break a parser
   lint     formatting, static analysis, shell and Python checks
   clean    remove what was built
-  image    the SBC image (comes later)
-  boot     the image in QEMU (comes later)
+  image    the disk image of the SBC, or of the machine that QEMU plays
+  boot     that image in QEMU
   help     this, or ./build.sh help VERB for its options
 
 What is missing on Debian 12 or 13 is installed (as root or with sudo); elsewhere it is named.
@@ -62,10 +62,12 @@ Without GROUP all groups run, the fast ones first:
   replay   captures of real buses against the simulated segment
   sim      the whole master on virtual time; also under ASan+UBSan
   fuzz     every fuzz target: its corpus, then some seconds of search
+  recipes  the image's recipes and layers, parsed by BitBake, held against their rules
   live     everything over a veth pair, in real time
 Only when named:
+  boot     the image in QEMU; needs root and ./build.sh image
   dds      samples and commands over DDS between two namespaces; needs CycloneDDS
-To come: control sync0 recipes boot.
+To come: control sync0.
 
   --keep-going      run all groups even if one fails (default)
   --fail-fast       stop behind the first suite with a failure
@@ -130,12 +132,12 @@ USAGE
 
 help_image()
 {
-	echo 'usage: ./build.sh image    (comes with the image issue)'
+	"$root/app/tools/image/build-image.sh" --help
 }
 
 help_boot()
 {
-	echo 'usage: ./build.sh boot    (comes with the image issue)'
+	"$root/app/tools/image/boot.sh" --help
 }
 
 help_help()
@@ -215,10 +217,21 @@ do_clean()
 	esac
 }
 
-not_yet()
+# BitBake's library has an environment of its own: it needs Python, but none of the tests' packages.
+do_image()
 {
-	printf 'build.sh: %s: comes with the image issue\n' "$1" >&2
-	exit 2
+	"$root/app/tools/image/build-image.sh" --check "$@"
+	need_packages image
+	PYTHON=$(find_python) || die "no Python 3.11 or newer with venv and ensurepip"
+	export PYTHON
+	exec "$root/app/tools/image/build-image.sh" "$@"
+}
+
+do_boot()
+{
+	"$root/app/tools/image/boot.sh" --check "$@"
+	need_packages image
+	exec "$root/app/tools/image/boot.sh" "$@"
 }
 
 verb=${1:-help}
@@ -231,9 +244,6 @@ build | test | run | sim | fuzz | lint | clean | image | boot)
 			exit 0
 		fi
 	done
-	case $verb in
-	image | boot) not_yet "$verb" ;;
-	esac
 	"do_$verb" "$@"
 	;;
 help | --help | -h)

@@ -37,6 +37,7 @@ is_present()
 	cmd:*) command -v "${1#cmd:}" > /dev/null 2>&1 ;;
 	hdr:*) printf '#include <%s>\n' "${1#hdr:}" | gcc -E - > /dev/null 2>&1 ;;
 	pymod:*) find_python > /dev/null ;;
+	file:*) [ -e "${1#file:}" ] ;;
 	fuzzer)
 		printf 'int LLVMFuzzerTestOneInput(const char *d, unsigned long n) { return !d || !n; }\n' |
 			clang -x c -fsanitize=fuzzer -o /dev/null - > /dev/null 2>&1
@@ -48,10 +49,15 @@ is_present()
 # Lines "PACKAGE WHY" of what is missing for the purposes given.
 missing_packages()
 {
-	grep -v '^#' "$root/app/tools/packages.txt" | while read -r package purpose check why; do
-		case " $* " in
-		*" $purpose "*) is_present "$check" || printf '%s\t%s\n' "$package" "$why" ;;
-		esac
+	grep -v '^#' "$root/app/tools/packages.txt" | while read -r package purposes check why; do
+		for purpose in "$@"; do
+			case ,$purposes, in
+			*,"$purpose",*)
+				is_present "$check" || printf '%s\t%s\n' "$package" "$why"
+				break
+				;;
+			esac
+		done
 	done
 }
 

@@ -35,9 +35,11 @@ fresh=no
 port=2222
 key=
 timing='-accel tcg,thread=multi'
+check=no
 while [ $# -gt 0 ]; do
 	case $1 in
 	--fresh) fresh=yes ;;
+	--check) check=yes ;; # build.sh: are the options good?
 	--icount) timing='-accel tcg,thread=single -icount shift=0,sleep=off' ;;
 	--ssh-port | --key)
 		[ $# -ge 2 ] || die "$1 needs a value"
@@ -62,6 +64,7 @@ done
 case $port in
 '' | *[!0-9]*) die "--ssh-port: '$port' is no port" ;;
 esac
+[ "$check" = no ] || exit 0
 
 image=$root/build/image/qemuarm64
 name=ecdaq-image-ecdaq-qemuarm64

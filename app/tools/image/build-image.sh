@@ -17,7 +17,8 @@ programs, from the recipes in recipes/ and layers/. Needs Debian 12 or 13 on x86
 chroots, and runs arm64 programs through the kernel's binfmt_misc). What is done is kept, by the hash
 of all that went in: a second run only does what changed.
 
-  --machine MACHINE  qemuarm64 (default): QEMU's virt machine, the segment simulated inside
+  --machine MACHINE  qemuarm64 (default): QEMU's virt machine, the segment simulated inside;
+                     raspberrypi4-64: Raspberry Pi 4 Model B and Compute Module 4
   --recipe RECIPE    one recipe instead of the whole image: linux-ecdaq, soem, ecdaq, ecdaq-config
   --jobs N           tasks at the same time (default: as many as there are cores)
   --plan             say what would be done, and the hash of each task, and end
@@ -42,6 +43,7 @@ machine=qemuarm64
 recipe=ecdaq-image
 jobs=$(nproc)
 plan=
+check=no
 while [ $# -gt 0 ]; do
 	case $1 in
 	--machine | --recipe | --jobs)
@@ -54,6 +56,7 @@ while [ $# -gt 0 ]; do
 		shift
 		;;
 	--plan) plan=--dry-run ;;
+	--check) check=yes ;; # build.sh: are the options good?
 	--help | -h)
 		usage
 		exit 0
@@ -69,6 +72,8 @@ done
 case $jobs in
 '' | *[!0-9]* | 0) die "--jobs: '$jobs' is no number of tasks" ;;
 esac
+
+[ "$check" = no ] || exit 0
 
 # pip's own environment for BitBake's library, one for each content of requirements.txt.
 need_bitbake()
