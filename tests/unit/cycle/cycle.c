@@ -510,3 +510,43 @@ TEST(cycle, a_stall_found_at_the_wake_and_again_by_the_frame_is_one_overrun)
 	steps(3);
 	CHECK_EQ(stats.overruns, 1);
 }
+
+TEST(cycle, a_number_behind_the_edges_is_set_right_once_and_the_deadline_stays)
+{
+	uint64_t cycle;
+
+	start_in_op();
+	steps(1);
+	cycle = next_sample().h.cycle;
+	world.dc_offset_ns += PERIOD_NS; /* one edge on, in the same phase: this master was not late
+					  */
+	steps(50);
+	CHECK_EQ(stats.overruns, 1);
+	CHECK_EQ(stats.cycles_skipped, 1);
+	for (unsigned i = 1; i <= 51; i++) {
+		struct got s = next_sample();
+
+		CHECK_EQ(s.h.cycle, cycle + i);
+		CHECK_EQ((s.h.flags & SAMPLE_SKIPPED) != 0, i == 1);
+		CHECK_EQ(s.h.slaves_bad, i == 1 ? 3 : 0);
+	}
+	CHECK_EQ(stats.samples_bad, 2);
+}
+
+TEST(cycle, a_number_behind_by_three_edges_and_a_wake_late_by_two_are_set_right_together)
+{
+	int64_t step_ns;
+	uint64_t skipped;
+
+	start_in_op();
+	world.dc_offset_ns += 3 * PERIOD_NS;
+	world.late_ns = 2 * PERIOD_NS;
+	steps(1);
+	skipped = stats.cycles_skipped;
+	CHECK_EQ(skipped, 5);
+	CHECK_EQ(stats.overruns, 1);
+	step_ns = world.now.ns;
+	steps(20);
+	CHECK_EQ(stats.cycles_skipped, skipped);
+	CHECK(llabs(world.now.ns - step_ns - 20 * (int64_t)PERIOD_NS) < 100000);
+}
