@@ -12,7 +12,7 @@ usage()
 	cat <<'USAGE'
 usage: ./build.sh VERB [OPTION...]
 
-  run      a simulated segment, the master, the recorder and the live view, on this machine
+  run      a simulated segment, the master, the recorder, DDS and the live view, on this machine
   test     the tests, all groups or some
   build    compile, and lay what others use into build/stage/
   sim      the simulated segment alone, on a network interface
@@ -148,6 +148,7 @@ help_help()
 prepare_build()
 {
 	need_packages build "$@"
+	want_packages dds ecdaq-dds
 	need_venv
 	need_soem
 }
@@ -167,7 +168,7 @@ do_build()
 
 do_test()
 {
-	prepare_build test run
+	prepare_build test run dds
 	exec "$PYTHON" "$root/app/tools/run_tests.py" "$@"
 }
 

@@ -21,6 +21,8 @@ void report_gather(struct cli *cli, const struct status_page *page,
 
 	report.is_running = source_is_alive(page->pid);
 	report.is_recorder_running = record != NULL && source_is_alive(record->pid);
+	report.dds = source_dds(cli);
+	report.is_dds_running = report.dds != NULL && source_is_alive(report.dds->pid);
 	if (samples_try(cli, &samples) == 0) {
 		if (samples.meta->session == page->session &&
 		    ring_peek_newest(samples.reader, samples.payload) == RING_OK) {
@@ -34,6 +36,11 @@ void report_gather(struct cli *cli, const struct status_page *page,
 		samples_close(&samples);
 	}
 	*ret_report = report;
+}
+
+void report_release(const struct report *report)
+{
+	source_dds_close(report->dds);
 }
 
 void report_al_format(uint32_t al_state, char *buf, size_t buf_len)
@@ -221,6 +228,28 @@ static void write_recorder(const struct report *report, FILE *out)
 	}
 }
 
+/* Nothing where there is none: DDS is a choice. */
+static void write_dds(const struct report *report, FILE *out)
+{
+	const struct dds_status *dds = report->dds;
+	char plain[TEXT_BYTES * 4];
+
+	if (dds == NULL) {
+		return;
+	}
+	fprintf(out, "dds        %s%s, domain %u", text_plain(dds->interface, plain, sizeof(plain)),
+		report->is_dds_running ? "" : " (gone)", dds->domain);
+	if (dds->tag[0] != '\0') {
+		fprintf(out, ", tag %s", text_plain(dds->tag, plain, sizeof(plain)));
+	}
+	fprintf(out,
+		"   %" PRIu64 " cycles, %" PRIu64 " missed   %" PRIu64
+		" subscribers   commands: %s, %" PRIu64 " accepted, %" PRIu64 " refused%s\n",
+		GET(dds->published_cycles), GET(dds->missed_cycles), GET(dds->subscribers),
+		dds->are_commands_on ? "on" : "off", GET(dds->commands_accepted),
+		GET(dds->commands_refused), dds->is_secure ? "   secured" : "");
+}
+
 static void write_message(const struct status_page *page, FILE *out)
 {
 	char text[sizeof(page->message)];
@@ -242,6 +271,7 @@ void report_write_screen(const struct report *report, FILE *out)
 	write_cycle(report, out);
 	write_times(&report->page->cycle, out);
 	write_recorder(report, out);
+	write_dds(report, out);
 	if (count > 0) {
 		fprintf(out, "%3s %-16s %-13s %12s %10s %10s %6s %6s\n", "pos", "slave", "state",
 			"good", "bad", "dc diff", "rx err", "links");
@@ -266,5 +296,6 @@ void report_write_summary(const struct report *report, FILE *out)
 		GET(st->page_faults));
 	write_times(st, out);
 	write_recorder(report, out);
+	write_dds(report, out);
 	write_message(report->page, out);
 }

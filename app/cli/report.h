@@ -11,8 +11,10 @@
 struct report {
 	const struct status_page *page;
 	const struct record_status *record; /* NULL: no recorder was started */
+	const struct dds_status *dds;       /* NULL: no ecdaq-dds was started */
 	int is_running;                     /* ecdaqd's process is there */
 	int is_recorder_running;
+	int is_dds_running;
 	int has_wkc; /* the newest sample could be read */
 	uint16_t wkc;
 	uint16_t wkc_expected;
@@ -21,9 +23,14 @@ struct report {
 };
 
 struct cli;
-/** Look at the rest of the run directory; @page and @record as they were mapped. */
+/**
+ * Look at the rest of the run directory; @page and @record as they were mapped. Release what was
+ * mapped besides with report_release().
+ */
 void report_gather(struct cli *cli, const struct status_page *page,
 		   const struct record_status *record, struct report *ret_report);
+
+void report_release(const struct report *report);
 
 /** The screen of `ecdaq status` and `ecdaq top`. */
 void report_write_screen(const struct report *report, FILE *out);

@@ -124,6 +124,32 @@ static void write_record(struct json *js, const struct report *report)
 	json_object_end(js);
 }
 
+static void write_dds(struct json *js, const struct report *report)
+{
+	const struct dds_status *dds = report->dds;
+
+	if (dds == NULL) {
+		json_null(js, "dds");
+		return;
+	}
+	json_object_begin(js, "dds");
+	json_truth(js, "running", report->is_dds_running);
+	json_i64(js, "pid", dds->pid);
+	json_text(js, "interface", dds->interface);
+	json_u64(js, "domain", dds->domain);
+	json_text(js, "tag", dds->tag);
+	json_truth(js, "secure", dds->is_secure != 0);
+	json_truth(js, "commands", dds->are_commands_on != 0);
+	json_u64(js, "session", GET(dds->session));
+	json_u64(js, "published_cycles", GET(dds->published_cycles));
+	json_u64(js, "missed_cycles", GET(dds->missed_cycles));
+	json_u64(js, "failed_messages", GET(dds->failed_messages));
+	json_u64(js, "subscribers", GET(dds->subscribers));
+	json_u64(js, "commands_accepted", GET(dds->commands_accepted));
+	json_u64(js, "commands_refused", GET(dds->commands_refused));
+	json_object_end(js);
+}
+
 static void write_ports(struct json *js, const char *key, const _Atomic uint32_t *counts)
 {
 	json_array_begin(js, key);
@@ -216,6 +242,7 @@ void report_write_json(const struct report *report, struct json *js)
 	write_histogram(js, "phase_ns", &page->cycle.phase);
 	write_histogram(js, "work_ns", &page->cycle.work);
 	write_record(js, report);
+	write_dds(js, report);
 	write_degraded(js, page);
 	json_array_begin(js, "slave");
 	for (uint32_t i = 0; i < source_slave_count(page); i++) {

@@ -67,6 +67,11 @@ void source_record_close(const struct record_status *record)
 	status_unmap(record, sizeof(*record));
 }
 
+void source_dds_close(const struct dds_status *dds)
+{
+	status_unmap(dds, sizeof(*dds));
+}
+
 int source_is_alive(int64_t pid)
 {
 	return pid > 0 && (kill((pid_t)pid, 0) == 0 || errno == EPERM);
@@ -75,6 +80,23 @@ int source_is_alive(int64_t pid)
 static int is_closed_text(const char *text, size_t len)
 {
 	return memchr(text, 0, len) != NULL;
+}
+
+const struct dds_status *source_dds(struct cli *cli)
+{
+	const struct dds_status *dds;
+	char path[CONFIG_PATH_BYTES];
+
+	if (cli_path(cli, CONFIG_RUN_DDS_STATUS, path) != CLI_OK) {
+		return NULL;
+	}
+	dds = status_open(path, DDS_STATUS_MAGIC, sizeof(*dds));
+	if (dds != NULL && !(is_closed_text(dds->interface, sizeof(dds->interface)) &&
+			     is_closed_text(dds->tag, sizeof(dds->tag)))) {
+		source_dds_close(dds);
+		dds = NULL;
+	}
+	return dds;
 }
 
 /* Does the ring's description fit into its meta area, and what it describes into a slot? */

@@ -19,8 +19,11 @@
 enum cli_exit source_status(struct cli *cli, const struct status_page **ret_page);
 /** The recorder's page, or NULL: it may not have been started. Nothing is said. */
 const struct record_status *source_record(struct cli *cli);
+/** The same of ecdaq-dds. */
+const struct dds_status *source_dds(struct cli *cli);
 void source_status_close(const struct status_page *page);
 void source_record_close(const struct record_status *record);
+void source_dds_close(const struct dds_status *dds);
 
 /** Is the process that wrote a page still there? */
 int source_is_alive(int64_t pid);

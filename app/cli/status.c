@@ -40,6 +40,7 @@ enum cli_exit verb_status(struct cli *cli, int argc, char **argv)
 	} else {
 		report_write_screen(&report, stdout);
 	}
+	report_release(&report);
 	source_record_close(record);
 	source_status_close(page);
 	return CLI_OK;

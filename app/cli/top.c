@@ -114,6 +114,7 @@ static enum cli_exit follow(struct top *top, const struct status_page *page)
 		record = source_record(top->cli);
 		report_gather(top->cli, page, record, &report);
 		show(top, &report);
+		report_release(&report);
 		source_record_close(record);
 		if (!report.is_running || is_replaced(top, page) || top->looks == top->count) {
 			break;
@@ -126,6 +127,7 @@ static enum cli_exit follow(struct top *top, const struct status_page *page)
 		record = source_record(top->cli);
 		report_gather(top->cli, page, record, &report);
 		report_write_screen(&report, stdout);
+		report_release(&report);
 		source_record_close(record);
 	}
 	return CLI_OK;

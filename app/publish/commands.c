@@ -9,6 +9,7 @@
 
 #include "base/clock.h"
 #include "ecdaq.h"
+#include "publish/domain.h"
 #include "publish/remote_board.h"
 
 enum { REFUSALS_A_STEP = 32, NEWS = 256 };
@@ -97,9 +98,8 @@ void commands_follow(struct commands *commands)
 {
 	struct board *board;
 
-	/* Without the option the board is not even opened. */
-	if (!commands->cfg->dds_allow_insecure_commands ||
-	    remote_board_follow(&commands->board) != 1) {
+	/* Where commands are off the board is not even opened. */
+	if (!domain_takes_commands(commands->cfg) || remote_board_follow(&commands->board) != 1) {
 		return;
 	}
 	/* What an ecdaq-dds that was killed left there must not come back with our first beat. */

@@ -10,7 +10,19 @@
 
 #include "config/config.h"
 
-enum { DOMAIN_XML_BYTES = 4096 };
+enum { DOMAIN_XML_BYTES = 8192 };
+
+/** DDS Security is in use. */
+static inline int domain_is_secure(const struct config *cfg)
+{
+	return cfg->dds_security[0] != '\0';
+}
+
+/** Only those who may command can, or it was said that anybody may. */
+static inline int domain_takes_commands(const struct config *cfg)
+{
+	return domain_is_secure(cfg) || cfg->dds_allow_insecure_commands != 0;
+}
 
 /** 0, or -E2BIG. @cfg has passed config_check(): nothing in it needs escaping. */
 int domain_xml(const struct config *cfg, char *ret_xml, size_t xml_bytes);

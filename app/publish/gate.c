@@ -10,6 +10,7 @@
 
 #include "base/clock.h"
 #include "image/image.h"
+#include "publish/domain.h"
 
 struct commander {
 	uint64_t sender; /* 0: free */
@@ -281,7 +282,7 @@ int gate_check(struct gate *gate, const struct gate_command *cmd, const struct g
 	struct commander *commander;
 	int r;
 
-	if (!gate->cfg->dds_allow_insecure_commands) {
+	if (!domain_takes_commands(gate->cfg)) {
 		return refuse(
 			reason, -EPERM,
 			"commands are off without DDS Security (dds.allow_insecure_commands)");

@@ -18,6 +18,7 @@ enum exit_status {
 	STATUS_FAILED = 1,
 	STATUS_USAGE = 2,
 	STATUS_CONFIG = 3,
+	STATUS_OFF = 4,
 };
 
 struct arguments {
@@ -25,6 +26,7 @@ struct arguments {
 	const char *run_dir;
 	const char *set[SETS];
 	size_t set_count;
+	int is_check;
 	int is_help;
 	int is_version;
 };
@@ -49,11 +51,13 @@ static void help(FILE *out)
 	      "  --set OPTION=VALUE   set one option over the file, as often as needed:\n"
 	      "                       --set dds.interface=eth1\n"
 	      "  --run-dir DIR        where ecdaqd has its rings (runtime.run_dir)\n"
+	      "  --check              only look whether it could start\n"
 	      "  --version            print the version\n"
 	      "  --help               this\n"
 	      "\n"
 	      "Exit codes: 0 ended in order, or dds.enable is off; 1 DDS failed; 2 command line;\n"
-	      "3 configuration, the network interface among it.\n",
+	      "3 configuration, the network interface among it; 4 --check, and dds.enable is "
+	      "off.\n",
 	      out);
 }
 
@@ -72,6 +76,9 @@ static int take_option(int c, int was, char **argv, struct arguments *a)
 		return 0;
 	case 'r':
 		a->run_dir = optarg;
+		return 0;
+	case 'k':
+		a->is_check = 1;
 		return 0;
 	case 'v':
 		a->is_version = 1;
@@ -92,6 +99,7 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
 		{ "config", required_argument, NULL, 'c' },
 		{ "set", required_argument, NULL, 's' },
 		{ "run-dir", required_argument, NULL, 'r' },
+		{ "check", no_argument, NULL, 'k' },
 		{ "version", no_argument, NULL, 'v' },
 		{ "help", no_argument, NULL, 'h' },
 		{ NULL, 0, NULL, 0 },
@@ -184,14 +192,14 @@ int main(int argc, char **argv)
 	}
 	if (!cfg.dds_enable) {
 		fputs("ecdaq-dds: dds.enable is off: nothing to do\n", stderr);
-		return STATUS_OK;
+		return arguments.is_check ? STATUS_OFF : STATUS_OK;
 	}
 	r = publisher_create(&cfg, &publisher, error, sizeof(error));
 	if (r < 0) {
 		fprintf(stderr, "ecdaq-dds: %s\n", error);
 		return exit_status(r);
 	}
-	r = run(publisher);
+	r = arguments.is_check ? 0 : run(publisher);
 	publisher_destroy(publisher);
 	return r < 0 ? exit_status(r) : STATUS_OK;
 }

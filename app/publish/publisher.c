@@ -15,6 +15,7 @@
 #include "publish/commands.h"
 #include "publish/domain.h"
 #include "publish/events.h"
+#include "publish/own_status.h"
 #include "publish/samples.h"
 #include "publish/state.h"
 #include "publish/topics.h"
@@ -29,6 +30,7 @@ struct publisher {
 	dds_entity_t waitset;
 	struct commands *commands;
 	struct events events;
+	struct own_status own;
 	char ring_path[CONFIG_PATH_BYTES];
 	char status_path[CONFIG_PATH_BYTES];
 	const struct status_page *page; /* NULL: none */
@@ -55,6 +57,9 @@ static int find_paths(struct publisher *p)
 	r = r < 0 ? r
 		  : config_run_path(p->cfg, CONFIG_RUN_EVENTS, p->events.path,
 				    sizeof(p->events.path));
+	r = r < 0 ? r
+		  : config_run_path(p->cfg, CONFIG_RUN_DDS_STATUS, p->own.path,
+				    sizeof(p->own.path));
 	return r < 0 ? r
 		     : config_run_path(p->cfg, CONFIG_RUN_STATUS, p->status_path,
 				       sizeof(p->status_path));
@@ -127,9 +132,17 @@ int publisher_create(const struct config *cfg, struct publisher **ret_publisher,
 	return 0;
 }
 
+static void tell_own(struct publisher *p)
+{
+	own_status_put(&p->own, p->cfg, &p->topics,
+		       p->samples == NULL ? 0 : samples_table(p->samples)->meta->session,
+		       &p->counts, commands_counts(p->commands));
+}
+
 static void end_session(struct publisher *p)
 {
 	if (p->samples != NULL) {
+		tell_own(p);
 		fprintf(stderr, "ecdaq-dds: session %" PRIu64 " ended\n",
 			samples_table(p->samples)->meta->session);
 		samples_destroy(p->samples);
@@ -143,6 +156,7 @@ void publisher_destroy(struct publisher *p)
 		return;
 	}
 	end_session(p);
+	own_status_close(&p->own);
 	topics_close(&p->topics); /* no listener is called from here on */
 	commands_destroy(p->commands);
 	events_close(&p->events);
@@ -202,6 +216,7 @@ static void tell_state(struct publisher *p)
 	struct timex t = { .modes = 0 };
 
 	state_put_status(&p->topics, &view);
+	tell_own(p);
 	if (p->samples != NULL && adjtimex(&t) >= 0) {
 		samples_note_tai_offset(p->samples, t.tai);
 	}

@@ -7,6 +7,7 @@
 
 #include "ecdaq.h"
 #include "image/image.h"
+#include "publish/domain.h"
 #include "publish/mapped_time.h"
 
 enum { TYPE_BYTES = 16, TEXT_BYTES = 256 };
@@ -117,7 +118,7 @@ int state_put_channels(const struct topics *topics, const struct config *cfg,
 	m->session = table->meta->session;
 	m->period_ns = table->meta->period_ns;
 	m->command_lease_ns = gate_lease_ns(cfg);
-	m->are_commands_on = cfg->dds_allow_insecure_commands != 0;
+	m->are_commands_on = domain_takes_commands(cfg);
 	put_slaves(m, table);
 	put_channels(m, table, cfg);
 	(void)topics_write_now(topics->channels, m);

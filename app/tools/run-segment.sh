@@ -12,7 +12,7 @@ usage()
 usage: ./build.sh run [OPTION...]
 
 Brings a simulated segment to OP over a veth pair in a network namespace of its own, records every
-cycle and shows it live. Ctrl-C ends it in order (ecdaqd, recorder, segment) and prints a summary.
+cycle, publishes it over DDS and shows it live. Ctrl-C ends it in order (ecdaqd, recorder, segment) and prints a summary.
 It needs no privilege where the kernel grants users their own namespaces; real-time priority is then
 not to be had, and ecdaqd says so once.
 
@@ -22,6 +22,8 @@ not to be had, and ecdaqd says so once.
   --sii DIR       folder of SII images for --slaves NAMES (default: $ECDAQ_SII)
   --config FILE   ecdaq.yaml for ecdaqd and ecdaq-record (default: built-in defaults)
   --record DIR    where recordings go (default: build/run/record)
+  --no-dds        without ecdaq-dds. Else it publishes on this machine's loopback, in a domain and with a
+                  tag of its own (one line says which); where FILE has a section dds, as that says
   --json          no live view; the last line printed is `ecdaq status --json --summary`
 
 environment:
@@ -43,13 +45,17 @@ note()
 	printf -- '-- %s\n' "$*" >&2
 }
 
+# The highest domain: nobody's by default, and no ports that the kernel gives away.
+private_domain=230
 seconds=
 slaves=2
 sii=${ECDAQ_SII:-}
 config=
 record=$root/build/run/record
 json=no
+dds=yes
 mode=outside
+bin=${ECDAQ_BIN_DIR:-$root/build/stage/bin}
 
 parse_options()
 {
@@ -61,6 +67,7 @@ parse_options()
 			shift
 			;;
 		--json) json=yes ;;
+		--no-dds) dds=no ;;
 		--check) mode=check ;;
 		--inside) mode=inside ;;
 		--help)
@@ -94,6 +101,32 @@ check_options()
 	[ -z "$config" ] || [ -r "$config" ] || die "--config: $config: cannot be read"
 }
 
+# ecdaq-dds stays outside of the namespace, where others can subscribe: it needs nothing of the
+# segment but the run directory. It is a child of this process, which goes on as the one inside.
+start_dds()
+{
+	local options=(--config "$config") why
+
+	[ "$dds" = yes ] || return 0
+	if [ ! -x "$bin/ecdaq-dds" ]; then
+		note "no DDS: ecdaq-dds is not there (app/doc/dds.md says what it needs to be built)"
+		return 0
+	fi
+	if [ -z "$config" ] || ! grep -q '^dds:' "$config"; then
+		options=(--set dds.enable=on --set dds.interface=lo --set dds.multicast=off
+			--set "dds.domain=$private_domain" --set "dds.tag=run-$$")
+		[ -z "$config" ] || options=(--config "$config" "${options[@]}")
+	fi
+	if ! why=$("$bin/ecdaq-dds" --check "${options[@]}" 2>&1); then
+		note "no DDS: ${why##*$'\n'}"
+		return 0
+	fi
+	setpriv --pdeathsig TERM setsid "$bin/ecdaq-dds" "${options[@]}" < /dev/null &
+	export ECDAQ_RUN_DDS_PID=$!
+	[[ ${options[*]} != *dds.tag=run-$$ ]] ||
+		note "DDS: ecdaq-remote --interface lo --domain $private_domain --tag run-$$ watch"
+}
+
 enter_namespace()
 {
 	local how=(unshare --net)
@@ -101,6 +134,12 @@ enter_namespace()
 	[ "$(id -u)" = 0 ] || how=(unshare --user --map-root-user --net)
 	"${how[@]}" true 2> /dev/null ||
 		die "this kernel grants no network namespace to user $(id -un): run it as root"
+	if [ -z "${ECDAQ_RUN_DIR:-}" ]; then
+		ECDAQ_RUN_DIR=$(mktemp -d /dev/shm/ecdaq-run-XXXXXX)
+		export ECDAQ_RUN_DIR ECDAQ_RUN_DIR_IS_OWN=yes
+	fi
+	mkdir -p "$ECDAQ_RUN_DIR"
+	start_dds
 	exec "${how[@]}" "$0" --inside "$@"
 }
 
@@ -150,6 +189,22 @@ stop()
 	esac
 }
 
+# ecdaq-dds was started before this shell: tail stands in for it, and ends when it does.
+adopt_dds()
+{
+	[ -n "${ECDAQ_RUN_DDS_PID:-}" ] || return 0
+	setsid tail --pid="$ECDAQ_RUN_DDS_PID" -s 0.1 -f /dev/null &
+	pid[dds]=$!
+}
+
+stop_dds()
+{
+	[ -n "${pid[dds]:-}" ] || return 0
+	kill -TERM "$ECDAQ_RUN_DDS_PID" 2> /dev/null || true
+	wait "${pid[dds]}" || true
+	unset 'pid[dds]'
+}
+
 failed=0
 interrupted=no
 
@@ -158,6 +213,7 @@ end_in_order()
 	stop view
 	stop daemon
 	stop recorder
+	stop_dds
 	stop segment
 }
 
@@ -165,7 +221,7 @@ clean_up()
 {
 	trap '' INT TERM
 	end_in_order
-	[ -z "${own_run_dir:-}" ] || rm -rf "$own_run_dir"
+	[ -z "${ECDAQ_RUN_DIR_IS_OWN:-}" ] || rm -rf "$ECDAQ_RUN_DIR"
 }
 
 # Which of the children ended? Waits for the first.
@@ -194,17 +250,12 @@ run_inside()
 	local daemon_options=(--simulated)
 	local segment_options=(--interface ecsim0 --slaves "$slaves")
 
-	bin=${ECDAQ_BIN_DIR:-$root/build/stage/bin}
 	# As root the segment gets a real-time priority below the master's: it stands for hardware.
 	! chrt -f 1 true 2> /dev/null || segment_options+=(--priority 50)
 	[ -z "$sii" ] || segment_options+=(--sii "$sii")
 	[ -z "$seconds" ] || daemon_options+=(--seconds "$seconds")
 	[ -z "$config" ] || set_options=(--config "$config" "${set_options[@]}")
-	if [ -z "${ECDAQ_RUN_DIR:-}" ]; then
-		own_run_dir=$(mktemp -d /dev/shm/ecdaq-run-XXXXXX)
-		export ECDAQ_RUN_DIR=$own_run_dir
-	fi
-	mkdir -p "$record" "$ECDAQ_RUN_DIR"
+	mkdir -p "$record"
 	exec 3<&0
 	trap clean_up EXIT
 	trap 'interrupted=yes' INT TERM
@@ -212,6 +263,7 @@ run_inside()
 	start segment "$bin/ecdaq-sim" "${segment_options[@]}"
 	start recorder "$bin/ecdaq-record" "${set_options[@]}"
 	start daemon "$bin/ecdaqd" "${set_options[@]}" "${daemon_options[@]}"
+	adopt_dds
 	if [ "$json" = no ] && [ -t 1 ]; then
 		start view "$bin/ecdaq" top
 	fi

@@ -115,6 +115,17 @@ need_packages()
 	[ -z "$missing" ] || say_missing "$missing" "installed, and still not found"
 }
 
+# want_packages PURPOSE WHAT: the same where it can do without; one line says what is left out.
+want_packages()
+{
+	[ -n "$(missing_packages "$1")" ] || return 0
+	if ! why=$( (need_packages "$1") 2>&1); then
+		names=$(missing_packages "$1" | cut -f 1 | tr '\n' ' ')
+		reason=$(printf '%s\n' "$why" | sed -n 's/^build.sh: \(.*\); missing:$/\1/p')
+		note "without $2, which needs ${names% }: $reason"
+	fi
+}
+
 # need_venv: sets $venv to an environment with tests/requirements.txt, made once for its contents.
 need_venv()
 {

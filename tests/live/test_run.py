@@ -214,6 +214,7 @@ def test_build_sh_run_ends_with_one_json_line(tmp_path: Path) -> None:
         "recording",
         "recorded_cycles",
         "recorded_gaps",
+        "dds",
     ):
         assert key in line
     for key in ("wake_latency_ns", "round_trip_ns", "phase_ns"):
@@ -221,6 +222,9 @@ def test_build_sh_run_ends_with_one_json_line(tmp_path: Path) -> None:
     assert line["slaves"] == 3
     assert line["recorded_gaps"] == 0
     assert line["samples_good"] > 3000
+    assert line["dds"]["published_cycles"] > 1000
+    assert (line["dds"]["missed_cycles"], line["dds"]["failed_messages"]) == (0, 0)
+    assert (line["dds"]["interface"], line["dds"]["commands"]) == ("lo", False)
     assert line["recording"].endswith(".mcap")
     assert list((tmp_path / "record").glob("*.mcap"))
 

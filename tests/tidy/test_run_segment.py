@@ -18,13 +18,15 @@ SCRIPT = ROOT / "app" / "tools" / "run-segment.sh"
 STAND_IN = """#!/bin/bash
 trap 'echo "end $(basename "$0")" >> "$LOG"; exit 0' TERM
 trap 'echo "interrupted $(basename "$0")" >> "$LOG"' INT
+[ "$1" != --check ] || exit 0
 echo "start $(basename "$0") $*" >> "$LOG"
 {body}
 while :; do sleep 0.05; done
 """
 # Ends only when the others run: else they could be ended before they can say so.
-WHEN_ALL_RUN = """until [ "$(grep -c '^start' "$LOG")" -ge 3 ]; do sleep 0.01; done
+WHEN_ALL_RUN = """until [ "$(grep -c '^start' "$LOG")" -ge 4 ]; do sleep 0.01; done
 """
+PROGRAMS = ("ecdaqd", "ecdaq-record", "ecdaq-dds", "ecdaq-sim")
 TOOL = """#!/bin/bash
 echo "tool $*" >> "$LOG"
 [ "$1" = status ] && echo '{"state":"STOPPED"}'
@@ -32,7 +34,7 @@ echo "tool $*" >> "$LOG"
 
 
 class Bench:
-    """Stand-ins for the four programs, and the log they write."""
+    """Stand-ins for the programs, and the log they write."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -41,7 +43,7 @@ class Bench:
         self.bin = folder / "bin"
         self.bin.mkdir()
         self.program("ecdaq", TOOL)
-        for name in ("ecdaqd", "ecdaq-record", "ecdaq-sim"):
+        for name in PROGRAMS:
             self.program(name, STAND_IN.replace("{body}", ""))
 
     def program(self, name: str, text: str) -> None:
@@ -74,7 +76,7 @@ class Bench:
             time.sleep(0.01)
 
     def wait_until_all_run(self) -> None:
-        self.wait_for_log("start ecdaq-sim", "start ecdaq-record", "start ecdaqd")
+        self.wait_for_log(*(f"start {name}" for name in PROGRAMS))
 
 
 @pytest.fixture
@@ -96,7 +98,7 @@ def test_an_interrupt_ends_all_in_order_with_a_summary(bench: Bench, number: int
     os.killpg(run.pid, number)
     out, err = run.communicate(timeout=20)
     assert run.returncode == 0, err
-    assert ends(bench) == ["end ecdaqd", "end ecdaq-record", "end ecdaq-sim"]
+    assert ends(bench) == ["end ecdaqd", "end ecdaq-record", "end ecdaq-dds", "end ecdaq-sim"]
     assert bench.log[-1] == "tool status --summary"
     assert out.splitlines()[-1] == '{"state":"STOPPED"}'
     assert not any(line.startswith("interrupted") for line in bench.log)
@@ -119,7 +121,7 @@ def test_a_master_that_fails_fails_the_run(bench: Bench) -> None:
     _, err = run.communicate(timeout=20)
     assert run.returncode == 1
     assert "daemon ended with 8" in err
-    assert ends(bench) == ["end ecdaq-record", "end ecdaq-sim"]
+    assert ends(bench) == ["end ecdaq-record", "end ecdaq-dds", "end ecdaq-sim"]
 
 
 def test_a_segment_that_ends_by_itself_fails_the_run(bench: Bench) -> None:
@@ -135,7 +137,7 @@ def test_a_run_that_is_killed_leaves_nothing_behind(bench: Bench) -> None:
     bench.wait_until_all_run()
     run.kill()
     run.communicate(timeout=20)
-    bench.wait_for_log("end ecdaqd", "end ecdaq-record", "end ecdaq-sim")
+    bench.wait_for_log(*(f"end {name}" for name in PROGRAMS))
 
 
 def test_the_run_directory_is_removed_unless_it_is_given(bench: Bench, tmp_path: Path) -> None:
@@ -145,3 +147,65 @@ def test_the_run_directory_is_removed_unless_it_is_given(bench: Bench, tmp_path:
     (line,) = [entry for entry in bench.log if entry.startswith("run dir ")]
     assert not Path(line.removeprefix("run dir ")).exists()
     assert set(Path("/dev/shm").glob("ecdaq-run-*")) <= before
+
+
+def dds_line(bench: Bench) -> str:
+    return next((line for line in bench.log if line.startswith("start ecdaq-dds")), "")
+
+
+def test_dds_is_published_on_loopback_in_a_domain_and_with_a_tag_of_ones_own(bench: Bench) -> None:
+    bench.make_it("ecdaqd", WHEN_ALL_RUN + "exit 0")
+    run = bench.start("--seconds", "1")
+    _, err = run.communicate(timeout=20)
+    assert run.returncode == 0, err
+    tag = f"run-{run.pid}"
+    for setting in ("enable=on", "interface=lo", "multicast=off", "domain=230", f"tag={tag}"):
+        assert f"--set dds.{setting}" in dds_line(bench)
+    assert f"ecdaq-remote --interface lo --domain 230 --tag {tag} watch" in err
+
+
+def test_dds_is_done_as_the_configuration_says_where_it_does(bench: Bench) -> None:
+    config = bench.folder / "mine.yaml"
+    config.write_text("dds:\n  enable: on\n  interface: eth7\n")
+    bench.make_it("ecdaqd", WHEN_ALL_RUN + "exit 0")
+    assert bench.start("--seconds", "1", "--config", str(config)).wait(20) == 0
+    assert dds_line(bench) == f"start ecdaq-dds --config {config}"
+
+
+def test_without_dds_there_is_none(bench: Bench) -> None:
+    bench.make_it("ecdaqd", WHEN_ALL_RUN.replace("4", "3") + "exit 0")
+    run = bench.start("--seconds", "1", "--no-dds")
+    _, err = run.communicate(timeout=20)
+    assert run.returncode == 0
+    assert "DDS" not in err
+    assert not dds_line(bench)
+
+
+@pytest.mark.parametrize(
+    ("program", "reason"),
+    [
+        (None, "ecdaq-dds is not there"),
+        ("#!/bin/sh\necho 'ecdaq-dds: why not' >&2\nexit 3\n", "ecdaq-dds: why not"),
+    ],
+)
+def test_where_dds_cannot_be_had_one_line_says_so_and_the_run_goes_on(
+    bench: Bench, program: str | None, reason: str
+) -> None:
+    if program is None:
+        (bench.bin / "ecdaq-dds").unlink()
+    else:
+        bench.program("ecdaq-dds", program)
+    bench.make_it("ecdaqd", WHEN_ALL_RUN.replace("4", "3") + "exit 0")
+    run = bench.start("--seconds", "1")
+    _, err = run.communicate(timeout=20)
+    assert run.returncode == 0
+    (line,) = err.splitlines()
+    assert line.startswith(f"-- no DDS: {reason}")
+
+
+def test_a_publisher_that_ends_by_itself_fails_the_run(bench: Bench) -> None:
+    bench.make_it("ecdaq-dds", WHEN_ALL_RUN + "exit 1")
+    run = bench.start()
+    _, err = run.communicate(timeout=20)
+    assert run.returncode == 1
+    assert "dds ended by itself" in err
