@@ -68,13 +68,19 @@ struct bus_watch_report {
 
 /**
  * Read AL state, error counters, DC difference of every slave into @page (its slave[] entries),
- * emit events through
- * @emit, acknowledge errors and lead slaves that fell back to SAFE-OP or PRE-OP or were
- * power-cycled to OP again (with DC redone for a returned slave, T18), a step per call.
+ * emit events through @emit, and say in @ret_report what was found. It changes nothing on the bus.
  */
 int bus_watch(struct bus *bus, struct status_page *page,
 	      void (*emit)(void *ctx, const struct event *ev), void *emit_ctx,
 	      struct bus_watch_report *ret_report);
+
+/**
+ * Acknowledge errors and lead slaves that fell back to SAFE-OP or PRE-OP or were power-cycled to OP
+ * again (with DC redone for a returned slave, T18), a step per call. After bus_watch(), when its
+ * report has been acted on: a slave on its way through INIT takes the working counter from all.
+ */
+void bus_lead_back(struct bus *bus, void (*emit)(void *ctx, const struct event *ev),
+		   void *emit_ctx);
 
 /* --- what was found; valid after bus_map() (slaves: after bus_scan()) --- */
 

@@ -75,7 +75,9 @@ struct bus {
 	struct line *line;
 	char *error;      /* of the public call that runs */
 	uint8_t sequence; /* index byte of our own frames */
-	int is_looking;   /* in bus_watch(): what is lost is looked at again soon, so fewer tries */
+	/* In bus_watch() or bus_lead_back(): what is lost is looked at again soon, so fewer tries.
+	 */
+	int is_looking;
 	struct bus_slave slave[LIMIT_SLAVES];
 	size_t slave_count;
 	struct slave_info info[LIMIT_SLAVES]; /* what bus_slaves() shows */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A look at every slave, a few times a second: states, error counters, clock difference. Who needs
- * it is led back. */
+/* A look at every slave, a few times a second: states, error counters, clock difference; and
+ * a step on the way back for who needs it. */
 #include <string.h>
 
 #include "base/bytes.h"
@@ -145,29 +145,38 @@ static void show(const struct bus_slave *sl, const struct look *look, struct sla
 		memory_order_relaxed);
 }
 
+/* One that is about to be led through INIT is in OP no more, though it still says so. */
+static int is_to_leave_op(const struct bus_slave *sl)
+{
+	return sl->step >= RECOVERY_INIT && sl->step <= RECOVERY_CLOCK;
+}
+
 static int is_in_op(const struct bus_slave *sl)
 {
-	return !sl->is_lost && sl->misses == 0 &&
+	return !sl->is_lost && sl->misses == 0 && !is_to_leave_op(sl) &&
 	       (sl->al_status & (AL_STATE_MASK | AL_ERROR)) == AL_OP;
 }
 
-static void recover_some(struct bus *bus, const struct bus_emit *emit)
+void bus_lead_back(struct bus *bus, void (*emit)(void *ctx, const struct event *ev), void *emit_ctx)
 {
+	const struct bus_emit out = { .call = emit, .ctx = emit_ctx };
 	unsigned steps = 0;
 
 	if (bus->target != AL_OP) {
 		return;
 	}
+	bus->is_looking = 1;
 	for (size_t n = 0; n < bus->slave_count && steps < RECOVERIES_PER_CALL; n++) {
 		size_t pos = (bus->next_recovery + n) % bus->slave_count;
 		struct bus_slave *sl = &bus->slave[pos];
 
 		if ((!is_in_op(sl) && sl->misses == 0) || sl->step != RECOVERY_NONE) {
-			bus_recover(bus, pos, emit);
+			bus_recover(bus, pos, &out);
 			steps++;
 		}
 	}
 	bus->next_recovery += steps > 0 ? steps : 1;
+	bus->is_looking = 0;
 }
 
 int bus_watch(struct bus *bus, struct status_page *page,
@@ -197,7 +206,6 @@ int bus_watch(struct bus *bus, struct status_page *page,
 	    bus->slave[bus->reference].step == RECOVERY_NONE) {
 		bus_reference_time(bus, &time_ns);
 	}
-	recover_some(bus, &out);
 	bus->is_looking = 0;
 	*ret_report = (struct bus_watch_report){ 0 };
 	for (size_t i = 0; i < bus->slave_count; i++) {

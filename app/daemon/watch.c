@@ -173,6 +173,7 @@ enum session_news session_watch(struct session *s)
 		follow_silence(s);
 	} else if (bus_watch(s->bus, s->home.page, emit_event, s, &report) == 0) {
 		follow_bus(s, &report);
+		bus_lead_back(s->bus, emit_event, s);
 	}
 	if (s->lost_since.ns != 0 && mono_sub(session_now(s), s->lost_since).ns > LOST_LIMIT_NS) {
 		return SESSION_LOST;

@@ -348,6 +348,7 @@ struct bus_watch_report bench_watch(struct bus_bench *b)
 	struct bus_watch_report report = { 0 };
 
 	bus_watch(b->bus, b->page, on_event, b, &report);
+	bus_lead_back(b->bus, on_event, b);
 	return report;
 }
 

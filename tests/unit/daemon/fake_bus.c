@@ -210,6 +210,16 @@ int bus_watch(struct bus *bus, struct status_page *page,
 	return 0;
 }
 
+void bus_lead_back(struct bus *bus, void (*emit)(void *ctx, const struct event *ev), void *emit_ctx)
+{
+	(void)bus;
+	(void)emit;
+	(void)emit_ctx;
+	if (fake_bus.led_back != NULL) {
+		fake_bus.led_back(fake_bus.led_back_ctx);
+	}
+}
+
 const struct slave_info *bus_slaves(const struct bus *bus, size_t *ret_count)
 {
 	(void)bus;

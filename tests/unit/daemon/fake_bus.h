@@ -36,6 +36,8 @@ struct fake_bus {
 	unsigned transports; /* open ones */
 	int is_link_up;
 	uint64_t exchanges;
+	void (*led_back)(void *ctx); /* called by bus_lead_back(); NULL: nobody */
+	void *led_back_ctx;
 };
 
 extern struct fake_bus fake_bus;

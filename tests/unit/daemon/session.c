@@ -313,6 +313,28 @@ TEST(session, a_slave_that_falls_is_shown_and_its_return_too)
 	bench_close(&b);
 }
 
+static void check_nobody_takes_samples(void *ctx)
+{
+	CHECK_EQ(state_of(ctx), BUS_RECOVERING);
+	fake_bus.led_back = NULL;
+}
+
+/* On its way through INIT the working counter is low: that must not look like bad samples. */
+TEST(session, a_slave_is_led_back_only_after_the_cycle_has_left_op)
+{
+	static struct bench b;
+	struct failure failure;
+
+	bench_open(&b);
+	CHECK_EQ(session_bring_up(b.session, &failure), 0);
+	fake_bus.led_back = check_nobody_takes_samples;
+	fake_bus.led_back_ctx = &b;
+	fake_bus.report = (struct bus_watch_report){ .slaves_op = 0, .is_all_op = 0 };
+	CHECK_EQ(run(&b, 150, &failure), SESSION_GOES_ON);
+	CHECK(fake_bus.led_back == NULL); /* it was */
+	bench_close(&b);
+}
+
 TEST(session, all_slaves_lost_for_long_asks_for_a_new_start)
 {
 	static struct bench b;
