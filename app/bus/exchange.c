@@ -190,8 +190,8 @@ static void keep_frame(struct exchange *ex, unsigned number)
 	}
 }
 
-/* A frame of this exchange or an earlier one, by its sequence. */
-static void sort_frame(struct exchange *ex, unsigned number, uint16_t sequence, mono_t at)
+/* A frame of this exchange or an earlier one, by its sequence. 1 if it was waited for. */
+static int sort_frame(struct exchange *ex, unsigned number, uint16_t sequence, mono_t at)
 {
 	unsigned age = (uint16_t)(ex->sequence - sequence);
 	uint8_t *came = &ex->history[sequence % HISTORY];
@@ -199,11 +199,11 @@ static void sort_frame(struct exchange *ex, unsigned number, uint16_t sequence, 
 
 	if (age >= ex->run_count) {
 		ex->result.foreign++;
-		return;
+		return 0;
 	}
 	if (age < HISTORY && (*came & bit) != 0) {
 		ex->result.doubled++;
-		return;
+		return 0;
 	}
 	if (age < HISTORY) {
 		*came |= bit;
@@ -216,7 +216,7 @@ static void sort_frame(struct exchange *ex, unsigned number, uint16_t sequence, 
 		if (ex->missing == 0) {
 			ex->result.round_trip = mono_sub(at, ex->result.sent);
 		}
-		return;
+		return 1;
 	}
 	ex->result.late++;
 	if (age == 0) {
@@ -225,23 +225,30 @@ static void sort_frame(struct exchange *ex, unsigned number, uint16_t sequence, 
 	if (age > ex->result.late_by) {
 		ex->result.late_by = age;
 	}
+	return 0;
 }
 
-static void take_frame(struct exchange *ex, size_t len, mono_t at)
+/* 1 if it was waited for, 0 if it only took time. */
+static int take_frame(struct exchange *ex, size_t len, mono_t at)
 {
 	for (unsigned i = 0; i < ex->frame_count; i++) {
 		uint16_t sequence;
 
 		if (exchange_frame_matches(&ex->frame[i], ex->received, len, &sequence)) {
-			sort_frame(ex, i, sequence, at);
-			return;
+			return sort_frame(ex, i, sequence, at);
 		}
 	}
 	if (!line_ride_answer(ex->line, ex->received, len)) {
 		ex->result.foreign++;
 	}
+	return 0;
 }
 
+/*
+ * The transport hands out what waits in its queue even past the deadline: a frame that waited
+ * there while this thread did not run is not lost. So one that nobody waits for must end the
+ * wait, or a flood of them would hold the cycle for ever.
+ */
 static int receive_one(struct exchange *ex, mono_t deadline)
 {
 	mono_t at = { 0 };
@@ -251,8 +258,7 @@ static int receive_one(struct exchange *ex, mono_t deadline)
 	if (r < 0) {
 		return r;
 	}
-	take_frame(ex, (size_t)r, at);
-	return 0;
+	return take_frame(ex, (size_t)r, at) || at.ns < deadline.ns ? 0 : -EAGAIN;
 }
 
 /* What a ride or an earlier receive met stays counted; the rest starts anew. */

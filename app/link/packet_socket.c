@@ -49,23 +49,19 @@ static int packet_send(void *ctx, const uint8_t *frame, size_t frame_len)
 	return (size_t)r == frame_len ? 0 : -EIO;
 }
 
-/* One look: a frame's length, -EAGAIN, -errno. Our own outgoing frames and jumbo frames are passed
- * over. */
+/* One look: a frame's length, -errno. -EAGAIN is nothing, or one of our own outgoing frames or a
+ * jumbo frame, which are passed over one a look: the caller minds its deadline between them. */
 static int take_frame(const struct packet_socket *ps, uint8_t *frame, size_t capacity)
 {
-	for (;;) {
-		struct sockaddr_ll from = { 0 };
-		socklen_t from_len = sizeof(from);
-		ssize_t r = recvfrom(ps->fd, frame, capacity, MSG_DONTWAIT | MSG_TRUNC,
-				     (struct sockaddr *)&from, &from_len);
+	struct sockaddr_ll from = { 0 };
+	socklen_t from_len = sizeof(from);
+	ssize_t r = recvfrom(ps->fd, frame, capacity, MSG_DONTWAIT | MSG_TRUNC,
+			     (struct sockaddr *)&from, &from_len);
 
-		if (r < 0 && errno != EINTR) {
-			return -errno;
-		}
-		if (r >= 0 && (size_t)r <= capacity && from.sll_pkttype != PACKET_OUTGOING) {
-			return (int)r;
-		}
+	if (r < 0) {
+		return errno == EINTR ? -EAGAIN : -errno;
 	}
+	return (size_t)r <= capacity && from.sll_pkttype != PACKET_OUTGOING ? (int)r : -EAGAIN;
 }
 
 static void sleep_for_frame(const struct packet_socket *ps, int64_t left_ns)

@@ -30,6 +30,8 @@ struct fake_wire {
 	unsigned sent;
 	int drop; /* so many of the next frames are lost */
 	int send_error;
+	int64_t flood_ns; /* > 0: a frame of somebody else comes every so often, without end */
+	unsigned flooded;
 	unsigned slept;
 	struct fake_frame last_sent;
 	struct fake_frame queue[FAKE_QUEUE];
@@ -100,6 +102,22 @@ static inline int fake_send(void *ctx, const uint8_t *frame, size_t len)
 	return 0;
 }
 
+/* A flood that is faster than its reader: one more waits whenever it looks, deadline or not. */
+static inline int fake_flood(struct fake_wire *wire, uint8_t *frame, mono_t *ret_at)
+{
+	static const uint8_t source[6] = { 0x02, 0x02, 0x02, 0x02, 0x02, 0x02 };
+	struct ecat_frame_builder fb;
+
+	wire->now_ns += wire->flood_ns;
+	wire->flooded++;
+	if (ret_at != NULL) {
+		ret_at->ns = wire->now_ns;
+	}
+	ecat_frame_begin(&fb, frame, source);
+	ecat_frame_add(&fb, ECAT_CMD_BRD, 0xee, 0, 0x0500, 2);
+	return (int)ecat_frame_end(&fb);
+}
+
 static inline int fake_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadline,
 			       mono_t *ret_at)
 {
@@ -107,6 +125,9 @@ static inline int fake_receive(void *ctx, uint8_t *frame, size_t capacity, mono_
 	struct fake_frame *ff = &wire->queue[0];
 	int len;
 
+	if (wire->flood_ns > 0 && (wire->queued == 0 || ff->at_ns > wire->now_ns)) {
+		return fake_flood(wire, frame, ret_at);
+	}
 	if (wire->queued == 0 || (ff->at_ns > deadline.ns && ff->at_ns > wire->now_ns)) {
 		wire->now_ns = deadline.ns > wire->now_ns ? deadline.ns : wire->now_ns;
 		return -EAGAIN;

@@ -76,6 +76,22 @@ TEST(line, answer_to_an_earlier_index_is_thrown_away)
 	line_destroy(line);
 }
 
+TEST(line, flood_of_foreign_frames_costs_the_timeout_and_no_more)
+{
+	struct fake_wire wire = { .drop = 1, .flood_ns = 3000 };
+	struct line *line = line_on(&wire);
+	uint8_t frame[LIMIT_FRAME_BYTES];
+	uint8_t answer[LIMIT_FRAME_BYTES];
+	size_t len = make_frame(frame, ECAT_CMD_FPRD, 7, 0x1001, ESC_REG_AL_STATUS);
+
+	CHECK_EQ(line_transact(line, frame, len, answer, sizeof(answer), (span_t){ 2000000 }),
+		 -ETIMEDOUT);
+	CHECK(wire.now_ns >= 2000000 && wire.now_ns <= 2003000);
+	CHECK_EQ(line_thrown_away(line), wire.flooded);
+	CHECK_EQ(line_transact(line, frame, len, answer, sizeof(answer), (span_t){ 2000000 }), len);
+	line_destroy(line);
+}
+
 static void shorten(struct fake_wire *wire, uint8_t *frame, size_t len)
 {
 	(void)wire;
