@@ -74,7 +74,8 @@ void cycle_push_sample(struct cycle *cy);
 void cycle_skip(struct cycle *cy, uint64_t count);
 /**
  * Which SYNC0 edge the frame's inputs belong to, by the DC time at which it passed. 1 if it was in
- * its window; 0 if it passed while the slaves were still putting the edge's inputs in place.
+ * its window; 0 if it passed while the slaves were still putting the edge's inputs in place, or
+ * brought no time that can be believed.
  */
 int cycle_place(struct cycle *cy, const struct exchange_result *res);
 /** Is each slave's sample good? Flags and counters say so. */

@@ -84,8 +84,11 @@ int cycle_place(struct cycle *cy, const struct exchange_result *res)
 {
 	struct numbering_place place;
 
-	if (cy->phase == CYCLE_CLOCKS || res->dc_time_ns == 0 || cy->servo.state == DC_OFF) {
+	if (cy->phase == CYCLE_CLOCKS || cy->servo.state == DC_OFF) {
 		return 1;
+	}
+	if (res->dc_time_ns == 0) {
+		return 0; /* whose inputs these are cannot be told */
 	}
 	place = numbering_place(&cy->numbering, cy->sample.cycle, res->dc_time_ns);
 	if (place.was_rebased) {

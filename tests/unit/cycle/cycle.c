@@ -19,6 +19,7 @@ static struct {
 	enum exchange_status status;
 	int64_t dc_offset_ns; /* DC time minus host time */
 	int64_t transit_ns;
+	int is_timeless; /* the reference's time in the frame is not to be believed */
 	unsigned late;
 	unsigned doubled;
 	uint8_t seen_output;
@@ -50,9 +51,9 @@ struct exchange_result exchange_run(struct exchange *ex, uint8_t *image, mono_t 
 		return res;
 	}
 	world.now.ns += world.transit_ns;
-	res.dc_time_ns = world.now.ns + world.dc_offset_ns;
+	res.dc_time_ns = world.is_timeless ? 0 : world.now.ns + world.dc_offset_ns;
 	if (world.conversions_from_dc) {
-		world.counter[0] = (uint16_t)(res.dc_time_ns / PERIOD_NS);
+		world.counter[0] = (uint16_t)((world.now.ns + world.dc_offset_ns) / PERIOD_NS);
 		world.counter[1] = (uint16_t)(world.counter[0] + 100);
 	}
 	if (world.status == EXCHANGE_OK) {
@@ -549,4 +550,22 @@ TEST(cycle, a_number_behind_by_three_edges_and_a_wake_late_by_two_are_set_right_
 	steps(20);
 	CHECK_EQ(stats.cycles_skipped, skipped);
 	CHECK(llabs(world.now.ns - step_ns - 20 * (int64_t)PERIOD_NS) < 100000);
+}
+
+/* Master and slaves were held up together: the frame is back, its time too far off to be believed.
+ */
+TEST(cycle, a_frame_without_a_time_is_late_and_never_taken_for_the_current_one)
+{
+	start_in_op();
+	steps(10);
+	world.is_timeless = 1;
+	world.late_ns = 22 * PERIOD_NS + 40000;
+	world.dc_offset_ns += 3 * PERIOD_NS;
+	steps(1);
+	world.is_timeless = 0;
+	steps(20);
+	CHECK_EQ(stats.samples_bad_unexplained, 0);
+	CHECK_EQ(stats.frames_late, 1);
+	CHECK(stats.samples_bad > 0);
+	CHECK_EQ(stats.samples_good, 2 * (10 + 10 + 20));
 }
