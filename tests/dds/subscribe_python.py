@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ FIELDS = [
     "counter",
     "sample_time_ns",
     "raw",
+    "taken_ns",
 ]
 
 
@@ -38,11 +40,13 @@ def of_samples(link: ecdaq.Link, seconds: float) -> Iterator[list[Any]]:
             s.counter,
             s.sample_time_ns,
             " ".join(map(str, s.raw)),
+            time.monotonic_ns(),
         ]
 
 
 def of_blocks(link: ecdaq.Link, seconds: float) -> Iterator[list[Any]]:
     for b in link.blocks(seconds):
+        taken_ns = time.monotonic_ns()
         n = b.channel_count
         for k in range(b.count):
             raw = b.raw[k * n : (k + 1) * n]
@@ -57,6 +61,7 @@ def of_blocks(link: ecdaq.Link, seconds: float) -> Iterator[list[Any]]:
                 b.counter[k],
                 b.sample_time_ns[k],
                 " ".join(map(str, raw)),
+                taken_ns,
             ]
 
 
