@@ -34,13 +34,13 @@ die()
 fresh=no
 port=2222
 key=
-timing='-accel tcg,thread=multi'
+timing=host
 check=no
 while [ $# -gt 0 ]; do
 	case $1 in
 	--fresh) fresh=yes ;;
 	--check) check=yes ;; # build.sh: are the options good?
-	--icount) timing='-accel tcg,thread=single -icount shift=0,sleep=off' ;;
+	--icount) timing=guest ;;
 	--ssh-port | --key)
 		[ $# -ge 2 ] || die "$1 needs a value"
 		case $1 in
@@ -83,14 +83,11 @@ if [ "$fresh" = yes ] || [ ! -f "$vm/disk.img" ] || ! cmp -s "$image/$name.sha25
 	cp "$image/$name.sha256" "$vm/made-of"
 fi
 cp "$image/$name-vmlinux" "$vm/vmlinux"
+cp "$image/$name.cmdline" "$vm/cmdline"
 cp "$key" "$vm/authorized_keys"
 # The boot partition starts at 4 MiB.
 "$here/qemu.sh" "$vm" mcopy -o -i disk.img@@4M authorized_keys ::ecdaq/authorized_keys
 
 echo "-- ssh -p $port -i $vm/key operator@127.0.0.1    (end: Ctrl-a x)" >&2
-# shellcheck disable=SC2086 # a list of options
-exec "$here/qemu.sh" "$vm" qemu-system-aarch64 -M virt,gic-version=3 -cpu cortex-a72 -smp 2 -m 1024 \
-	$timing -nographic -no-reboot -kernel vmlinux -append "$(cat "$image/$name.cmdline")" \
-	-drive file=disk.img,if=none,format=raw,id=disk -device virtio-blk-pci,drive=disk \
-	-netdev "user,id=lan,hostfwd=tcp:127.0.0.1:$port-:22" -device virtio-net-pci,netdev=lan,romfile= \
-	-device virtio-rng-pci "$@"
+exec "$here/virt.sh" "$vm" "$timing" -nographic \
+	-netdev "user,id=lan,hostfwd=tcp:127.0.0.1:$port-:22" -device virtio-net-pci,netdev=lan,romfile= "$@"

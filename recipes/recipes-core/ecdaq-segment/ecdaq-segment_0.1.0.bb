@@ -7,6 +7,7 @@ LIC_FILES_CHKSUM = "file://${WORKDIR}/LICENSE;md5=d93e890ea955514b83819d57248280
 
 SRC_URI = "file://ecdaq-segment.service \
            file://10-ecdaq-segment.netdev \
+           file://10-ecdaq-outside.link \
            file://LICENSE"
 FILESEXTRAPATHS:prepend := "${ECDAQ_TOP}:"
 
@@ -19,6 +20,7 @@ do_install() {
 	install -d "${D}/usr/lib/systemd/system" "${D}/usr/lib/systemd/network" \
 		"${D}/usr/share/doc/ecdaq-segment"
 	install -m 644 "${WORKDIR}/ecdaq-segment.service" "${D}/usr/lib/systemd/system/"
+	install -m 644 "${WORKDIR}/10-ecdaq-outside.link" "${D}/usr/lib/systemd/network/"
 	install -m 644 "${WORKDIR}/10-ecdaq-segment.netdev" "${D}/usr/lib/systemd/network/"
 	install -m 644 "${WORKDIR}/LICENSE" "${D}/usr/share/doc/ecdaq-segment/copyright"
 }

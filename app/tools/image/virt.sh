@@ -1,0 +1,38 @@
+#!/bin/sh
+# SPDX-License-Identifier: MIT
+# The machine qemuarm64, in a folder with disk.img, vmlinux and cmdline:
+# virt.sh FOLDER host|guest [QEMU-OPTION...]
+#
+# host:  its clock is the host's; both processors run at once. Function, not timing.
+# guest: its clock counts instructions, one a nanosecond, and stands still for nobody else: a cycle of
+#        1 ms holds whatever the host does. QEMU then runs one processor at a time and hands over when
+#        1/N of the time to the next timer is spent, N being the number of processors. With two, one
+#        waits up to half a cycle for the other. So N is 16, of which Linux uses two (nr_cpus=2; the
+#        others are never started), and the turns are short.
+# ECDAQ_APPEND adds words to the kernel's command line.
+set -eu
+
+[ $# -ge 2 ] || {
+	echo 'usage: app/tools/image/virt.sh FOLDER host|guest [QEMU-OPTION...]' >&2
+	exit 2
+}
+here=$(CDPATH='' cd -- "$(dirname -- "$0")" && pwd)
+folder=$1
+append="$(cat "$folder/cmdline") ${ECDAQ_APPEND:-}"
+case $2 in
+host) timing='-smp 2 -accel tcg,thread=multi' ;;
+guest)
+	timing='-smp 16 -accel tcg,thread=single -icount shift=0,sleep=off'
+	append="$append nr_cpus=2"
+	;;
+*)
+	echo "virt.sh: '$2' is neither host nor guest" >&2
+	exit 2
+	;;
+esac
+shift 2
+# shellcheck disable=SC2086 # a list of options
+exec "$here/qemu.sh" "$folder" qemu-system-aarch64 -M virt,gic-version=3 -cpu cortex-a72 -m 1024 $timing \
+	-no-reboot -kernel vmlinux -append "$append" \
+	-drive file=disk.img,if=none,format=raw,id=disk -device virtio-blk-pci,drive=disk,num-queues=1 \
+	-device virtio-rng-pci "$@"
