@@ -22,10 +22,16 @@ struct client {
 	struct admin_reply reply;
 };
 
-struct admin_server {
-	int listener;
-	int poller;
+struct listener {
+	int fd; /* -1: none */
 	char path[sizeof(((struct sockaddr_un *)0)->sun_path)];
+};
+
+struct admin_server {
+	int poller;
+	struct listener admin;
+	struct listener offer; /* of the board */
+	int board_fd;
 	struct client client[ADMIN_CLIENTS];
 };
 
@@ -36,31 +42,64 @@ static int fail(char *error, size_t error_bytes, const char *path, int r)
 }
 
 /* Mode and group stand before anybody can connect: the socket gets its name last. */
-static int listen_at(struct admin_server *server, gid_t group)
+static int name_it(const struct listener *listener, gid_t group)
 {
 	struct sockaddr_un address = { .sun_family = AF_UNIX };
 	char temporary[sizeof(address.sun_path)];
-	struct epoll_event interest = { .events = EPOLLIN };
 
-	if (snprintf(temporary, sizeof(temporary), "%s.new", server->path) >=
+	if (snprintf(temporary, sizeof(temporary), "%s.new", listener->path) >=
 	    (int)sizeof(temporary)) {
 		return -ENAMETOOLONG;
 	}
 	memcpy(address.sun_path, temporary, sizeof(temporary));
 	unlink(temporary);
-	if (bind(server->listener, (const struct sockaddr *)&address, sizeof(address)) < 0) {
+	if (bind(listener->fd, (const struct sockaddr *)&address, sizeof(address)) < 0) {
 		return -errno;
 	}
 	if (chmod(temporary, SOCKET_MODE) < 0 ||
 	    (group != (gid_t)-1 && chown(temporary, (uid_t)-1, group) < 0) ||
-	    listen(server->listener, ADMIN_CLIENTS) < 0 || rename(temporary, server->path) < 0 ||
-	    epoll_ctl(server->poller, EPOLL_CTL_ADD, server->listener, &interest) < 0) {
+	    listen(listener->fd, ADMIN_CLIENTS) < 0 || rename(temporary, listener->path) < 0) {
 		int r = -errno;
 
 		unlink(temporary);
 		return r;
 	}
 	return 0;
+}
+
+static void listener_close(struct listener *listener)
+{
+	if (listener->fd >= 0) {
+		close(listener->fd);
+		listener->fd = -1;
+	}
+	if (listener->path[0] != '\0') {
+		unlink(listener->path);
+		listener->path[0] = '\0';
+	}
+}
+
+static int listen_at(struct listener *listener, const char *path, gid_t group, int poller)
+{
+	struct epoll_event interest = { .events = EPOLLIN };
+	int r;
+
+	if (snprintf(listener->path, sizeof(listener->path), "%s", path) >=
+	    (int)sizeof(listener->path)) {
+		r = -ENAMETOOLONG;
+	} else {
+		listener->fd = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+		r = listener->fd < 0 ? -errno : name_it(listener, group);
+	}
+	if (r < 0) {
+		listener->path[0] = '\0'; /* nothing of ours stands there */
+	} else if (epoll_ctl(poller, EPOLL_CTL_ADD, listener->fd, &interest) < 0) {
+		r = -errno;
+	}
+	if (r < 0) {
+		listener_close(listener);
+	}
+	return r;
 }
 
 int admin_server_create(const char *path, gid_t group, struct admin_server **ret_server,
@@ -72,26 +111,28 @@ int admin_server_create(const char *path, gid_t group, struct admin_server **ret
 	if (server == NULL) {
 		return fail(error, error_bytes, path, -ENOMEM);
 	}
+	server->admin.fd = -1;
+	server->offer.fd = -1;
 	for (size_t i = 0; i < ADMIN_CLIENTS; i++) {
 		server->client[i].fd = -1;
 	}
 	server->poller = epoll_create1(EPOLL_CLOEXEC);
-	server->listener = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-	r = server->poller < 0 || server->listener < 0 ? -errno : 0;
-	if (r == 0 &&
-	    snprintf(server->path, sizeof(server->path), "%s", path) >= (int)sizeof(server->path)) {
-		r = -ENAMETOOLONG;
-	}
-	if (r == 0) {
-		r = listen_at(server, group);
-	}
+	r = server->poller < 0 ? -errno : listen_at(&server->admin, path, group, server->poller);
 	if (r < 0) {
-		server->path[0] = '\0'; /* nothing of ours stands there */
 		admin_server_destroy(server);
 		return fail(error, error_bytes, path, r);
 	}
 	*ret_server = server;
 	return 0;
+}
+
+int admin_server_offer_board(struct admin_server *server, const char *path, gid_t group,
+			     int board_fd, char *error, size_t error_bytes)
+{
+	int r = listen_at(&server->offer, path, group, server->poller);
+
+	server->board_fd = board_fd;
+	return r < 0 ? fail(error, error_bytes, path, r) : 0;
 }
 
 static void client_close(struct client *client)
@@ -111,14 +152,10 @@ void admin_server_destroy(struct admin_server *server)
 			client_close(&server->client[i]);
 		}
 	}
-	if (server->listener >= 0) {
-		close(server->listener);
-	}
+	listener_close(&server->admin);
+	listener_close(&server->offer);
 	if (server->poller >= 0) {
 		close(server->poller);
-	}
-	if (server->path[0] != '\0') {
-		unlink(server->path);
 	}
 	free(server);
 }
@@ -166,7 +203,7 @@ static void accept_clients(struct admin_server *server)
 	struct epoll_event interest = { .events = EPOLLIN };
 	int fd;
 
-	while ((fd = accept4(server->listener, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC)) >= 0) {
+	while ((fd = accept4(server->admin.fd, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC)) >= 0) {
 		struct client *client = free_client(server);
 
 		if (client == NULL) {
@@ -242,11 +279,48 @@ static void answer_due(struct client *client, const struct admin_target *target,
 	}
 }
 
+/* One byte, for the descriptor to travel with; nothing is read and nobody is waited for. */
+static void give_board(int to, int board_fd)
+{
+	char byte = 0;
+	struct iovec data = { .iov_base = &byte, .iov_len = sizeof(byte) };
+	union {
+		struct cmsghdr header;
+		char bytes[CMSG_SPACE(sizeof(int))];
+	} control = { .bytes = { 0 } };
+	struct msghdr message = { .msg_iov = &data,
+				  .msg_iovlen = 1,
+				  .msg_control = &control,
+				  .msg_controllen = sizeof(control.bytes) };
+	struct cmsghdr *header = CMSG_FIRSTHDR(&message);
+
+	header->cmsg_level = SOL_SOCKET;
+	header->cmsg_type = SCM_RIGHTS;
+	header->cmsg_len = CMSG_LEN(sizeof(int));
+	memcpy(CMSG_DATA(header), &board_fd, sizeof(board_fd));
+	(void)!sendmsg(to, &message, MSG_NOSIGNAL | MSG_DONTWAIT);
+}
+
+static void serve_offer(const struct admin_server *server)
+{
+	int fd;
+
+	for (int n = 0; server->offer.fd >= 0 && n < ADMIN_CLIENTS; n++) {
+		fd = accept4(server->offer.fd, NULL, NULL, SOCK_CLOEXEC);
+		if (fd < 0) {
+			return;
+		}
+		give_board(fd, server->board_fd);
+		close(fd);
+	}
+}
+
 unsigned admin_server_service(struct admin_server *server, const struct admin_target *target,
 			      mono_t now)
 {
 	unsigned waiting = 0;
 
+	serve_offer(server);
 	accept_clients(server);
 	for (size_t i = 0; i < ADMIN_CLIENTS; i++) {
 		struct client *client = &server->client[i];

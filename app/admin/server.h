@@ -24,7 +24,14 @@ struct admin_server;
  */
 int admin_server_create(const char *path, gid_t group, struct admin_server **ret_server,
 			char *error, size_t error_bytes);
-/** Closes all clients and removes the socket. NULL is fine. */
+/**
+ * Give the board behind @board_fd (kept by the caller) to whoever connects to the socket at @path,
+ * of the same mode: who may write outputs of owner remote need not reach the admin socket. 0 or
+ * -errno with one line in @error. Context: blocking.
+ */
+int admin_server_offer_board(struct admin_server *server, const char *path, gid_t group,
+			     int board_fd, char *error, size_t error_bytes);
+/** Closes all clients and removes the sockets. NULL is fine. */
 void admin_server_destroy(struct admin_server *server);
 
 /** A descriptor that polls readable when admin_server_service() has something to do. */

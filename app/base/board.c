@@ -1,7 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 #include "board.h"
 
+#include <errno.h>
+#include <fcntl.h>
 #include <string.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #define RELAXED memory_order_relaxed
 
@@ -10,6 +15,77 @@ void board_init(struct board *board)
 	memset(board, 0, sizeof(*board));
 	board->magic = BOARD_MAGIC;
 	board->bytes = sizeof(*board);
+}
+
+static struct board *map(int fd)
+{
+	void *board = mmap(NULL, sizeof(struct board), PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
+
+	return board == MAP_FAILED ? NULL : board;
+}
+
+static struct board *fill_shared(int fd)
+{
+	struct board *board;
+
+	if (ftruncate(fd, sizeof(*board)) < 0 ||
+	    fcntl(fd, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL) < 0) {
+		return NULL;
+	}
+	board = map(fd);
+	if (board != NULL) {
+		board_init(board); /* writes every page, so that the cycle is not the first to */
+	}
+	return board;
+}
+
+struct board *board_create_shared(int *ret_fd)
+{
+	int fd = memfd_create("ecdaq-board", MFD_CLOEXEC | MFD_ALLOW_SEALING);
+	struct board *board;
+
+	if (fd < 0) {
+		return NULL;
+	}
+	board = fill_shared(fd);
+	if (board == NULL) {
+		int err = errno;
+
+		close(fd);
+		errno = err;
+		return NULL;
+	}
+	*ret_fd = fd;
+	return board;
+}
+
+struct board *board_map(int fd)
+{
+	struct board *board;
+	struct stat st;
+	int seals = fcntl(fd, F_GET_SEALS);
+
+	if (fstat(fd, &st) < 0) {
+		return NULL;
+	}
+	if (seals < 0 || (seals & F_SEAL_SHRINK) == 0 || st.st_size != (off_t)sizeof(*board)) {
+		errno = EPROTO;
+		return NULL;
+	}
+	board = map(fd);
+	if (board != NULL && (board->magic != BOARD_MAGIC || board->bytes != sizeof(*board))) {
+		board_unmap(board);
+		errno = EPROTO;
+		return NULL;
+	}
+	return board;
+}
+
+void board_unmap(struct board *board)
+{
+	if (board != NULL) {
+		munmap(board, sizeof(*board));
+	}
 }
 
 void board_begin(struct board *board)

@@ -40,6 +40,20 @@ struct board_set {
 };
 
 void board_init(struct board *board);
+
+/**
+ * A board in memory that a process that may be hostile can be given to write (@ret_fd): sealed, so
+ * that nobody can shorten it and let the reader run into nothing (SIGBUS). NULL with errno. Free
+ * with board_unmap() and close(). Context: blocking.
+ */
+struct board *board_create_shared(int *ret_fd);
+/**
+ * Map a board that was given to us. NULL with errno; EPROTO: not a board of this version, or one
+ * that could be shortened under us. @fd may be closed. Context: blocking.
+ */
+struct board *board_map(int fd);
+void board_unmap(struct board *board);
+
 /** Put one value into the next set; board_commit() makes it visible. Context: the writer. */
 void board_put(struct board *board, unsigned output, uint64_t raw);
 /** Take the value of one output back in the next set: fail-safe from then on. Context: the writer.

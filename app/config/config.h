@@ -158,7 +158,7 @@ int config_parse_duration(const char *text, int64_t *ret_ns, char *why);
 #define CONFIG_RUN_STATUS "status"                   /* struct status_page */
 #define CONFIG_RUN_RECORD_STATUS "record-status"     /* struct record_status */
 #define CONFIG_RUN_DDS_STATUS "dds-status"           /* struct dds_status */
-#define CONFIG_RUN_COMMANDS_REMOTE "commands-remote" /* struct board, for ecdaq-dds */
+#define CONFIG_RUN_COMMANDS_REMOTE "commands-remote" /* socket that gives ecdaq-dds its board */
 #define CONFIG_RUN_ADMIN "admin"                     /* socket, admin/protocol.h */
 
 /** Where the run directory is: @cfg->run_dir, else $ECDAQ_RUN_DIR, else /run/ecdaq (root) or

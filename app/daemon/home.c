@@ -17,7 +17,7 @@
 
 #include "base/event.h"
 
-enum { DIR_MODE = 0750, FILE_MODE = 0640, BOARD_MODE = 0660, GROUP_BYTES = 4096 };
+enum { DIR_MODE = 0750, FILE_MODE = 0640, GROUP_BYTES = 4096 };
 
 int home_path(const struct home *home, const char *file, char *ret_path, size_t path_bytes)
 {
@@ -194,16 +194,10 @@ static int make_events(struct home *home, const struct config *cfg, struct failu
 	return r < 0 ? fail(failure, path, -r) : 0;
 }
 
-/* The one file here that its group may write: who may, may only fill in outputs of owner remote. */
 static int make_remote(struct home *home, struct failure *failure)
 {
-	char path[CONFIG_PATH_BYTES + 16];
-
-	if (home_path(home, CONFIG_RUN_COMMANDS_REMOTE, path, sizeof(path)) < 0) {
-		return fail(failure, home->dir, ENAMETOOLONG);
-	}
-	home->remote = status_create(path, BOARD_MAGIC, sizeof(*home->remote), BOARD_MODE);
-	return home->remote == NULL ? fail(failure, path, errno) : 0;
+	home->remote = board_create_shared(&home->remote_fd);
+	return home->remote == NULL ? fail(failure, "remote command board", errno) : 0;
 }
 
 int home_open(struct home *home, const struct config *cfg, const struct platform *platform,
@@ -213,6 +207,7 @@ int home_open(struct home *home, const struct config *cfg, const struct platform
 
 	memset(home, 0, sizeof(*home));
 	home->lock = -1;
+	home->remote_fd = -1;
 	if (config_run_path(cfg, "", home->dir, sizeof(home->dir)) < 0) {
 		return failure_set(failure, EXIT_CODE_CONFIG, -ENAMETOOLONG,
 				   "runtime.run_dir: the path is too long");
@@ -247,8 +242,12 @@ void home_close(struct home *home)
 		home->events = NULL;
 	}
 	if (home->remote != NULL) {
-		status_unmap(home->remote, sizeof(*home->remote));
+		board_unmap(home->remote);
 		home->remote = NULL;
+	}
+	if (home->remote_fd >= 0) {
+		close(home->remote_fd);
+		home->remote_fd = -1;
 	}
 	if (home->page != NULL) {
 		status_unmap(home->page, sizeof(*home->page));

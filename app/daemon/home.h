@@ -25,6 +25,7 @@ struct home {
 	struct status_page *page;
 	struct ring *events;
 	struct board *remote; /* outputs as ecdaq-dds wants them */
+	int remote_fd;        /* the same, to be given to it; -1: none */
 };
 
 enum home_segment { HOME_REAL, HOME_SIMULATED };

@@ -198,11 +198,27 @@ int session_is_pressed(const struct session *session)
 
 /* --- life --- */
 
+static int open_sockets(struct session *s, char *error, size_t error_bytes)
+{
+	char admin[CONFIG_PATH_BYTES + 16];
+	char remote[CONFIG_PATH_BYTES + 16];
+	int r = home_path(&s->home, CONFIG_RUN_ADMIN, admin, sizeof(admin));
+
+	r = r < 0 ? r : home_path(&s->home, CONFIG_RUN_COMMANDS_REMOTE, remote, sizeof(remote));
+	if (r < 0) {
+		snprintf(error, error_bytes, "%s: %s", s->home.dir, strerror(-r));
+		return r;
+	}
+	r = admin_server_create(admin, s->home.group, &s->admin, error, error_bytes);
+	return r < 0 ? r
+		     : admin_server_offer_board(s->admin, remote, s->home.group, s->home.remote_fd,
+						error, error_bytes);
+}
+
 int session_create(const struct session_spec *spec, struct session **ret_session,
 		   struct failure *failure)
 {
 	struct session *s = aligned_alloc(64, (sizeof(*s) + 63) / 64 * 64);
-	char path[CONFIG_PATH_BYTES + 16];
 	char error[FAILURE_TEXT_BYTES];
 	int r;
 
@@ -216,12 +232,7 @@ int session_create(const struct session_spec *spec, struct session **ret_session
 		session_destroy(s);
 		return r;
 	}
-	r = home_path(&s->home, CONFIG_RUN_ADMIN, path, sizeof(path));
-	if (r == 0) {
-		r = admin_server_create(path, s->home.group, &s->admin, error, sizeof(error));
-	} else {
-		snprintf(error, sizeof(error), "%s: %s", s->home.dir, strerror(-r));
-	}
+	r = open_sockets(s, error, sizeof(error));
 	if (r < 0) {
 		session_destroy(s);
 		return failure_set(failure,

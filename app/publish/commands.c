@@ -71,6 +71,7 @@ int commands_create(const struct config *cfg, struct commands **ret_commands)
 		return -ENOMEM;
 	}
 	c->cfg = cfg;
+	remote_board_init(&c->board);
 	pthread_mutex_init(&c->lock, NULL);
 	c->gate = gate_create(cfg);
 	r = c->gate == NULL ? -ENOMEM

@@ -2,62 +2,112 @@
 #include "publish/remote_board.h"
 
 #include <errno.h>
-#include <fcntl.h>
-#include <sys/mman.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/un.h>
 #include <unistd.h>
 
-static int map_board(struct remote_board *rb, int fd)
+void remote_board_init(struct remote_board *rb)
 {
-	struct stat st;
-	struct board *board;
+	*rb = (struct remote_board){ .socket = -1 };
+}
 
-	if (fstat(fd, &st) < 0) {
+static int ask(struct remote_board *rb)
+{
+	struct sockaddr_un address = { .sun_family = AF_UNIX };
+
+	if (snprintf(address.sun_path, sizeof(address.sun_path), "%s", rb->path) >=
+	    (int)sizeof(address.sun_path)) {
+		return -ENAMETOOLONG;
+	}
+	rb->socket = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+	if (rb->socket < 0) {
 		return -errno;
 	}
-	if (st.st_size != (off_t)sizeof(*board)) {
-		return -EPROTO;
+	if (connect(rb->socket, (const struct sockaddr *)&address, sizeof(address)) < 0) {
+		int r = -errno;
+
+		remote_board_close(rb);
+		return r;
 	}
-	board = mmap(NULL, sizeof(*board), PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
-	if (board == MAP_FAILED) {
-		return -errno;
+	return 0;
+}
+
+/* The descriptor that came with @message; -1: none. */
+static int descriptor_of(struct msghdr *message)
+{
+	int fd = -1;
+
+	for (struct cmsghdr *c = CMSG_FIRSTHDR(message); c != NULL; c = CMSG_NXTHDR(message, c)) {
+		if (c->cmsg_level == SOL_SOCKET && c->cmsg_type == SCM_RIGHTS &&
+		    c->cmsg_len == CMSG_LEN(sizeof(int))) {
+			memcpy(&fd, CMSG_DATA(c), sizeof(fd));
+		}
 	}
-	if (board->magic != BOARD_MAGIC || board->bytes != sizeof(*board)) {
-		munmap(board, sizeof(*board));
-		return -EPROTO;
+	return fd;
+}
+
+static int receive(struct remote_board *rb)
+{
+	char byte;
+	struct iovec data = { .iov_base = &byte, .iov_len = sizeof(byte) };
+	union {
+		struct cmsghdr header;
+		char bytes[CMSG_SPACE(sizeof(int))];
+	} control;
+	struct msghdr message = { .msg_iov = &data,
+				  .msg_iovlen = 1,
+				  .msg_control = &control,
+				  .msg_controllen = sizeof(control.bytes) };
+	ssize_t len = recvmsg(rb->socket, &message, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
+	int fd;
+	int r;
+
+	if (len < 0 && (errno == EAGAIN || errno == EINTR)) {
+		return 0;
 	}
-	rb->board = board;
-	rb->inode = st.st_ino;
-	rb->device = st.st_dev;
-	return 1;
+	r = len < 0 ? -errno : -EPROTO;
+	fd = len < 0 ? -1 : descriptor_of(&message);
+	close(rb->socket);
+	rb->socket = -1;
+	if (fd >= 0) {
+		rb->board = board_map(fd);
+		r = rb->board == NULL ? -errno : 1;
+		close(fd);
+	}
+	return r;
 }
 
 int remote_board_follow(struct remote_board *rb)
 {
 	struct stat st;
-	int fd;
 	int r;
 
 	if (stat(rb->path, &st) < 0) {
 		return -errno;
 	}
-	if (rb->board != NULL && rb->inode == st.st_ino && rb->device == st.st_dev) {
+	/* An inode's number may be used again at once. */
+	if (rb->inode != st.st_ino || rb->made.tv_sec != st.st_ctim.tv_sec ||
+	    rb->made.tv_nsec != st.st_ctim.tv_nsec) {
+		remote_board_close(rb);
+	}
+	if (rb->board != NULL) {
 		return 0;
 	}
-	remote_board_close(rb);
-	fd = open(rb->path, O_RDWR | O_CLOEXEC | O_NOFOLLOW);
-	if (fd < 0) {
-		return -errno;
-	}
-	r = map_board(rb, fd);
-	close(fd);
-	return r;
+	r = rb->socket < 0 ? ask(rb) : 0;
+	rb->inode = st.st_ino;
+	rb->made = st.st_ctim;
+	return r < 0 ? r : receive(rb);
 }
 
 void remote_board_close(struct remote_board *rb)
 {
-	if (rb->board != NULL) {
-		munmap(rb->board, sizeof(*rb->board));
-		rb->board = NULL;
+	if (rb->socket >= 0) {
+		close(rb->socket);
+		rb->socket = -1;
 	}
+	board_unmap(rb->board);
+	rb->board = NULL;
 }

@@ -14,7 +14,7 @@
 /* A server in a directory of its own, and the fake session behind it. */
 struct bench {
 	char dir[64];
-	char path[80];
+	char path[100];
 	struct admin_server *server;
 	struct fake fake;
 	mono_t now;
@@ -253,4 +253,52 @@ TEST(admin_server, a_path_that_cannot_be_had_is_one_line)
 		 -ENOENT);
 	CHECK_STR(error, "admin socket /nowhere/admin: No such file or directory");
 	CHECK(server == NULL);
+}
+
+TEST(admin_server, the_board_is_given_to_each_who_connects_to_its_own_socket)
+{
+	struct bench b;
+	char path[100];
+	char error[256];
+	char byte;
+	union {
+		struct cmsghdr header;
+		char bytes[CMSG_SPACE(sizeof(int))];
+	} control;
+	struct iovec data = { .iov_base = &byte, .iov_len = 1 };
+	struct msghdr message = { .msg_iov = &data, .msg_iovlen = 1 };
+	struct stat st;
+	int board_fd = -1;
+	struct board *board = board_create_shared(&board_fd);
+	struct board *given;
+	int fd;
+
+	bench_open(&b);
+	snprintf(path, sizeof(path), "%s/commands-remote", b.dir);
+	CHECK_EQ(
+		admin_server_offer_board(b.server, path, (gid_t)-1, board_fd, error, sizeof(error)),
+		0);
+	CHECK_EQ(stat(path, &st), 0);
+	CHECK_EQ(st.st_mode & 07777, 0660);
+	for (int i = 0; i < 2; i++) {
+		snprintf(b.path, sizeof(b.path), "%s", path);
+		fd = bench_connect(&b);
+		CHECK(has_answer(admin_server_fd(b.server)));
+		service(&b);
+		CHECK(!has_answer(admin_server_fd(b.server)));
+		message.msg_control = &control;
+		message.msg_controllen = sizeof(control.bytes);
+		CHECK_EQ(recvmsg(fd, &message, MSG_DONTWAIT | MSG_CMSG_CLOEXEC), 1);
+		close(fd);
+		memcpy(&fd, CMSG_DATA(&control.header), sizeof(fd));
+		given = board_map(fd);
+		CHECK(given != NULL);
+		board_put(given, 1, 40 + (unsigned)i);
+		CHECK_EQ(board->output[1].raw, 40 + (unsigned)i);
+		board_unmap(given);
+		close(fd);
+	}
+	board_unmap(board);
+	close(board_fd);
+	bench_close(&b); /* both sockets are gone with the server */
 }

@@ -1,7 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 #include "base/board.h"
 
+#include <errno.h>
+#include <fcntl.h>
 #include <pthread.h>
+#include <unistd.h>
 
 #include "harness/test.h"
 
@@ -90,4 +93,31 @@ TEST(board, output_taken_back_is_not_set_in_the_next_set)
 	CHECK_EQ(board_take(&board, 8, &set), 1);
 	CHECK_EQ(set.is_set[3], 0);
 	CHECK_EQ(set.is_set[4], 1);
+}
+
+TEST(board, whoever_is_given_a_shared_one_cannot_shorten_it_and_can_only_empty_it)
+{
+	int fd = -1;
+	struct board *mine = board_create_shared(&fd);
+	struct board *given;
+
+	CHECK(mine != NULL);
+	memset(&set, 0, sizeof(set));
+	given = board_map(fd);
+	CHECK(given != NULL);
+	board_begin(given);
+	board_put(given, 511, 5);
+	board_commit(given);
+	CHECK(board_take(mine, BOARD_OUTPUTS, &set));
+	CHECK_EQ(set.raw[511], 5);
+	CHECK_EQ(ftruncate(fd, 0), -1);
+	CHECK_EQ(errno, EPERM);
+	CHECK_EQ(ftruncate(fd, sizeof(*mine) * 2), -1);
+	CHECK_EQ(fcntl(fd, F_ADD_SEALS, F_SEAL_WRITE), -1);
+	CHECK_EQ(fallocate(fd, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, 0, sizeof(*mine)), 0);
+	CHECK(board_take(mine, BOARD_OUTPUTS, &set)); /* zeros: nothing is set */
+	CHECK_EQ(set.is_set[511], 0);
+	board_unmap(given);
+	board_unmap(mine);
+	close(fd);
 }
