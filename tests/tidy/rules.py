@@ -23,11 +23,12 @@ INCLUDE_TABLE: dict[str, set[str]] = {
     "wire": {"base"},
     "config": {"base"},
     "image": {"base", "wire"},
+    "control": {"base", "config", "image"},
     "link": {"base", "wire", "image"},
     "bus": {"base", "wire", "config", "image", "link"},
-    "cycle": {"base", "wire", "config", "image", "link", "bus"},
+    "cycle": {"base", "wire", "config", "image", "link", "bus", "control"},
     "admin": {"base", "wire", "config", "image", "cycle"},
-    "daemon": {"base", "wire", "config", "image", "link", "bus", "cycle", "admin"},
+    "daemon": {"base", "wire", "config", "image", "link", "bus", "control", "cycle", "admin"},
     "record": READERS,
     "publish": READERS,
     "sync0": READERS,
@@ -79,7 +80,7 @@ BANNED_CALLS: list[tuple[str, str, str]] = [
     ),
 ]
 # Allocation belongs to start-up: these modules allocate in functions that are named for it.
-NO_ALLOCATION_MODULES = ("wire", "image", "cycle", "link")
+NO_ALLOCATION_MODULES = ("wire", "image", "control", "cycle", "link")
 ALLOCATING_FUNCTION = re.compile(r"_(create|open|start|grow|load|copy)\b|^main$")
 
 FUNCTION_LINES = 70
