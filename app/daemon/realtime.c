@@ -13,6 +13,8 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "base/cpu_list.h"
+
 #define DMA_LATENCY_PATH "/dev/cpu_dma_latency"
 #define ISOLATED_PATH "/sys/devices/system/cpu/isolated"
 
@@ -38,27 +40,6 @@ static void report(struct realtime *rt, enum event_rt which, int err, const char
 
 /* --- cores --- */
 
-int realtime_list_has(const char *list, int cpu)
-{
-	while (*list != '\0') {
-		char *end;
-		long first = strtol(list, &end, 10);
-		long last = first;
-
-		if (end == list) {
-			return 0;
-		}
-		if (*end == '-') {
-			last = strtol(end + 1, &end, 10);
-		}
-		if (cpu >= first && cpu <= last) {
-			return 1;
-		}
-		list = *end == ',' ? end + 1 : "";
-	}
-	return 0;
-}
-
 int realtime_is_isolated(int cpu)
 {
 	char list[1024];
@@ -71,7 +52,7 @@ int realtime_is_isolated(int cpu)
 	len = read(fd, list, sizeof(list) - 1);
 	close(fd);
 	list[len > 0 ? len : 0] = '\0';
-	return realtime_list_has(list, cpu);
+	return cpu_list_has(list, cpu);
 }
 
 /* This thread, and those it will start, keep off the cycle's core, unless there is no other. */

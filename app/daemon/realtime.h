@@ -46,9 +46,7 @@ int realtime_cycle_start(void *ctx, struct cycle *cycle, struct failure *failure
 int realtime_cycle_end(void *ctx);
 int realtime_cycle_has_ended(void *ctx);
 
-/** 1 if the kernel keeps other work off @cpu (isolcpus). @list is the kernel's: "1-3,5". */
-int realtime_list_has(const char *list, int cpu);
-/** The same for this machine. */
+/** 1 if the kernel of this machine keeps other work off @cpu (isolcpus). */
 int realtime_is_isolated(int cpu);
 
 #endif
