@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
-from machine import IMAGE, NAME, Machine
+from machine import IMAGE, NAME, Machine, Space
 
 KEEP = Path(__file__).resolve().parents[2] / "build" / "test-logs"
 
@@ -39,12 +39,14 @@ def machine(
     request: pytest.FixtureRequest, image: Path, key: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Machine]:
     """The machine of a file, set up by its BOOT_FILES, up to its login prompt."""
-    vm = Machine(tmp_path_factory.mktemp("vm"), image, key)
-    files = dict(getattr(request.module, "BOOT_FILES", {}))
-    if getattr(request.module, "WITH_KEY", True):
+    module = request.module
+    space = Space() if getattr(module, "OUTSIDE", False) else None
+    vm = Machine(
+        tmp_path_factory.mktemp("vm"), image, key, getattr(module, "TIMING", "guest"), space
+    )
+    files = dict(getattr(module, "BOOT_FILES", {}))
+    if getattr(module, "WITH_KEY", True):
         files["authorized_keys"] = key.with_suffix(".pub").read_text()
-    if getattr(request.module, "IN_GUEST_TIME", False):
-        vm.accelerator = ["-accel", "tcg,thread=single", "-icount", "shift=0,sleep=off"]
     failed_before = request.session.testsfailed
     try:
         vm.lay_boot_files(files)
@@ -53,7 +55,9 @@ def machine(
         yield vm
     finally:
         vm.stop()
+        if space is not None:
+            space.close()
         if request.session.testsfailed > failed_before or vm.has_console():
             KEEP.mkdir(parents=True, exist_ok=True)
-            target = KEEP / f"console-{Path(request.module.__file__).stem}.log"
+            target = KEEP / f"console-{Path(module.__file__).stem}.log"
             target.write_text(vm.console())

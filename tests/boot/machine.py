@@ -18,11 +18,16 @@ from typing import Any
 TOP = Path(__file__).resolve().parents[2]
 IMAGE = TOP / "build" / "image" / "qemuarm64"
 NAME = "ecdaq-image-ecdaq-qemuarm64"
-QEMU_SH = TOP / "app" / "tools" / "image" / "qemu.sh"
+TOOLS = TOP / "app" / "tools" / "image"
 # An emulator on a busy machine: limits that only a hang exceeds.
-BOOT_S = float(os.environ.get("ECDAQ_BOOT_SECONDS", "300"))
+BOOT_S = float(os.environ.get("ECDAQ_BOOT_SECONDS", "900"))
 POLL_S = 0.2
 ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]|\r")
+
+
+def profile(timing: str) -> str:
+    """The settings for emulation that ./build.sh boot takes, too."""
+    return (TOOLS / f"profile-{timing}.yaml").read_text()
 
 
 class WaitError(AssertionError):
@@ -48,29 +53,65 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-class Machine:
-    """One virtual machine with a disk of its own, made from the image."""
+class Space:
+    """A network namespace with two taps: the machine's LAN port and its EtherCAT port."""
 
-    def __init__(self, folder: Path, image: Path, key: Path) -> None:
+    HOST, GUEST = "192.168.77.1", "192.168.77.2"
+
+    def __init__(self) -> None:
+        self.holder = subprocess.Popen(
+            ["unshare", "--net", "sh", "-c", "echo ready; exec cat"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert self.holder.stdout is not None
+        assert self.holder.stdout.readline() == "ready\n", "no network namespace to be had"
+        self.enter = ["nsenter", "--target", str(self.holder.pid), "--net"]
+        self.run("ip", "link", "set", "lo", "up")
+        for tap in ("lan", "ecat"):
+            self.run("ip", "tuntap", "add", "dev", tap, "mode", "tap")
+        self.run("ip", "link", "set", "ecat", "arp", "off", "multicast", "off", "up")
+        self.run("ip", "address", "add", f"{self.HOST}/24", "dev", "lan")
+        self.run("ip", "link", "set", "lan", "multicast", "on", "up")
+
+    def run(self, *command: str) -> None:
+        subprocess.run([*self.enter, *command], check=True, capture_output=True, timeout=60)
+
+    def close(self) -> None:
+        assert self.holder.stdin is not None
+        self.holder.stdin.close()
+        self.holder.wait(10)
+
+
+class Machine:
+    """One virtual machine with a disk of its own, made from the image.
+
+    timing: "guest" or "host", see app/tools/image/virt.sh. With a space, its ports lead there.
+    """
+
+    def __init__(
+        self, folder: Path, image: Path, key: Path, timing: str, space: Space | None = None
+    ) -> None:
         self.folder = folder
         self.key = key
+        self.timing = timing
+        self.space = space
         self.disk = folder / "disk.img"
         subprocess.run(["cp", "--sparse=always", image, self.disk], check=True)
         # The data partition has to grow into what the image does not have.
         with self.disk.open("r+b") as disk:
             disk.truncate(2 << 30)
         shutil.copy(IMAGE / f"{NAME}-vmlinux", folder / "vmlinux")
-        self.cmdline = (IMAGE / f"{NAME}.cmdline").read_text().strip()
+        shutil.copy(IMAGE / f"{NAME}.cmdline", folder / "cmdline")
         self.port = free_port()
         self.process: subprocess.Popen[bytes] | None = None
         self.boots = 0
-        # What the processor emulation is told; see test_20_segment.py for guest time.
-        self.accelerator = ["-accel", "tcg,thread=multi"]
 
     def tool(self, *command: str | Path) -> subprocess.CompletedProcess[str]:
         """A program of the SDK chroot, in the folder of this machine."""
         return subprocess.run(
-            [QEMU_SH, self.folder, *command], check=True, capture_output=True, text=True
+            [TOOLS / "qemu.sh", self.folder, *command], check=True, capture_output=True, text=True
         )
 
     def lay_boot_files(self, files: Mapping[str, str]) -> None:
@@ -82,21 +123,32 @@ class Machine:
                 self.tool("mmd", "-D", "s", "-i", "disk.img@@4M", f"::ecdaq/{parent}")
             self.tool("mcopy", "-o", "-i", "disk.img@@4M", "file", f"::ecdaq/{name}")
 
-    def start(self, extra: str = "") -> None:
-        """Power on. The console of every boot goes to the same log, one behind the other."""
+    def ports(self) -> list[str]:
+        """QEMU's options for the machine's network."""
+        nic = "virtio-net-pci,romfile="
+        if self.space is None:
+            forward = f"user,id=lan,hostfwd=tcp:127.0.0.1:{self.port}-:22"
+            return ["-netdev", forward, "-device", f"{nic},netdev=lan"]
+        tap = "tap,script=no,downscript=no"
+        return [
+            *("-netdev", f"{tap},id=lan,ifname=lan", "-device", f"{nic},netdev=lan"),
+            *("-netdev", f"{tap},id=ecat,ifname=ecat"),
+            *("-device", f"{nic},netdev=ecat,mac=52:54:00:ec:da:01"),
+        ]
+
+    def start(self, append: str = "", options: tuple[str, ...] = ()) -> None:
+        """Power on. Each boot has a console log of its own."""
         assert self.process is None
         self.boots += 1
         log = self.folder / f"console-{self.boots}.log"
-        command: list[str | Path] = [QEMU_SH, self.folder, "qemu-system-aarch64"]
-        command += ["-M", "virt,gic-version=3", "-cpu", "cortex-a72", "-smp", "2", "-m", "1024"]
-        command += [*self.accelerator, "-display", "none", "-no-reboot"]
-        command += ["-kernel", "vmlinux", "-append", f"{self.cmdline} {extra}".strip()]
-        command += ["-drive", "file=disk.img,if=none,format=raw,id=disk"]
-        command += ["-device", "virtio-blk-pci,drive=disk", "-device", "virtio-rng-pci"]
-        command += ["-netdev", f"user,id=lan,hostfwd=tcp:127.0.0.1:{self.port}-:22"]
-        command += ["-device", "virtio-net-pci,netdev=lan,romfile=", "-serial", f"file:{log}"]
+        outside = "" if self.space is None else "ecdaq.segment=outside"
         self.process = subprocess.Popen(
-            command,
+            [
+                *(self.space.enter if self.space is not None else []),
+                *(TOOLS / "virt.sh", self.folder, self.timing, "-display", "none"),
+                *("-serial", f"file:{log}", *self.ports(), *options),
+            ],
+            env=os.environ | {"ECDAQ_APPEND": f"{outside} {append}".strip()},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=(self.folder / "qemu.log").open("ab"),
@@ -136,10 +188,13 @@ class Machine:
         self.wait_for_console(r"\S+ login:")
 
     def ssh_command(self, *options: str) -> list[str]:
+        space = self.space
+        where = ("127.0.0.1", str(self.port)) if space is None else (space.GUEST, "22")
         return [
-            *("ssh", "-q", "-p", str(self.port), "-i", str(self.key), "-o", "BatchMode=yes"),
+            *(space.enter if space is not None else []),
+            *("ssh", "-q", "-p", where[1], "-i", str(self.key), "-o", "BatchMode=yes"),
             *("-o", "StrictHostKeyChecking=no", "-o", "UserKnownHostsFile=/dev/null"),
-            *("-o", "ConnectTimeout=30", *options, "operator@127.0.0.1"),
+            *("-o", "ConnectTimeout=30", *options, f"operator@{where[0]}"),
         ]
 
     def try_run(self, command: str, seconds: float = 120) -> subprocess.CompletedProcess[str]:

@@ -9,7 +9,8 @@ root=$(CDPATH='' cd -- "$here/../../.." && pwd)
 usage()
 {
 	cat <<'USAGE'
-usage: ./build.sh boot [--fresh] [--ssh-port N] [--key FILE] [--icount] [-- QEMU-OPTION...]
+usage: ./build.sh boot [--fresh] [--ssh-port N] [--key FILE] [--config FILE] [--icount]
+                       [-- QEMU-OPTION...]
 
 Boots the image of machine qemuarm64 in QEMU (no KVM needed): its serial console here, its SSH port on
 127.0.0.1, the EtherCAT segment simulated inside. Nobody has a password: log in with
@@ -21,6 +22,8 @@ and end it with `sudo poweroff` there, or Ctrl-a x here. The disk keeps what was
   --fresh       start from a new disk (default: the disk of the last time, if the image is the same)
   --ssh-port N  port on 127.0.0.1 that leads to the guest's SSH (default: 2222)
   --key FILE    public key that may log in (default: one made for this, build/image/boot/key)
+  --config FILE ecdaq.yaml for the boot partition (default: one for emulation,
+                app/tools/image/profile-host.yaml or profile-guest.yaml)
   --icount      the guest's clock counts instructions: slower, and a 1 ms cycle holds in guest time
 USAGE
 }
@@ -34,6 +37,7 @@ die()
 fresh=no
 port=2222
 key=
+config=
 timing=host
 check=no
 while [ $# -gt 0 ]; do
@@ -41,11 +45,12 @@ while [ $# -gt 0 ]; do
 	--fresh) fresh=yes ;;
 	--check) check=yes ;; # build.sh: are the options good?
 	--icount) timing=guest ;;
-	--ssh-port | --key)
+	--ssh-port | --key | --config)
 		[ $# -ge 2 ] || die "$1 needs a value"
 		case $1 in
 		--ssh-port) port=$2 ;;
 		--key) key=$2 ;;
+		--config) config=$2 ;;
 		esac
 		shift
 		;;
@@ -76,6 +81,8 @@ if [ -z "$key" ]; then
 	key=$vm/key.pub
 fi
 [ -f "$key" ] || die "--key: no file $key"
+config=${config:-$here/profile-$timing.yaml}
+[ -f "$config" ] || die "--config: no file $config"
 if [ "$fresh" = yes ] || [ ! -f "$vm/disk.img" ] || ! cmp -s "$image/$name.sha256" "$vm/made-of"; then
 	cp --sparse=always "$image/$name.img" "$vm/disk.img"
 	# Room for recordings: the data partition grows into it.
@@ -85,8 +92,9 @@ fi
 cp "$image/$name-vmlinux" "$vm/vmlinux"
 cp "$image/$name.cmdline" "$vm/cmdline"
 cp "$key" "$vm/authorized_keys"
+cp "$config" "$vm/ecdaq.yaml"
 # The boot partition starts at 4 MiB.
-"$here/qemu.sh" "$vm" mcopy -o -i disk.img@@4M authorized_keys ::ecdaq/authorized_keys
+"$here/qemu.sh" "$vm" mcopy -o -i disk.img@@4M authorized_keys ecdaq.yaml ::ecdaq/
 
 echo "-- ssh -p $port -i $vm/key operator@127.0.0.1    (end: Ctrl-a x)" >&2
 exec "$here/virt.sh" "$vm" "$timing" -nographic \
