@@ -63,6 +63,32 @@ struct cycle_stats {
 	struct histogram work;  /* wake to end of work */
 };
 
+enum control_state {
+	CONTROL_NONE = 0, /* no program is configured */
+	CONTROL_WAITING,  /* loaded; the bus is not in OP */
+	CONTROL_RUNNING,
+	CONTROL_SAFE,    /* runs, and has asked for fail-safe outputs */
+	CONTROL_PARKED,  /* took too long (control.overrun fail_safe) */
+	CONTROL_STOPPED, /* took too long (control.overrun stop) */
+	CONTROL_CRASHED,
+	CONTROL_STUCK, /* did not come back */
+};
+
+/* The control program. Texts: [service], before the cycle starts; numbers: [cycle]. */
+struct control_status {
+	char name[64];
+	char path[256];
+	int64_t budget_ns; /* [service] */
+	_Atomic uint32_t state;
+	_Atomic uint32_t reserved;
+	_Atomic uint64_t calls;
+	_Atomic uint64_t overruns;    /* calls that took longer than the budget */
+	_Atomic uint64_t safe_cycles; /* calls that asked for fail-safe outputs */
+	_Atomic uint64_t limited;     /* values set that the channel or its limits did not allow */
+	_Atomic uint64_t refused;     /* values set that were no numbers, or bits too many */
+	struct histogram time;        /* of each call */
+};
+
 /* One slave as the service thread last saw it. [service] */
 struct slave_status {
 	struct slave_info info;
@@ -70,8 +96,13 @@ struct slave_status {
 	_Atomic uint32_t al_status_code;
 	_Atomic uint32_t is_lost;
 	_Atomic int32_t dc_diff_ns;
-	_Atomic uint32_t rx_errors[4];  /* 0x0300.., per port, as last read */
-	_Atomic uint32_t lost_links[4]; /* 0x0310.. */
+	/* Sums of the chip's 8-bit counters (bus/error_counters.h), per port */
+	_Atomic uint32_t rx_errors[4];        /* 0x0300..0x0307: invalid frames and RX errors */
+	_Atomic uint32_t forwarded_errors[4]; /* 0x0308..0x030B: found by a slave before */
+	_Atomic uint32_t lost_links[4];       /* 0x0310..0x0313 */
+	_Atomic uint32_t processing_errors;   /* 0x030C */
+	_Atomic uint32_t pdi_errors;          /* 0x030D */
+	_Atomic uint32_t are_errors_short;    /* 1: a counter stood at 255, there were more */
 };
 
 struct status_page {
@@ -96,6 +127,7 @@ struct status_page {
 	_Atomic uint32_t cycle_cpu;         /* [service] core of the cycle thread; ~0: not pinned */
 	struct slave_status slave[LIMIT_SLAVES];
 	struct cycle_stats cycle;
+	struct control_status control;
 };
 
 #define RECORD_STATUS_MAGIC UINT64_C(0x3163657273716463) /* "cdqsrec1" */
@@ -157,6 +189,7 @@ enum record_state {
 const char *bus_state_to_str(uint32_t state);
 const char *dc_state_to_str(uint32_t state);
 const char *record_state_to_str(uint32_t state);
+const char *control_state_to_str(uint32_t state);
 
 /**
  * Make a page of @bytes at @path (any size that starts with magic and bytes) and map it for

@@ -17,6 +17,7 @@
 
 #include "bus/bus.h"
 #include "bus/dc_topology.h"
+#include "bus/error_counters.h"
 #include "bus/pdo.h"
 #include "wire/sii.h"
 
@@ -65,6 +66,7 @@ struct bus_slave {
 	int is_lost;
 	int is_clock_set;    /* offset and delay are in place since its last power-up */
 	unsigned good_looks; /* at 0x092C, in a row */
+	struct error_counters errors;
 	enum recovery_step step;
 	mono_t step_deadline;
 	mono_t retry_at;

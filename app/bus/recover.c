@@ -97,6 +97,7 @@ static void find(struct bus *bus, size_t pos)
 	access.cmd = ECAT_CMD_APWR;
 	if (registers_run(bus, &access, 1) >= 0 && access.wkc > 0) {
 		bus->soem_slave[soem_index(pos)].eep_pdi = 0;
+		error_counters_restart(&bus->slave[pos].errors);
 		enter(bus, pos, RECOVERY_IDENTIFY);
 	}
 }

@@ -16,13 +16,13 @@ enum {
 
 struct look {
 	uint8_t al[6];
-	uint8_t rx_errors[2 * ESC_PORTS];
-	uint8_t lost_links[ESC_PORTS];
+	uint8_t errors[ERROR_PORT_BYTES];
+	uint8_t lost_links[ERROR_LINK_BYTES];
 	uint8_t diff[4];
 	uint16_t wkc[LOOKS];
 };
 
-enum { LOOK_AL, LOOK_RX_ERRORS, LOOK_LOST_LINKS, LOOK_DIFF };
+enum { LOOK_AL, LOOK_ERRORS, LOOK_LOST_LINKS, LOOK_DIFF };
 
 static int look_at_all(struct bus *bus, struct look *look)
 {
@@ -37,8 +37,8 @@ static int look_at_all(struct bus *bus, struct look *look)
 			void *data;
 		} part[LOOKS] = {
 			[LOOK_AL] = { ESC_REG_AL_STATUS, sizeof(look->al), look[i].al },
-			[LOOK_RX_ERRORS] = { ESC_REG_RX_ERROR_COUNTER, sizeof(look->rx_errors),
-					     look[i].rx_errors },
+			[LOOK_ERRORS] = { ESC_REG_RX_ERROR_COUNTER, sizeof(look->errors),
+					  look[i].errors },
 			[LOOK_LOST_LINKS] = { ESC_REG_LOST_LINK_COUNTER, sizeof(look->lost_links),
 					      look[i].lost_links },
 			[LOOK_DIFF] = { ESC_REG_DC_SYSTEM_TIME_DIFF, sizeof(look->diff),
@@ -115,6 +115,59 @@ static void note_presence(struct bus *bus, size_t pos, int is_here, const struct
 	}
 }
 
+/* Counters that have come far start anew: read, cleared and read in one frame, so nothing that is
+ * counted meanwhile is left out, and it does not matter which of them a chip clears. */
+static void clear_errors(struct bus *bus, size_t pos)
+{
+	struct error_counters *ec = &bus->slave[pos].errors;
+	uint16_t adp = bus->slave[pos].info.station_addr;
+	uint8_t read[2][ERROR_COUNTERS];
+	struct access access[] = {
+		{ ECAT_CMD_FPRD, adp, ESC_REG_RX_ERROR_COUNTER, ERROR_PORT_BYTES, read[0], 0 },
+		{ ECAT_CMD_FPRD, adp, ESC_REG_LOST_LINK_COUNTER, ERROR_LINK_BYTES,
+		  read[0] + ERROR_LINKS, 0 },
+		{ ECAT_CMD_FPWR, adp, ESC_REG_RX_ERROR_COUNTER, 2 * ESC_PORTS, NULL, 0 },
+		{ ECAT_CMD_FPWR, adp, ESC_REG_ECAT_PU_ERROR, 2, NULL, 0 },
+		{ ECAT_CMD_FPWR, adp, ESC_REG_LOST_LINK_COUNTER, ERROR_LINK_BYTES, NULL, 0 },
+		{ ECAT_CMD_FPRD, adp, ESC_REG_RX_ERROR_COUNTER, ERROR_PORT_BYTES, read[1], 0 },
+		{ ECAT_CMD_FPRD, adp, ESC_REG_LOST_LINK_COUNTER, ERROR_LINK_BYTES,
+		  read[1] + ERROR_LINKS, 0 },
+	};
+	const struct access *second = &access[5];
+
+	if (registers_run(bus, access, sizeof(access) / sizeof(access[0])) < 0) {
+		return; /* the next look sees what has become of them */
+	}
+	if (access[0].wkc > 0 && second[0].wkc > 0) {
+		error_counters_take(ec, 0, read[0], ERROR_PORT_BYTES);
+		error_counters_take(ec, 0, read[1], ERROR_PORT_BYTES);
+	}
+	if (access[1].wkc > 0 && second[1].wkc > 0) {
+		error_counters_take(ec, ERROR_LINKS, read[0] + ERROR_LINKS, ERROR_LINK_BYTES);
+		error_counters_take(ec, ERROR_LINKS, read[1] + ERROR_LINKS, ERROR_LINK_BYTES);
+	}
+}
+
+static void count_errors(struct bus *bus, size_t pos, const struct look *look)
+{
+	struct bus_slave *sl = &bus->slave[pos];
+	int wants_clear = 0;
+
+	if (sl->step == RECOVERY_IDENTIFY) {
+		return; /* it may be another's */
+	}
+	if (look->wkc[LOOK_ERRORS] > 0) {
+		wants_clear = error_counters_take(&sl->errors, 0, look->errors, ERROR_PORT_BYTES);
+	}
+	if (look->wkc[LOOK_LOST_LINKS] > 0) {
+		wants_clear |= error_counters_take(&sl->errors, ERROR_LINKS, look->lost_links,
+						   ERROR_LINK_BYTES);
+	}
+	if (wants_clear) {
+		clear_errors(bus, pos);
+	}
+}
+
 static void show(const struct bus_slave *sl, const struct look *look, struct slave_status *page)
 {
 	atomic_store_explicit(&page->is_lost, (uint32_t)sl->is_lost, memory_order_relaxed);
@@ -127,18 +180,7 @@ static void show(const struct bus_slave *sl, const struct look *look, struct sla
 	} else if (sl->is_lost) {
 		atomic_store_explicit(&page->al_state, AL_NONE, memory_order_relaxed);
 	}
-	for (unsigned i = 0; i < ESC_PORTS; i++) {
-		if (look->wkc[LOOK_RX_ERRORS] > 0) {
-			atomic_store_explicit(&page->rx_errors[i],
-					      (uint32_t)look->rx_errors[2 * (size_t)i] +
-						      look->rx_errors[2 * (size_t)i + 1],
-					      memory_order_relaxed);
-		}
-		if (look->wkc[LOOK_LOST_LINKS] > 0) {
-			atomic_store_explicit(&page->lost_links[i], look->lost_links[i],
-					      memory_order_relaxed);
-		}
-	}
+	error_counters_show(&sl->errors, page);
 	atomic_store_explicit(
 		&page->dc_diff_ns,
 		look->wkc[LOOK_DIFF] > 0 ? (int32_t)(get_le32(look->diff) & DIFF_MAGNITUDE) : -1,
@@ -197,6 +239,7 @@ int bus_watch(struct bus *bus, struct status_page *page,
 		note_presence(bus, i, is_here, &out);
 		if (is_here) {
 			note_state(bus, i, &look[i], &out);
+			count_errors(bus, i, &look[i]);
 		}
 		if (page != NULL) {
 			show(&bus->slave[i], &look[i], &page->slave[i]);

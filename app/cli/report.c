@@ -189,10 +189,11 @@ static void write_slave(const struct status_page *page, uint32_t index, FILE *ou
 	if (info.has_dc) {
 		text_ns(GET(slave->dc_diff_ns), diff);
 	}
-	fprintf(out, "%3u %-16s %-13s %12" PRIu64 " %10" PRIu64 " %10s %6" PRIu64 " %6" PRIu64,
+	fprintf(out, "%3u %-16s %-13s %12" PRIu64 " %10" PRIu64 " %10s %6" PRIu64 " %6" PRIu64 "%s",
 		index, info.name, GET(slave->is_lost) ? "LOST" : state,
 		GET(page->cycle.slave_good[index]), GET(page->cycle.slave_bad[index]),
-		info.is_dc_reference ? "reference" : diff, rx, links);
+		info.is_dc_reference ? "reference" : diff, rx, links,
+		GET(slave->are_errors_short) ? "+" : "");
 	if (code != 0) {
 		fprintf(out, "  0x%04x %s", code, al_status_code_to_str((uint16_t)code));
 	}

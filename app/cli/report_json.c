@@ -190,7 +190,11 @@ void report_slave_json(const struct status_page *page, uint32_t index, struct js
 	json_u64(js, "input_bits", info.input_bits);
 	json_u64(js, "output_bits", info.output_bits);
 	write_ports(js, "rx_errors", slave->rx_errors);
+	write_ports(js, "forwarded_errors", slave->forwarded_errors);
 	write_ports(js, "lost_links", slave->lost_links);
+	json_u64(js, "processing_errors", GET(slave->processing_errors));
+	json_u64(js, "pdi_errors", GET(slave->pdi_errors));
+	json_truth(js, "errors_incomplete", GET(slave->are_errors_short) != 0);
 	json_object_end(js);
 }
 

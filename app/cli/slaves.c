@@ -58,7 +58,14 @@ static void show_more(const struct status_page *page, uint32_t index)
 	printf("    %-16s %" PRIu64 " good, %" PRIu64 " bad\n", "samples",
 	       GET(page->cycle.slave_good[index]), GET(page->cycle.slave_bad[index]));
 	show_ports("receive errors", slave->rx_errors);
+	show_ports("forwarded errors", slave->forwarded_errors);
 	show_ports("lost links", slave->lost_links);
+	printf("    %-16s %u processing, %u PDI\n", "other errors", GET(slave->processing_errors),
+	       GET(slave->pdi_errors));
+	if (GET(slave->are_errors_short)) {
+		printf("    %-16s a counter stood at 255: there were more errors than counted\n",
+		       "");
+	}
 }
 
 enum cli_exit verb_slaves(struct cli *cli, int argc, char **argv)

@@ -121,7 +121,8 @@ void fake_make_status(struct fake *f)
 	page->slave_count = f->slaves;
 	page->slaves_expected = SLAVES;
 	page->cycle_cpu = UINT32_MAX;
-	page->rt_degraded = 1u << EVENT_RT_PRIORITY;
+	page->rt_degraded = f->degraded;
+	page->cycle.page_faults = f->page_faults;
 	page->cycle.dc_state = DC_LOCKED;
 	page->cycle.dc_lock_ns = 123456789;
 	page->cycle.dc_diff_max_ns = 42;
@@ -133,6 +134,10 @@ void fake_make_status(struct fake *f)
 	page->slave[1].dc_diff_ns = -7;
 	page->slave[1].al_status_code = 0x001b;
 	page->slave[1].rx_errors[0] = 3;
+	page->slave[1].forwarded_errors[2] = 4;
+	page->slave[1].lost_links[1] = 255;
+	page->slave[1].pdi_errors = 5;
+	page->slave[1].are_errors_short = 1;
 }
 
 void fake_make_record_status(struct fake *f)

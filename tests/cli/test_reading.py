@@ -67,6 +67,10 @@ def test_status_lists_the_slaves(daemon: Fake) -> None:
     assert second["state"] == "OP"
     assert second["al_status"] == "SyncManager watchdog"
     assert second["rx_errors"] == [3, 0, 0, 0]
+    assert second["forwarded_errors"] == [0, 0, 4, 0]
+    assert second["lost_links"] == [0, 255, 0, 0]
+    assert second["processing_errors"] == 0 and second["pdi_errors"] == 5
+    assert second["errors_incomplete"] is True and first["errors_incomplete"] is False
     assert second["dc_diff_ns"] == -7
     assert second["device"] == "FB1111-Piccolo \ufffd"
 

@@ -212,6 +212,62 @@ TEST(recovery, error_counters_reach_the_status_page)
 	bench_destroy(b);
 }
 
+static void count(struct bus_bench *b, enum esc_error error, unsigned port, unsigned times)
+{
+	for (unsigned i = 0; i < times; i++) {
+		esc_count_error(segment_esc(b->segment, 1), port, error);
+	}
+	bench_watch(b);
+}
+
+TEST(recovery, error_counters_are_summed_beyond_what_the_chip_can_count)
+{
+	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 2, .seed = 98 });
+	const struct slave_status *page = &b->page->slave[1];
+	uint64_t ok;
+
+	bench_bring_up(b);
+	bench_watch(b);
+	ok = b->cycles - b->ok;
+	for (unsigned i = 0; i < 10; i++) {
+		count(b, ESC_ERROR_RX, 0, 100);
+		count(b, ESC_ERROR_INVALID_FRAME, 0, 20);
+		count(b, ESC_ERROR_FORWARDED, 1, 90);
+		count(b, ESC_ERROR_UNIT, 0, 50);
+		count(b, ESC_ERROR_LOST_LINK, 3, 127);
+	}
+	CHECK_EQ(atomic_load(&page->rx_errors[0]), 1200);
+	CHECK_EQ(atomic_load(&page->forwarded_errors[1]), 900);
+	CHECK_EQ(atomic_load(&page->processing_errors), 500);
+	CHECK_EQ(atomic_load(&page->lost_links[3]), 1270);
+	CHECK_EQ(atomic_load(&page->are_errors_short), 0);
+	CHECK_EQ(atomic_load(&b->page->slave[0].rx_errors[0]), 0);
+	count(b, ESC_ERROR_RX, 0, 1000);
+	CHECK_EQ(atomic_load(&page->rx_errors[0]), 1200 + 255);
+	CHECK_EQ(atomic_load(&page->are_errors_short), 1);
+	count(b, ESC_ERROR_RX, 0, 7);
+	CHECK_EQ(atomic_load(&page->rx_errors[0]), 1200 + 255 + 7);
+	CHECK_EQ(b->cycles - b->ok, ok);
+	bench_destroy(b);
+}
+
+TEST(recovery, error_sums_outlive_a_power_cycle_of_their_slave)
+{
+	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 2, .seed = 99 });
+	const struct slave_status *page = &b->page->slave[1];
+
+	bench_bring_up(b);
+	count(b, ESC_ERROR_RX, 0, 5);
+	segment_power_off(b->segment, 1, bench_now_ns(b));
+	watch_for(b, 5);
+	segment_power_on(b->segment, 1, bench_now_ns(b));
+	bench_recover(b, LIMIT_CYCLES);
+	CHECK_EQ(atomic_load(&page->rx_errors[0]), 5);
+	count(b, ESC_ERROR_RX, 0, 6);
+	CHECK_EQ(atomic_load(&page->rx_errors[0]), 11);
+	bench_destroy(b);
+}
+
 TEST(recovery, watching_costs_no_cycle)
 {
 	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 8, .seed = 95 });
