@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "status.h"
+#include "sync0.h"
 
 static const struct {
 	const char *name;
@@ -39,6 +40,22 @@ static const struct {
 	[EVENT_RECORD_DISK_FULL] = { "record_disk_full", EVENT_ERROR },
 	[EVENT_RECORD_RESUMED] = { "record_resumed", EVENT_NOTICE },
 	[EVENT_COMMAND] = { "command", EVENT_NOTICE },
+	[EVENT_CONTROL_OVERRUN] = { "control_overrun", EVENT_WARNING },
+	[EVENT_CONTROL_CRASHED] = { "control_crashed", EVENT_ERROR },
+	[EVENT_SYNC0_LOST] = { "sync0_lost", EVENT_ERROR },
+	[EVENT_SYNC0_BACK] = { "sync0_back", EVENT_NOTICE },
+	[EVENT_SYNC0_MISSING] = { "sync0_missing", EVENT_ERROR },
+	[EVENT_SYNC0_EXTRA] = { "sync0_extra", EVENT_WARNING },
+	[EVENT_SYNC0_OVERFLOW] = { "sync0_overflow", EVENT_WARNING },
+	[EVENT_SYNC0_PERIOD] = { "sync0_period", EVENT_ERROR },
+	[EVENT_SYNC0_JITTER] = { "sync0_jitter", EVENT_ERROR },
+	[EVENT_SYNC0_PHASE] = { "sync0_phase", EVENT_ERROR },
+	[EVENT_SYNC0_SKEW] = { "sync0_skew", EVENT_ERROR },
+	[EVENT_SYNC0_PHASE_STEP] = { "sync0_phase_step", EVENT_WARNING },
+	[EVENT_SYNC0_CLOCK_STEP] = { "sync0_clock_step", EVENT_WARNING },
+	[EVENT_SYNC0_CLEAR] = { "sync0_clear", EVENT_NOTICE },
+	[EVENT_SYNC0_SHOT] = { "sync0_shot", EVENT_INFO },
+	[EVENT_SYNC0_SHOT_LOST] = { "sync0_shot_lost", EVENT_ERROR },
 };
 
 const char *event_name(uint16_t id)
@@ -113,6 +130,97 @@ static int format_refusal(const struct event *ev, char *buf, size_t buf_len)
 	}
 	return snprintf(buf, buf_len, "%scommand of user %" PRId32 "%s refused: %s", slave,
 			ev->arg[1], channel, reason(ev->arg[0]));
+}
+
+/* The tests ask for every event's text, so none can be forgotten behind the default. */
+static void format_sync0_figures(const struct event *ev, char *buf, size_t buf_len)
+{
+	const int32_t *a = ev->arg;
+
+	switch (ev->id) {
+	case EVENT_SYNC0_PERIOD:
+		snprintf(buf, buf_len, "SYNC0 period off by %" PRId32 " ppb, limit %" PRId32 " ppb",
+			 a[0], a[1]);
+		break;
+	case EVENT_SYNC0_JITTER:
+		snprintf(buf, buf_len, "SYNC0 jitter p99 %" PRId32 " ns, limit %" PRId32 " ns",
+			 a[0], a[1]);
+		break;
+	case EVENT_SYNC0_PHASE:
+		snprintf(buf, buf_len,
+			 "SYNC0 %" PRId32 " ns after its DC time, limit %" PRId32 " ns", a[0],
+			 a[1]);
+		break;
+	case EVENT_SYNC0_SKEW:
+		snprintf(buf, buf_len,
+			 "SYNC0 %" PRId32 " ns after the first line's, limit %" PRId32 " ns", a[0],
+			 a[1]);
+		break;
+	case EVENT_SYNC0_CLEAR:
+		snprintf(buf, buf_len, "SYNC0 %s is good again",
+			 sync0_check_to_str((uint32_t)a[0]));
+		break;
+	case EVENT_SYNC0_OVERFLOW:
+		snprintf(buf, buf_len, "%" PRId32 " edges dropped from a full queue", a[0]);
+		break;
+	default:
+		snprintf(buf, buf_len, "event %u", ev->id);
+		break;
+	}
+}
+
+static void format_sync0_pulses(const struct event *ev, char *buf, size_t buf_len)
+{
+	const int32_t *a = ev->arg;
+
+	switch (ev->id) {
+	case EVENT_SYNC0_LOST:
+		snprintf(buf, buf_len, "SYNC0 lost, %" PRId32 " cycles without an edge", a[0]);
+		break;
+	case EVENT_SYNC0_BACK:
+		snprintf(buf, buf_len, "SYNC0 back after %" PRId32 " cycles without an edge", a[0]);
+		break;
+	case EVENT_SYNC0_MISSING:
+		snprintf(buf, buf_len, "SYNC0 missing, %" PRId32 " in a row", a[0]);
+		break;
+	case EVENT_SYNC0_EXTRA:
+		snprintf(buf, buf_len, "SYNC0 extra, %" PRId32 " in this window", a[0]);
+		break;
+	case EVENT_SYNC0_PHASE_STEP:
+		snprintf(buf, buf_len, "SYNC0 stepped by %" PRId32 " ns", a[0]);
+		break;
+	case EVENT_SYNC0_CLOCK_STEP:
+		snprintf(buf, buf_len, "host clock stepped against DC time by %" PRId32 " ns",
+			 a[0]);
+		break;
+	default:
+		format_sync0_figures(ev, buf, buf_len);
+		break;
+	}
+}
+
+/* What ecdaq-sync0 saw; each begins with slave and line, where it has one. */
+static int format_sync0(const struct event *ev, char *buf, size_t buf_len)
+{
+	char text[128];
+	char where[48] = "";
+
+	if (ev->slave_pos != EVENT_NO_SLAVE) {
+		snprintf(where, sizeof(where), "slave %u, line %" PRIu32 ": ", ev->slave_pos,
+			 ev->line);
+	}
+	if (ev->id == EVENT_SYNC0_SHOT) {
+		return snprintf(buf, buf_len,
+				"%sone-shot for DC time %" PRId64 " came %" PRId32
+				" ns after it, +-%" PRId32 " ns",
+				where, ev->value, ev->arg[0], ev->arg[1]);
+	}
+	if (ev->id == EVENT_SYNC0_SHOT_LOST) {
+		return snprintf(buf, buf_len, "%sone-shot for DC time %" PRId64 " did not come",
+				where, ev->value);
+	}
+	format_sync0_pulses(ev, text, sizeof(text));
+	return snprintf(buf, buf_len, "%scycle %" PRId64 ": %s", where, ev->value, text);
 }
 
 /* NOLINTNEXTLINE(readability-function-size): a table, one text an event */
@@ -193,6 +301,16 @@ int event_format(const struct event *ev, char *buf, size_t buf_len)
 		}
 		return snprintf(buf, buf_len, "slave %u: %s by user %" PRId32 ", 0x%" PRIx64, slave,
 				command_name(a[0]), a[1], (uint64_t)ev->value);
+	case EVENT_CONTROL_OVERRUN:
+		return snprintf(buf, buf_len,
+				"cycle %" PRId64 ": control program took %" PRId32 " ns of %" PRId32
+				" ns",
+				ev->value, a[0], a[1]);
+	case EVENT_CONTROL_CRASHED:
+		return snprintf(buf, buf_len,
+				"control program crashed: signal %" PRId32 " (%s) at 0x%" PRIx64,
+				a[0], sigabbrev_np(a[0]) != NULL ? sigabbrev_np(a[0]) : "unknown",
+				(uint64_t)ev->value);
 	case EVENT_RT_DEGRADED:
 		return snprintf(buf, buf_len, "degraded: no %s: %s",
 				event_rt_to_str((uint32_t)a[0]), reason(a[1]));
@@ -201,6 +319,21 @@ int event_format(const struct event *ev, char *buf, size_t buf_len)
 				"slave %u: SDO 0x%04" PRIx32 ":%02" PRIx32 " abort 0x%08" PRIx64,
 				slave, (uint32_t)a[0] >> 8, (uint32_t)a[0] & 0xff,
 				(uint64_t)ev->value & 0xffffffff);
+	case EVENT_SYNC0_LOST:
+	case EVENT_SYNC0_BACK:
+	case EVENT_SYNC0_MISSING:
+	case EVENT_SYNC0_EXTRA:
+	case EVENT_SYNC0_OVERFLOW:
+	case EVENT_SYNC0_PERIOD:
+	case EVENT_SYNC0_JITTER:
+	case EVENT_SYNC0_PHASE:
+	case EVENT_SYNC0_SKEW:
+	case EVENT_SYNC0_PHASE_STEP:
+	case EVENT_SYNC0_CLOCK_STEP:
+	case EVENT_SYNC0_CLEAR:
+	case EVENT_SYNC0_SHOT:
+	case EVENT_SYNC0_SHOT_LOST:
+		return format_sync0(ev, buf, buf_len);
 	case EVENT_LINK:
 		return snprintf(buf, buf_len, "link %s", a[0] ? "up" : "down");
 	case EVENT_RECORD_STARTED:

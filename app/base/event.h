@@ -39,7 +39,24 @@ enum event_id {
 	EVENT_RECORD_GAP,       /* value: first cycle missing; arg: how many (clamped) */
 	EVENT_RECORD_DISK_FULL, /* value: bytes free */
 	EVENT_RECORD_RESUMED,   /* value: cycle */
-	EVENT_COMMAND, /* slave; value: its object or time; arg: enum admin_verb, user id */
+	EVENT_COMMAND,         /* slave; value: its object or time; arg: enum admin_verb, user id */
+	EVENT_CONTROL_OVERRUN, /* value: cycle; arg: ns it took, ns it may take */
+	EVENT_CONTROL_CRASHED, /* value: address; arg: number of the signal */
+	/* Of ecdaq-sync0, in its own ring; all with slave and line. */
+	EVENT_SYNC0_LOST,       /* value: first cycle without an edge; arg: cycles until now */
+	EVENT_SYNC0_BACK,       /* value: cycle; arg: cycles without an edge */
+	EVENT_SYNC0_MISSING,    /* value: first cycle without an edge; arg: how many */
+	EVENT_SYNC0_EXTRA,      /* value: cycle of the first; arg: how many in the window */
+	EVENT_SYNC0_OVERFLOW,   /* value: first cycle of the window; arg: edges dropped unread */
+	EVENT_SYNC0_PERIOD,     /* value: first cycle of the window; arg: ppb off, limit */
+	EVENT_SYNC0_JITTER,     /* the same; arg: p99 ns, limit */
+	EVENT_SYNC0_PHASE,      /* the same; arg: ns after the DC time, limit */
+	EVENT_SYNC0_SKEW,       /* the same; arg: ns after the first line, limit */
+	EVENT_SYNC0_PHASE_STEP, /* value: cycle; arg: ns */
+	EVENT_SYNC0_CLOCK_STEP, /* value: cycle; arg: ns that the host's clock went ahead */
+	EVENT_SYNC0_CLEAR,      /* value: first cycle of the window; arg: enum sync0_check */
+	EVENT_SYNC0_SHOT,       /* value: commanded DC time; arg: ns late, ns it may be off by */
+	EVENT_SYNC0_SHOT_LOST,  /* value: commanded DC time that passed without an edge */
 	EVENT_COUNT,
 };
 
@@ -64,7 +81,7 @@ struct event {
 	int32_t arg[2];
 	uint16_t id;        /* enum event_id */
 	uint16_t slave_pos; /* 0xffff: none */
-	uint32_t reserved;
+	uint32_t line;      /* ecdaq-sync0: of the configuration, from 1; 0: none */
 };
 
 static_assert(sizeof(struct event) == 48, "part of the ring's format");

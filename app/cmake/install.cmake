@@ -12,7 +12,7 @@ target_link_libraries(ecdaq_client_shared PRIVATE m)
 install(TARGETS ecdaq_client ecdaq_client_shared
 	ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(FILES base/board.h base/clock.h base/event.h base/histogram.h base/limits.h base/ring.h
-	base/sample.h base/status.h base/timemap.h
+	base/sample.h base/status.h base/sync0.h base/timemap.h
 	DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq/base)
 install(FILES image/image.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq/image)
 

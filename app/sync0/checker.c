@@ -1,0 +1,294 @@
+/* SPDX-License-Identifier: MIT */
+#include "sync0/checker.h"
+
+#include <errno.h>
+#include <stdlib.h>
+
+#include "base/clock.h"
+#include "sync0/checker_inside.h"
+
+enum {
+	GRACE_CYCLES = 64, /* a window stays open so long: held edges, late samples */
+	MASTER_BEHIND = 16,
+	WINDOW_CYCLES_MIN = 16,
+};
+
+#define MASTER_GONE_NS NS_PER_S /* do not wait longer for its samples */
+
+int checker_create(const struct checker_spec *spec, struct checker **ret_checker)
+{
+	struct checker *ck;
+	int r;
+
+	if (spec->line_count == 0 || spec->line_count > LIMIT_SLAVES || spec->period_ns <= 0 ||
+	    spec->window_ns / spec->period_ns < WINDOW_CYCLES_MIN) {
+		return -EINVAL;
+	}
+	ck = calloc(1, sizeof(*ck));
+	if (ck == NULL) {
+		return -ENOMEM;
+	}
+	ck->spec = *spec;
+	ck->window_cycles = (uint32_t)(spec->window_ns / spec->period_ns);
+	ck->grid = grid_create(spec->period_ns);
+	r = ck->grid == NULL ? -ENOMEM : figures_room_create(ck->window_cycles, &ck->room);
+	for (int i = 0; r == 0 && i < OPEN_WINDOWS; i++) {
+		r = window_create(ck->window_cycles, spec->line_count, &ck->window[i]);
+	}
+	if (r < 0) {
+		checker_destroy(ck);
+		return r;
+	}
+	*ret_checker = ck;
+	return 0;
+}
+
+void checker_destroy(struct checker *ck)
+{
+	if (ck == NULL) {
+		return;
+	}
+	for (int i = 0; i < OPEN_WINDOWS; i++) {
+		window_destroy(ck->window[i]);
+	}
+	figures_room_destroy(&ck->room);
+	grid_destroy(ck->grid);
+	free(ck);
+}
+
+void checker_emit(struct checker *ck, const struct event *ev)
+{
+	if (ck->spec.event != NULL) {
+		ck->spec.event(ck->spec.ctx, ev);
+	}
+}
+
+struct event checker_event(const struct checker *ck, size_t line, enum event_id id, int64_t cycle)
+{
+	int64_t mono_ns = grid_mono_ns(ck->grid, grid_due_dc_ns(ck->grid, cycle));
+
+	return (struct event){
+		.mono_ns = mono_ns,
+		.tai_ns = mono_ns + ck->spec.mono_to_tai_ns,
+		.cycle = (uint64_t)cycle,
+		.value = cycle,
+		.id = (uint16_t)id,
+		.slave_pos = ck->spec.line[line].slave_pos,
+		.line = (uint32_t)line + 1,
+	};
+}
+
+/* --- windows --- */
+
+void checker_begin_at(struct checker *ck, int64_t cycle)
+{
+	ck->has_base = 1;
+	ck->base = cycle;
+	ck->window_number = 0;
+	for (int i = 0; i < OPEN_WINDOWS; i++) {
+		window_clear(ck->window[i], cycle + (int64_t)i * ck->window_cycles);
+	}
+}
+
+struct window *checker_window(struct checker *ck, int64_t cycle)
+{
+	int64_t number;
+
+	if (!ck->has_base || cycle < checker_oldest(ck)->first_cycle) {
+		return NULL;
+	}
+	number = (cycle - ck->base) / ck->window_cycles;
+	/* So far ahead that nothing can be known of what lies between: only the newest matter. */
+	if (number - ck->window_number > 2 * OPEN_WINDOWS) {
+		checker_close_window(ck);
+		checker_close_window(ck);
+		checker_begin_at(ck, cycle);
+		number = 0;
+	}
+	while (number >= ck->window_number + OPEN_WINDOWS) {
+		checker_close_window(ck);
+	}
+	return ck->window[number % OPEN_WINDOWS];
+}
+
+/* A clock has stepped: nothing that is counted in the open windows can be held against anyone. */
+void checker_clock_stepped(struct checker *ck, int64_t cycle, int64_t step_ns)
+{
+	struct event ev = checker_event(ck, 0, EVENT_SYNC0_CLOCK_STEP, cycle);
+
+	ev.slave_pos = EVENT_NO_SLAVE;
+	ev.line = 0;
+	ev.arg[0] = alarm_clamp((double)step_ns);
+	checker_emit(ck, &ev);
+	for (size_t i = 0; i < ck->spec.line_count; i++) {
+		track_reset(&ck->line[i].track);
+		ck->line[i].has_last = 0;
+		ck->line[i].last_cycle = cycle;
+	}
+	for (int i = 0; ck->has_base && i < OPEN_WINDOWS; i++) {
+		struct window *w = ck->window[i];
+
+		if (w->first_cycle <= cycle + GRACE_CYCLES) {
+			w->clock_step_ns = step_ns;
+			w->clock_step_cycle = cycle;
+		}
+	}
+}
+
+static void pair(struct checker *ck, const struct checker_cycle *cy)
+{
+	int64_t step_ns;
+
+	if (grid_pair(ck->grid, cy->frame_dc_ns, cy->frame_mono_ns, cy->frame_latency_ns,
+		      &step_ns) == GRID_STEPPED) {
+		checker_clock_stepped(ck, cy->cycle, step_ns);
+	}
+}
+
+/* --- the master --- */
+
+static void have_base(struct checker *ck, const struct checker_cycle *cy)
+{
+	int64_t late_ns;
+	int64_t first;
+
+	if (ck->has_base || !cy->is_judged || !grid_is_ready(ck->grid)) {
+		return;
+	}
+	first = grid_cycle(ck->grid, ck->spec.since_ns, 0, &late_ns) + 2;
+	checker_begin_at(ck, first > cy->cycle + 1 ? first : cy->cycle + 1);
+}
+
+static void have_origin(struct checker *ck, const struct checker_cycle *cy)
+{
+	int64_t origin_dc_ns = cy->due_dc_ns - cy->cycle * ck->spec.period_ns;
+
+	if (ck->has_origin && origin_dc_ns != ck->origin_dc_ns && grid_is_ready(ck->grid)) {
+		checker_clock_stepped(ck, cy->cycle, ck->origin_dc_ns - origin_dc_ns);
+	}
+	ck->has_origin = 1;
+	ck->origin_dc_ns = origin_dc_ns;
+	grid_set_origin(ck->grid, origin_dc_ns);
+}
+
+void checker_cycle(struct checker *ck, const struct checker_cycle *cy)
+{
+	struct window *w;
+
+	have_origin(ck, cy);
+	if (cy->frame_dc_ns != 0) {
+		pair(ck, cy);
+	}
+	have_base(ck, cy);
+	ck->newest_cycle = cy->cycle;
+	w = checker_window(ck, cy->cycle);
+	if (w == NULL) {
+		return;
+	}
+	if (cy->dc_diff_ns > w->dc_diff_ns) {
+		w->dc_diff_ns = cy->dc_diff_ns;
+	}
+	if (cy->frame_dc_ns != 0) {
+		int64_t i = cy->cycle - w->first_cycle;
+
+		w->has_frame[i] = 1;
+		w->frame_dc_ns[i] = cy->frame_dc_ns;
+		w->frame_mono_ns[i] = cy->frame_mono_ns;
+		w->frame_latency_ns[i] = cy->frame_latency_ns;
+	}
+}
+
+/* --- time --- */
+
+static void look_for_lost(struct checker *ck, size_t number, int64_t cycle)
+{
+	struct line *ln = &ck->line[number];
+	int64_t limit = ck->spec.lost_ns / ck->spec.period_ns;
+	int64_t last = ln->last_cycle >= ck->base ? ln->last_cycle : ck->base - 1;
+	struct event ev;
+
+	if (ln->is_lost) {
+		if (ln->back_count > 0 && cycle - last > limit) {
+			ln->back_count = 0; /* a few came, and none again */
+		}
+		return;
+	}
+	if (cycle - last <= limit) {
+		return;
+	}
+	ln->is_lost = 1;
+	ln->back_count = 0;
+	ln->lost_from = last + 1;
+	ln->lost_to = INT64_MAX;
+	ck->alarms++;
+	ev = checker_event(ck, number, EVENT_SYNC0_LOST, last + 1);
+	ev.arg[0] = alarm_clamp((double)(cycle - last));
+	checker_emit(ck, &ev);
+}
+
+static int is_full(const struct checker *ck, int64_t mono_ns)
+{
+	int64_t end = checker_oldest(ck)->first_cycle + (int64_t)ck->window_cycles;
+	int64_t end_ns = grid_mono_ns(ck->grid, grid_due_dc_ns(ck->grid, end + GRACE_CYCLES));
+
+	return mono_ns > end_ns + MASTER_GONE_NS ||
+	       (mono_ns > end_ns && ck->newest_cycle >= end + MASTER_BEHIND);
+}
+
+void checker_advance(struct checker *ck, int64_t mono_ns)
+{
+	int64_t late_ns;
+	int64_t cycle;
+
+	if (!grid_is_ready(ck->grid) || !ck->has_origin) {
+		return;
+	}
+	for (size_t i = 0; i < ck->spec.line_count; i++) {
+		if (ck->spec.line[i].mode == CHECKER_ONESHOT) {
+			checker_look_at_shots(ck, i, mono_ns);
+		}
+	}
+	if (!ck->has_base) {
+		return;
+	}
+	cycle = grid_cycle(ck->grid, mono_ns, 0, &late_ns) - 1;
+	for (size_t i = 0; i < ck->spec.line_count; i++) {
+		if (ck->spec.line[i].mode == CHECKER_PERIODIC) {
+			look_for_lost(ck, i, cycle);
+		}
+	}
+	while (is_full(ck, mono_ns)) {
+		checker_close_window(ck);
+	}
+}
+
+void checker_finish(struct checker *ck)
+{
+	struct track_out out;
+
+	if (!grid_is_ready(ck->grid) || !ck->has_base) {
+		return;
+	}
+	for (size_t i = 0; i < ck->spec.line_count; i++) {
+		track_finish(&ck->line[i].track, ck->grid, &out);
+		checker_take(ck, i, &out);
+	}
+	if (ck->newest_cycle >= checker_oldest(ck)->first_cycle + (int64_t)ck->window_cycles) {
+		checker_close_window(ck);
+	}
+}
+
+int checker_is_lost(const struct checker *ck, size_t line)
+{
+	return ck->line[line].is_lost;
+}
+
+uint64_t checker_windows(const struct checker *ck)
+{
+	return ck->windows;
+}
+
+uint64_t checker_alarms(const struct checker *ck)
+{
+	return ck->alarms;
+}

@@ -1,0 +1,207 @@
+/* SPDX-License-Identifier: MIT */
+/* What is said of a window when it is full, and of shots when they are due. */
+#include <stdlib.h>
+
+#include "sync0/checker_inside.h"
+
+enum { MISSING_TOLD = 16, ALIKE_SHARE = 16 };
+
+static void emit_from_window(void *ctx, const struct event *ev)
+{
+	checker_emit(ctx, ev);
+}
+
+/* A run of missing edges that is told as "lost" is not told a second time. */
+static int is_told(const struct line *ln, int64_t first, int64_t end)
+{
+	return first < ln->lost_to && end > ln->lost_from && ln->lost_to > ln->lost_from;
+}
+
+static void tell_missing(struct checker *ck, const struct window *w, size_t number)
+{
+	const uint8_t *mark = w->line[number].mark;
+	int told = 0;
+
+	for (uint32_t i = 0; i < w->cycles && told < MISSING_TOLD; i++) {
+		uint32_t end = i;
+		struct event ev;
+
+		while (end < w->cycles && mark[end] == WINDOW_UNSEEN) {
+			end++;
+		}
+		if (end == i) {
+			continue;
+		}
+		if (!is_told(&ck->line[number], w->first_cycle + i, w->first_cycle + end)) {
+			ev = checker_event(ck, number, EVENT_SYNC0_MISSING, w->first_cycle + i);
+			ev.arg[0] = (int32_t)(end - i);
+			checker_emit(ck, &ev);
+			told++;
+		}
+		i = end;
+	}
+}
+
+static void tell_counts(struct checker *ck, const struct window *w, size_t number)
+{
+	const struct window_line *wl = &w->line[number];
+	struct event ev;
+
+	tell_missing(ck, w, number);
+	if (wl->extra > 0) {
+		ev = checker_event(ck, number, EVENT_SYNC0_EXTRA, wl->first_extra);
+		ev.arg[0] = alarm_clamp((double)wl->extra);
+		checker_emit(ck, &ev);
+	}
+	if (wl->step_ns != 0) {
+		ev = checker_event(ck, number, EVENT_SYNC0_PHASE_STEP, wl->step_cycle);
+		ev.arg[0] = alarm_clamp((double)wl->step_ns);
+		checker_emit(ck, &ev);
+	}
+}
+
+static void tell_overflow(struct checker *ck, const struct window *w, size_t number)
+{
+	struct event ev = checker_event(ck, number, EVENT_SYNC0_OVERFLOW, w->first_cycle);
+
+	if (w->line[number].overflow > 0) {
+		ev.arg[0] = alarm_clamp((double)w->line[number].overflow);
+		checker_emit(ck, &ev);
+	}
+}
+
+/* All lines stepped alike: it was the clock that they are timed with. */
+static void find_common_step(struct checker *ck, struct window *w)
+{
+	int64_t step_ns = w->line[0].step_ns;
+	struct event ev;
+
+	if (w->line_count < 2 || step_ns == 0 || w->clock_step_ns != 0) {
+		return;
+	}
+	for (size_t i = 1; i < w->line_count; i++) {
+		if (w->line[i].step_ns == 0 ||
+		    llabs(w->line[i].step_ns - step_ns) > ck->spec.period_ns / ALIKE_SHARE) {
+			return;
+		}
+	}
+	w->clock_step_ns = step_ns;
+	w->clock_step_cycle = w->line[0].step_cycle;
+	ev = checker_event(ck, 0, EVENT_SYNC0_CLOCK_STEP, w->clock_step_cycle);
+	ev.slave_pos = EVENT_NO_SLAVE;
+	ev.line = 0;
+	ev.arg[0] = alarm_clamp((double)step_ns);
+	checker_emit(ck, &ev);
+}
+
+static struct sync0_result begin_result(const struct checker *ck, size_t number, int64_t mono_ns)
+{
+	return (struct sync0_result){
+		.mono_ns = mono_ns,
+		.tai_ns = mono_ns + ck->spec.mono_to_tai_ns,
+		.session = ck->spec.session,
+		.slave_pos = ck->spec.line[number].slave_pos,
+		.line = (uint16_t)number,
+		.source = (uint8_t)ck->spec.source,
+		.dc_diff_ns = -1,
+	};
+}
+
+static void close_line(struct checker *ck, const struct window *w, size_t number)
+{
+	int64_t end_dc_ns = grid_due_dc_ns(ck->grid, w->first_cycle + (int64_t)w->cycles);
+	struct sync0_result r = begin_result(ck, number, grid_mono_ns(ck->grid, end_dc_ns));
+	const struct figures_spec spec = {
+		.period_ns = ck->spec.period_ns,
+		.origin_dc_ns = ck->origin_dc_ns,
+		.shift_ns = ck->spec.line[number].shift_ns,
+		.first_shift_ns = ck->spec.line[0].shift_ns,
+	};
+
+	r.kind = SYNC0_WINDOW;
+	figures_compute(w, number, &spec, &ck->spec.noise, &ck->room, &r);
+	judge(&ck->spec.limits, &ck->spec.noise, spec.shift_ns, &r);
+	if (!r.is_disturbed) {
+		tell_counts(ck, w, number);
+	}
+	tell_overflow(ck, w, number);
+	ck->alarms += (uint64_t)alarm_window(&ck->line[number].alarm, &r, &ck->spec.limits,
+					     emit_from_window, ck);
+	if (ck->spec.result != NULL) {
+		ck->spec.result(ck->spec.ctx, &r);
+	}
+}
+
+void checker_close_window(struct checker *ck)
+{
+	struct window *w = ck->window[ck->window_number % OPEN_WINDOWS];
+
+	find_common_step(ck, w);
+	for (size_t i = 0; i < ck->spec.line_count; i++) {
+		if (ck->spec.line[i].mode == CHECKER_PERIODIC) {
+			close_line(ck, w, i);
+		}
+	}
+	ck->windows++;
+	ck->window_number++;
+	window_clear(w, w->first_cycle + (int64_t)OPEN_WINDOWS * w->cycles);
+}
+
+/* --- shots --- */
+
+static void tell_shot(struct checker *ck, size_t number, const struct shot_verdict *v)
+{
+	struct sync0_result r = begin_result(ck, number, v->mono_ns);
+	struct event ev;
+	int64_t late_ns;
+
+	r.kind = SYNC0_SHOT;
+	r.first_cycle = (uint64_t)grid_cycle(ck->grid, v->mono_ns, 0, &late_ns);
+	r.cycles = 1;
+	r.has_come = v->news == SHOT_CAME;
+	r.edges = r.has_come;
+	r.missing = 1 - r.edges;
+	r.shot_dc_ns = v->due_dc_ns;
+	r.shot_late_ns = v->late_ns;
+	r.phase_error_ns = grid_uncertainty_ns(ck->grid);
+	judge(&ck->spec.limits, &ck->spec.noise, 0, &r);
+	ev = alarm_event(&r, r.has_come ? EVENT_SYNC0_SHOT : EVENT_SYNC0_SHOT_LOST);
+	ev.value = v->due_dc_ns;
+	ev.arg[0] = alarm_clamp((double)v->late_ns);
+	ev.arg[1] = alarm_clamp((double)(r.phase_error_ns + ck->spec.noise.max_ns));
+	checker_emit(ck, &ev);
+	ck->alarms += r.has_come ? 0 : 1;
+	if (ck->spec.result != NULL) {
+		ck->spec.result(ck->spec.ctx, &r);
+	}
+}
+
+static void tell_extra_shot(struct checker *ck, size_t number, int64_t mono_ns)
+{
+	int64_t late_ns;
+	struct event ev = checker_event(ck, number, EVENT_SYNC0_EXTRA,
+					grid_cycle(ck->grid, mono_ns, 0, &late_ns));
+
+	ev.mono_ns = mono_ns;
+	ev.arg[0] = 1;
+	checker_emit(ck, &ev);
+}
+
+void checker_look_at_shots(struct checker *ck, size_t line, int64_t until_ns)
+{
+	for (;;) {
+		struct shot_verdict v = shot_next(&ck->line[line].shot, ck->grid, until_ns);
+
+		switch (v.news) {
+		case SHOT_NONE:
+			return;
+		case SHOT_CAME:
+		case SHOT_LOST:
+			tell_shot(ck, line, &v);
+			break;
+		case SHOT_EXTRA:
+			tell_extra_shot(ck, line, v.mono_ns);
+			break;
+		}
+	}
+}

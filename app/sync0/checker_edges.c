@@ -1,0 +1,168 @@
+/* SPDX-License-Identifier: MIT */
+/* The way of an edge: its line's track gives it a cycle, the cycle's window takes it. */
+#include "sync0/checker_inside.h"
+
+enum {
+	BACK_EDGES = 3,
+	FIRST_SELF_CYCLE = 2, /* without a master: lines do not all begin in the same cycle */
+};
+
+/* Without a master, the first line's edges are the cycles. */
+static void cycle_by_edge(struct checker *ck, const struct edge *edge)
+{
+	struct self_cycle self;
+	int64_t step_ns;
+
+	if (!self_grid_edge(&ck->self, ck->spec.period_ns, edge, &self)) {
+		return;
+	}
+	if (!ck->has_origin) {
+		ck->has_origin = 1;
+		ck->origin_dc_ns = self.dc_ns - self.cycle * ck->spec.period_ns;
+		grid_set_origin(ck->grid, ck->origin_dc_ns);
+	}
+	if (grid_pair(ck->grid, self.dc_ns, edge->mono_ns, 0, &step_ns) == GRID_STEPPED) {
+		checker_clock_stepped(ck, self.cycle, step_ns);
+	}
+	ck->newest_cycle = self.cycle;
+	if (!ck->has_base) {
+		checker_begin_at(ck, self.cycle + FIRST_SELF_CYCLE);
+	}
+}
+
+static void tell_back(struct checker *ck, size_t number, int64_t cycle)
+{
+	struct line *ln = &ck->line[number];
+	struct event ev;
+
+	if (!ln->is_lost) {
+		return;
+	}
+	if (ln->back_count == 0) {
+		ln->lost_to = cycle;
+	}
+	if (++ln->back_count < BACK_EDGES) {
+		return;
+	}
+	ln->is_lost = 0;
+	ev = checker_event(ck, number, EVENT_SYNC0_BACK, ln->lost_to);
+	ev.arg[0] = alarm_clamp((double)(ln->lost_to - ln->lost_from));
+	checker_emit(ck, &ev);
+}
+
+/* What the kernel dropped lies just before the edge that it gave. */
+static void mark_overflow(struct checker *ck, size_t number, int64_t cycle)
+{
+	struct line *ln = &ck->line[number];
+
+	for (int64_t c = cycle - 1; ln->dropped > 0 && ln->has_last && c > ln->last_cycle; c--) {
+		struct window *w =
+			c >= checker_oldest(ck)->first_cycle ? checker_window(ck, c) : NULL;
+
+		if (w == NULL) {
+			break;
+		}
+		w->line[number].mark[c - w->first_cycle] = WINDOW_OVERFLOWN;
+		ln->dropped--;
+	}
+	ln->dropped = 0;
+}
+
+static void take_cycle(struct checker *ck, size_t number, const struct track_item *item)
+{
+	struct line *ln = &ck->line[number];
+	struct window *w = checker_window(ck, item->cycle);
+
+	if (w == NULL) {
+		return;
+	}
+	mark_overflow(ck, number, item->cycle);
+	w->line[number].mark[item->cycle - w->first_cycle] = WINDOW_SEEN;
+	w->line[number].mono_ns[item->cycle - w->first_cycle] = item->mono_ns;
+	if (ln->has_last && item->cycle == ln->last_cycle + 1 && ck->spec.deviation != NULL) {
+		ck->spec.deviation(ck->spec.ctx, number,
+				   item->mono_ns - ln->last_mono_ns - ck->spec.period_ns);
+	}
+	ln->has_last = 1;
+	ln->last_cycle = item->cycle;
+	ln->last_mono_ns = item->mono_ns;
+	tell_back(ck, number, item->cycle);
+}
+
+static void take_item(struct checker *ck, size_t number, const struct track_item *item)
+{
+	struct window *w;
+
+	if (item->kind == TRACK_CYCLE) {
+		take_cycle(ck, number, item);
+		return;
+	}
+	w = checker_window(ck, item->cycle);
+	if (w != NULL) {
+		if (w->line[number].extra++ == 0) {
+			w->line[number].first_extra = item->cycle;
+		}
+	}
+}
+
+static void note_step(struct checker *ck, size_t number, const struct track_out *out)
+{
+	struct window *w = out->step_ns != 0 ? checker_window(ck, out->step_cycle) : NULL;
+
+	if (w != NULL) {
+		w->line[number].step_ns = out->step_ns;
+		w->line[number].step_cycle = out->step_cycle;
+	}
+}
+
+void checker_take(struct checker *ck, size_t number, const struct track_out *out)
+{
+	for (int i = 0; i < out->count; i++) {
+		take_item(ck, number, &out->item[i]);
+	}
+	note_step(ck, number, out);
+}
+
+static void note_seqno(struct checker *ck, const struct edge *edge)
+{
+	struct line *ln = &ck->line[edge->line];
+	uint32_t gap = edge->seqno - ln->last_seqno - 1;
+	int64_t late_ns;
+	struct window *w;
+
+	if (edge->seqno != 0 && ln->last_seqno != 0 && gap != 0 && gap < UINT32_MAX / 2) {
+		ln->dropped += gap;
+		w = checker_window(ck, grid_cycle(ck->grid, edge->mono_ns, 0, &late_ns));
+		if (w != NULL) {
+			w->line[edge->line].overflow += gap;
+		}
+	}
+	ln->last_seqno = edge->seqno;
+}
+
+void checker_edge(struct checker *ck, const struct edge *edge)
+{
+	struct track_out out;
+
+	if (edge->line >= ck->spec.line_count) {
+		return;
+	}
+	if (ck->spec.line[edge->line].mode == CHECKER_ONESHOT) {
+		shot_edge(&ck->line[edge->line].shot, edge->mono_ns);
+		return;
+	}
+	if (ck->spec.grid == CHECKER_GRID_EDGES && edge->line == 0) {
+		cycle_by_edge(ck, edge);
+	}
+	if (!grid_is_ready(ck->grid) || !ck->has_origin) {
+		return;
+	}
+	note_seqno(ck, edge);
+	track_edge(&ck->line[edge->line].track, ck->grid, edge, &out);
+	checker_take(ck, edge->line, &out);
+}
+
+void checker_shot(struct checker *ck, size_t line, int64_t dc_ns)
+{
+	shot_command(&ck->line[line].shot, dc_ns);
+}

@@ -1,0 +1,71 @@
+/* SPDX-License-Identifier: MIT */
+/* Between the files of the checker; not for others. */
+#ifndef SYNC0_CHECKER_INSIDE_H
+#define SYNC0_CHECKER_INSIDE_H
+
+#include "sync0/alarm.h"
+#include "sync0/checker.h"
+#include "sync0/figures.h"
+#include "sync0/grid.h"
+#include "sync0/self_grid.h"
+#include "sync0/shot.h"
+#include "sync0/track.h"
+#include "sync0/window.h"
+
+enum { OPEN_WINDOWS = 2 };
+
+struct line {
+	struct track track;
+	struct alarm_line alarm;
+	struct shot_line shot;
+	uint32_t last_seqno;
+	uint64_t dropped;     /* by the kernel, before the next edge */
+	int has_last;         /* a cycle that is judged had its edge */
+	int64_t last_cycle;   /* the newest of them */
+	int64_t last_mono_ns; /* and its edge */
+	int is_lost;
+	int64_t lost_from; /* first cycle without an edge, and first with one again */
+	int64_t lost_to;
+	int back_count;
+};
+
+struct checker {
+	struct checker_spec spec;
+	struct grid *grid;
+	struct self_grid self;
+	struct figures_room room;
+	struct window *window[OPEN_WINDOWS]; /* the oldest open one is number % OPEN_WINDOWS */
+	int64_t window_number;
+	uint32_t window_cycles;
+	int has_base;
+	int64_t base; /* first cycle that is judged */
+	int has_origin;
+	int64_t origin_dc_ns;
+	int64_t newest_cycle; /* of the master, or of the first line */
+	uint64_t windows;
+	uint64_t alarms;
+	struct line line[LIMIT_SLAVES];
+};
+
+static inline struct window *checker_oldest(const struct checker *ck)
+{
+	return ck->window[ck->window_number % OPEN_WINDOWS];
+}
+
+/** Judge from @cycle on. */
+void checker_begin_at(struct checker *ck, int64_t cycle);
+/** The host's clock went ahead of DC time by @step_ns in about @cycle. */
+void checker_clock_stepped(struct checker *ck, int64_t cycle, int64_t step_ns);
+/** Take what has become clear of @line. */
+void checker_take(struct checker *ck, size_t line, const struct track_out *out);
+/** The open window that holds @cycle, closing older ones if it must; NULL if it is not judged. */
+struct window *checker_window(struct checker *ck, int64_t cycle);
+/** Compute, judge and tell the oldest open window, and open the next. */
+void checker_close_window(struct checker *ck);
+void checker_emit(struct checker *ck, const struct event *ev);
+/** An event of @line in @cycle, its time filled in. */
+struct event checker_event(const struct checker *ck, size_t line, enum event_id id, int64_t cycle);
+/** What can be said of the shots of @line. */
+void checker_look_at_shots(struct checker *ck, size_t line, int64_t until_ns);
+
+#endif

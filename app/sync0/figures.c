@@ -1,0 +1,240 @@
+/* SPDX-License-Identifier: MIT */
+#include "sync0/figures.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+
+#include "sync0/stat.h"
+
+#define PPB 1e9
+
+int figures_room_create(uint32_t cycles, struct figures_room *ret_room)
+{
+	struct figures_room room = {
+		.x = calloc(cycles, sizeof(uint32_t)),
+		.y = calloc(cycles, sizeof(int64_t)),
+		.scratch = calloc(cycles, sizeof(int64_t)),
+	};
+
+	if (room.x == NULL || room.y == NULL || room.scratch == NULL) {
+		figures_room_destroy(&room);
+		return -ENOMEM;
+	}
+	*ret_room = room;
+	return 0;
+}
+
+void figures_room_destroy(struct figures_room *room)
+{
+	free(room->x);
+	free(room->y);
+	free(room->scratch);
+	*room = (struct figures_room){ .x = NULL };
+}
+
+static void count(const struct window *w, const struct window_line *wl, struct sync0_result *ret)
+{
+	for (uint32_t i = 0; i < w->cycles; i++) {
+		if (wl->mark[i] == WINDOW_SEEN) {
+			ret->edges++;
+		} else if (wl->mark[i] == WINDOW_UNSEEN) {
+			if (ret->missing == 0) {
+				ret->first_missing = (uint64_t)(w->first_cycle + i);
+			}
+			ret->missing++;
+		}
+	}
+	ret->cycles = w->cycles;
+	ret->extra = wl->extra;
+	ret->overflow = wl->overflow;
+}
+
+/* Mean, spread and percentiles of the times between neighbouring cycles' edges. */
+static void period(const struct window *w, const struct window_line *wl,
+		   const struct figures_room *room, struct sync0_result *ret)
+{
+	int64_t first = -1;
+	int64_t last = -1;
+	double squares = 0;
+	size_t n = 0;
+
+	for (uint32_t i = 0; i < w->cycles; i++) {
+		if (wl->mark[i] == WINDOW_SEEN) {
+			first = first < 0 ? i : first;
+			last = i;
+		}
+	}
+	if (last <= first) {
+		return;
+	}
+	ret->period_ns = (double)(wl->mono_ns[last] - wl->mono_ns[first]) / (double)(last - first);
+	for (uint32_t i = 1; i < w->cycles; i++) {
+		if (wl->mark[i] == WINDOW_SEEN && wl->mark[i - 1] == WINDOW_SEEN) {
+			double off = (double)(wl->mono_ns[i] - wl->mono_ns[i - 1]) - ret->period_ns;
+
+			squares += off * off;
+			room->y[n++] = llabs(llround(off));
+		}
+	}
+	if (n < 2) {
+		return;
+	}
+	stat_sort(room->y, n);
+	ret->period_sd_ns = sqrt(squares / (double)(n - 1));
+	ret->jitter_p50_ns = stat_percentile(room->y, n, 500000);
+	ret->jitter_p99_ns = stat_percentile(room->y, n, 990000);
+	ret->jitter_max_ns = room->y[n - 1];
+	ret->has |= SYNC0_HAS_PERIOD;
+}
+
+/* The host's clock minus DC time, at every edge. */
+static int fit_edges(const struct window *w, const struct window_line *wl,
+		     const struct figures_spec *spec, int64_t base_ns,
+		     const struct figures_room *room, struct stat_fit *ret_fit)
+{
+	size_t n = 0;
+
+	for (uint32_t i = 0; i < w->cycles; i++) {
+		if (wl->mark[i] == WINDOW_SEEN) {
+			int64_t due_dc_ns = spec->origin_dc_ns +
+					    (w->first_cycle + (int64_t)i) * spec->period_ns;
+
+			room->x[n] = i;
+			room->y[n++] = wl->mono_ns[i] - due_dc_ns - base_ns;
+		}
+	}
+	return stat_line(room->x, room->y, n, room->scratch, ret_fit);
+}
+
+/* The same at every frame; *ret_latency_ns is what a pair may be off by. */
+static int fit_frames(const struct window *w, int64_t base_ns, const struct figures_room *room,
+		      struct stat_fit *ret_fit, int64_t *ret_latency_ns)
+{
+	size_t n = 0;
+	int r;
+
+	for (uint32_t i = 0; i < w->cycles; i++) {
+		if (w->has_frame[i]) {
+			room->x[n] = i;
+			room->y[n++] = w->frame_mono_ns[i] - w->frame_dc_ns[i] - base_ns;
+		}
+	}
+	r = stat_line(room->x, room->y, n, room->scratch, ret_fit);
+	if (r < 0) {
+		return r;
+	}
+	n = 0;
+	for (uint32_t i = 0; i < w->cycles; i++) {
+		if (w->has_frame[i]) {
+			room->scratch[n++] = w->frame_latency_ns[i];
+		}
+	}
+	*ret_latency_ns = stat_median(room->scratch, n);
+	return 0;
+}
+
+static int64_t base_of(const struct window *w, const struct window_line *wl,
+		       const struct figures_spec *spec)
+{
+	for (uint32_t i = 0; i < w->cycles; i++) {
+		if (w->has_frame[i]) {
+			return w->frame_mono_ns[i] - w->frame_dc_ns[i];
+		}
+	}
+	for (uint32_t i = 0; i < w->cycles; i++) {
+		if (wl->mark[i] == WINDOW_SEEN) {
+			return wl->mono_ns[i] - spec->origin_dc_ns -
+			       (w->first_cycle + (int64_t)i) * spec->period_ns;
+		}
+	}
+	return 0;
+}
+
+static void against_frames(const struct window *w, const struct stat_fit *edges,
+			   const struct figures_spec *spec, int64_t base_ns,
+			   const struct figures_room *room, struct sync0_result *ret)
+{
+	double to_ppb = PPB / (double)spec->period_ns;
+	struct stat_fit frames;
+	int64_t latency_ns;
+
+	if (fit_frames(w, base_ns, room, &frames, &latency_ns) < 0) {
+		return;
+	}
+	ret->has |= SYNC0_HAS_RATE | SYNC0_HAS_PHASE;
+	ret->rate_ppb = (frames.slope - edges->slope) * to_ppb;
+	/* Wake-ups are late together, not each for itself: their spread counts once more. */
+	ret->rate_error_ppb =
+		(edges->slope_error + frames.slope_error + frames.sigma / (double)w->cycles) *
+		to_ppb;
+	ret->phase_ns = llround(edges->offset - frames.offset -
+				frames.slope * (edges->centre - frames.centre));
+	ret->phase_error_ns = llround(edges->offset_error + frames.offset_error) + latency_ns;
+}
+
+static void frame_distance(const struct window *w, const struct window_line *wl,
+			   const struct figures_room *room, struct sync0_result *ret)
+{
+	size_t n = 0;
+
+	for (uint32_t i = 0; i < w->cycles; i++) {
+		if (w->has_frame[i] && wl->mark[i] == WINDOW_SEEN) {
+			room->scratch[n++] = w->frame_mono_ns[i] - wl->mono_ns[i];
+		}
+	}
+	ret->frame_ns = stat_median(room->scratch, n);
+}
+
+static void skew(const struct window *w, const struct window_line *wl,
+		 const struct figures_spec *spec, const struct judge_noise *noise,
+		 const struct figures_room *room, struct sync0_result *ret)
+{
+	const struct window_line *first = &w->line[0];
+	int64_t asked_ns = spec->shift_ns - spec->first_shift_ns + noise->bias_ns;
+	struct stat_fit fit;
+	size_t n = 0;
+
+	for (uint32_t i = 0; i < w->cycles; i++) {
+		if (wl->mark[i] == WINDOW_SEEN && first->mark[i] == WINDOW_SEEN) {
+			room->x[n] = i;
+			room->y[n++] = wl->mono_ns[i] - first->mono_ns[i] - asked_ns;
+		}
+	}
+	if (stat_line(room->x, room->y, n, room->scratch, &fit) < 0) {
+		return;
+	}
+	ret->has |= SYNC0_HAS_SKEW;
+	ret->skew_ns = llround(fit.offset);
+	ret->skew_error_ns = (int64_t)ceil(fit.offset_error) + noise->bias_error_ns;
+}
+
+void figures_compute(const struct window *w, size_t number, const struct figures_spec *spec,
+		     const struct judge_noise *noise, const struct figures_room *room,
+		     struct sync0_result *ret)
+{
+	const struct window_line *wl = &w->line[number];
+	int64_t base_ns = base_of(w, wl, spec);
+	struct stat_fit edges;
+
+	count(w, wl, ret);
+	ret->first_cycle = (uint64_t)w->first_cycle;
+	ret->step_ns = w->clock_step_ns != 0 ? w->clock_step_ns : wl->step_ns;
+	ret->is_disturbed = w->clock_step_ns != 0;
+	ret->dc_diff_ns = w->dc_diff_ns;
+	if (ret->step_ns != 0) {
+		return; /* two halves that do not belong together */
+	}
+	period(w, wl, room, ret);
+	if (fit_edges(w, wl, spec, base_ns, room, &edges) < 0) {
+		return;
+	}
+	ret->has |= SYNC0_HAS_DRIFT;
+	ret->drift_ppb = -edges.slope * PPB / (double)spec->period_ns;
+	ret->drift_error_ppb = edges.slope_error * PPB / (double)spec->period_ns;
+	against_frames(w, &edges, spec, base_ns, room, ret);
+	frame_distance(w, wl, room, ret);
+	if (number > 0) {
+		skew(w, wl, spec, noise, room, ret);
+	}
+}

@@ -1,0 +1,39 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * One-shot mode: a pulse for each commanded DC time, and none besides. Context: any.
+ */
+#ifndef SYNC0_SHOT_H
+#define SYNC0_SHOT_H
+
+#include <stdint.h>
+
+#include "sync0/grid.h"
+
+enum { SHOT_WAITING = 16, SHOT_EDGES = 64 };
+
+struct shot_line {
+	int64_t due_dc_ns[SHOT_WAITING]; /* commanded, oldest first */
+	int waiting;
+	int64_t edge_mono_ns[SHOT_EDGES]; /* belonging to none yet, oldest first */
+	int edges;
+};
+
+enum shot_news { SHOT_NONE, SHOT_CAME, SHOT_LOST, SHOT_EXTRA };
+
+struct shot_verdict {
+	enum shot_news news;
+	int64_t due_dc_ns;
+	int64_t mono_ns; /* of the edge; of the due time if none came */
+	int64_t late_ns;
+};
+
+/** A shot was commanded for @due_dc_ns. */
+void shot_command(struct shot_line *sl, int64_t due_dc_ns);
+void shot_edge(struct shot_line *sl, int64_t mono_ns);
+/**
+ * All edges before @until_ns are known: what can be said? Ask again until SHOT_NONE. The grid is
+ * ready.
+ */
+struct shot_verdict shot_next(struct shot_line *sl, const struct grid *grid, int64_t until_ns);
+
+#endif

@@ -1,0 +1,211 @@
+/* SPDX-License-Identifier: MIT */
+#include "sync0/track.h"
+
+#include <math.h>
+
+#include "base/clock.h"
+#include "sync0/stat.h"
+
+enum {
+	ASTRAY_SHARE = 4, /* of the period, either way: farther off is not the cycle's edge */
+	ALIKE_SHARE = 8,  /* held edges within this are a phase */
+	STEP_SHARE = 50,  /* a phase that is off by this for TRACK_HELD edges has changed */
+	FOLLOW_SHARE = 64,
+};
+
+void track_reset(struct track *track)
+{
+	*track = (struct track){ .is_locked = 0 };
+}
+
+static void emit(struct track_out *out, enum track_kind kind, int64_t cycle, int64_t mono_ns)
+{
+	out->item[out->count++] =
+		(struct track_item){ .kind = kind, .cycle = cycle, .mono_ns = mono_ns };
+}
+
+static void emit_extra(const struct track *track, const struct grid *grid, const struct edge *edge,
+		       struct track_out *out)
+{
+	int64_t late_ns;
+
+	emit(out, TRACK_EXTRA, grid_cycle(grid, edge->mono_ns, (int64_t)track->phase_ns, &late_ns),
+	     edge->mono_ns);
+}
+
+static void held_are_extra(struct track *track, const struct grid *grid, struct track_out *out)
+{
+	for (int i = 0; i < track->held_count; i++) {
+		emit_extra(track, grid, &track->held[i], out);
+	}
+	track->held_count = 0;
+}
+
+static void drop_oldest(struct track *track, const struct grid *grid, struct track_out *out)
+{
+	emit_extra(track, grid, &track->held[0], out);
+	track->held_count--;
+	for (int i = 0; i < track->held_count; i++) {
+		track->held[i] = track->held[i + 1];
+		track->held_late_ns[i] = track->held_late_ns[i + 1];
+	}
+}
+
+/* Are the held edges a cycle apart, at one place of it? Then that place is *ret_phase_ns. */
+static int held_are_alike(const struct track *track, int64_t period_ns, int64_t *ret_phase_ns)
+{
+	int64_t off[TRACK_HELD];
+
+	for (int i = 0; i < TRACK_HELD; i++) {
+		off[i] = fold_ns(track->held_late_ns[i] - track->held_late_ns[0], period_ns);
+		if (i > 0 && track->held[i].mono_ns - track->held[i - 1].mono_ns < period_ns / 2) {
+			return 0;
+		}
+	}
+	stat_sort(off, TRACK_HELD);
+	*ret_phase_ns = track->held_late_ns[0] + off[TRACK_HELD / 2];
+	return off[TRACK_HELD - 1] - off[0] < period_ns / ALIKE_SHARE;
+}
+
+static void take(struct track *track, int64_t cycle, int64_t mono_ns, struct track_out *out)
+{
+	if (track->has_last && cycle <= track->last_cycle) {
+		emit(out, TRACK_EXTRA, cycle, mono_ns);
+		return;
+	}
+	emit(out, TRACK_CYCLE, cycle, mono_ns);
+	track->has_last = 1;
+	track->last_cycle = cycle;
+	track->last_mono_ns = mono_ns;
+}
+
+static void lock_to(struct track *track, const struct grid *grid, int64_t phase_ns,
+		    struct track_out *out)
+{
+	int64_t period_ns = grid_period_ns(grid);
+
+	phase_ns = fold_ns(phase_ns, period_ns);
+	if (track->is_locked) {
+		out->step_ns = fold_ns(phase_ns - (int64_t)track->phase_ns, period_ns);
+	}
+	track->is_locked = 1;
+	track->phase_ns = (double)phase_ns;
+	track->run_count = 0;
+	for (int i = 0; i < track->held_count; i++) {
+		int64_t late_ns;
+
+		take(track, grid_cycle(grid, track->held[i].mono_ns, phase_ns, &late_ns),
+		     track->held[i].mono_ns, out);
+	}
+	out->step_cycle = out->item[out->count - track->held_count].cycle;
+	track->held_count = 0;
+}
+
+static void hold(struct track *track, const struct grid *grid, const struct edge *edge,
+		 int64_t late_ns, struct track_out *out)
+{
+	int64_t phase_ns;
+
+	track->held[track->held_count] = *edge;
+	track->held_late_ns[track->held_count++] = late_ns;
+	if (track->held_count < TRACK_HELD) {
+		return;
+	}
+	if (held_are_alike(track, grid_period_ns(grid), &phase_ns)) {
+		lock_to(track, grid, phase_ns, out);
+	} else {
+		drop_oldest(track, grid, out);
+	}
+}
+
+/* Is the run one step? All of it lies together, and one interval before it was as much off. */
+static int run_is_step(const struct track *track, double *ret_middle_ns)
+{
+	int64_t off[TRACK_HELD];
+	double middle;
+
+	for (int i = 0; i < TRACK_HELD; i++) {
+		off[i] = (int64_t)track->run_off_ns[i];
+	}
+	stat_sort(off, TRACK_HELD);
+	middle = (double)off[TRACK_HELD / 2];
+	*ret_middle_ns = middle;
+	return (double)(off[TRACK_HELD - 1] - off[0]) < fabs(middle) / 2 &&
+	       fabs(track->run_jump_ns - middle) < fabs(middle) / 2;
+}
+
+/* Follow the phase: slowly, or at once when TRACK_HELD edges in a row say that it is another. */
+static void follow(struct track *track, double off_ns, double jump_ns, int64_t period_ns,
+		   struct track_out *out)
+{
+	double middle_ns;
+
+	track->phase_ns += off_ns / FOLLOW_SHARE;
+	if (fabs(off_ns) < (double)period_ns / STEP_SHARE ||
+	    (track->run_count > 0 && (off_ns < 0) != (track->run_off_ns[0] < 0))) {
+		track->run_count = 0;
+		return;
+	}
+	if (track->run_count == 0) {
+		track->run_jump_ns = jump_ns;
+	}
+	track->run_off_ns[track->run_count++] = off_ns;
+	if (track->run_count < TRACK_HELD) {
+		return;
+	}
+	if (run_is_step(track, &middle_ns)) {
+		out->step_ns = (int64_t)track->run_jump_ns;
+		out->step_cycle = track->last_cycle - TRACK_HELD + 1;
+	}
+	track->phase_ns += middle_ns;
+	track->run_count = 0;
+}
+
+/* A phase that has wandered past half a period belongs to the neighbouring cycle. */
+static void keep_near(struct track *track, int64_t period_ns)
+{
+	double limit_ns = (double)period_ns * 5 / 8;
+
+	if (track->phase_ns > limit_ns) {
+		track->phase_ns -= (double)period_ns;
+	} else if (track->phase_ns < -limit_ns) {
+		track->phase_ns += (double)period_ns;
+	}
+}
+
+void track_edge(struct track *track, const struct grid *grid, const struct edge *edge,
+		struct track_out *ret_out)
+{
+	int64_t period_ns = grid_period_ns(grid);
+	int64_t late_ns;
+	int64_t cycle;
+	double off_ns;
+	double jump_ns;
+
+	keep_near(track, period_ns);
+	cycle = grid_cycle(grid, edge->mono_ns, (int64_t)track->phase_ns, &late_ns);
+	off_ns = (double)late_ns - track->phase_ns;
+	ret_out->count = 0;
+	ret_out->step_ns = 0;
+	if (!track->is_locked || fabs(off_ns) > (double)period_ns / ASTRAY_SHARE) {
+		hold(track, grid, edge, late_ns, ret_out);
+		return;
+	}
+	held_are_extra(track, grid, ret_out);
+	jump_ns = track->has_last ? (double)(edge->mono_ns - track->last_mono_ns -
+					     (cycle - track->last_cycle) * period_ns)
+				  : 0;
+	if (track->has_last && cycle <= track->last_cycle) {
+		emit(ret_out, TRACK_EXTRA, cycle, edge->mono_ns);
+		return;
+	}
+	take(track, cycle, edge->mono_ns, ret_out);
+	follow(track, off_ns, jump_ns, period_ns, ret_out);
+}
+
+void track_finish(struct track *track, const struct grid *grid, struct track_out *ret_out)
+{
+	ret_out->count = 0;
+	ret_out->step_ns = 0;
+	held_are_extra(track, grid, ret_out);
+}

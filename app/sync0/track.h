@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * Gives each edge of one line the number of the cycle it belongs to. A line has a phase against
+ * the grid, learnt from its first edges and followed slowly; an edge within a quarter of the period
+ * of it is a cycle's, any other is held until it is clear whether it is an extra one or the phase
+ * has stepped. A smaller step shows as one odd interval with all edges behind it on one side.
+ * Context: any.
+ */
+#ifndef SYNC0_TRACK_H
+#define SYNC0_TRACK_H
+
+#include <stdint.h>
+
+#include "sync0/edge.h"
+#include "sync0/grid.h"
+
+enum { TRACK_HELD = 8 };
+
+struct track {
+	int is_locked;
+	double phase_ns; /* behind the due time */
+	int has_last;
+	int64_t last_cycle;
+	int64_t last_mono_ns;          /* of the newest edge of a cycle */
+	double run_off_ns[TRACK_HELD]; /* edges in a row on one side of the phase */
+	double run_jump_ns; /* by how much the interval before the first of them was off */
+	unsigned run_count;
+	struct edge held[TRACK_HELD];
+	int64_t held_late_ns[TRACK_HELD];
+	int held_count;
+};
+
+enum track_kind { TRACK_CYCLE, TRACK_EXTRA };
+
+struct track_item {
+	enum track_kind kind;
+	int64_t cycle; /* for TRACK_EXTRA, the cycle in which it came */
+	int64_t mono_ns;
+};
+
+struct track_out {
+	int count;
+	struct track_item item[TRACK_HELD + 1];
+	int64_t step_ns;    /* the line's phase stepped by so much; 0: not */
+	int64_t step_cycle; /* the first cycle after it */
+};
+
+/** Forget everything: the grid has changed. */
+void track_reset(struct track *track);
+/** Take @edge; what has become clear by it is in @ret_out, oldest first. */
+void track_edge(struct track *track, const struct grid *grid, const struct edge *edge,
+		struct track_out *ret_out);
+/** What is still held is extra. */
+void track_finish(struct track *track, const struct grid *grid, struct track_out *ret_out);
+
+#endif

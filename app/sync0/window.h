@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: MIT */
+/* What was seen in one window of cycles: of each line its edges, of the master its frames. */
+#ifndef SYNC0_WINDOW_H
+#define SYNC0_WINDOW_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+enum window_mark { WINDOW_UNSEEN = 0, WINDOW_SEEN, WINDOW_OVERFLOWN };
+
+struct window_line {
+	int64_t *mono_ns; /* by cycle, where mark is WINDOW_SEEN */
+	uint8_t *mark;    /* enum window_mark */
+	uint64_t extra;
+	int64_t first_extra; /* cycle */
+	uint64_t overflow;
+	int64_t step_ns;
+	int64_t step_cycle;
+};
+
+struct window {
+	int64_t first_cycle;
+	uint32_t cycles;
+	size_t line_count;
+	struct window_line *line;
+	/* The frame of each cycle; has_frame 0: lost, skipped, or there is no master. */
+	uint8_t *has_frame;
+	int64_t *frame_dc_ns;
+	int64_t *frame_mono_ns;
+	int64_t *frame_latency_ns; /* either way */
+	int64_t dc_diff_ns;        /* largest; -1: not read */
+	int64_t clock_step_ns;     /* 0: none */
+	int64_t clock_step_cycle;
+};
+
+/** 0 or -ENOMEM. Free with window_destroy(). */
+int window_create(uint32_t cycles, size_t line_count, struct window **ret_window);
+void window_destroy(struct window *w);
+/** Begin anew, at @first_cycle. */
+void window_clear(struct window *w, int64_t first_cycle);
+int window_holds(const struct window *w, int64_t cycle);
+
+#endif
