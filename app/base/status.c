@@ -31,6 +31,17 @@ const char *dc_state_to_str(uint32_t state)
 	return name_of(dc_names, sizeof(dc_names) / sizeof(dc_names[0]), state);
 }
 
+static const char *const control_names[] = {
+	[CONTROL_NONE] = "none",       [CONTROL_WAITING] = "waiting", [CONTROL_RUNNING] = "running",
+	[CONTROL_SAFE] = "safe",       [CONTROL_PARKED] = "parked",   [CONTROL_STOPPED] = "stopped",
+	[CONTROL_CRASHED] = "crashed", [CONTROL_STUCK] = "stuck",
+};
+
+const char *control_state_to_str(uint32_t state)
+{
+	return name_of(control_names, sizeof(control_names) / sizeof(control_names[0]), state);
+}
+
 const char *record_state_to_str(uint32_t state)
 {
 	return name_of(record_names, sizeof(record_names) / sizeof(record_names[0]), state);

@@ -46,6 +46,12 @@ static int check_relations(const struct config *cfg, const struct option_lines *
 		  "must not be above a quarter of cycle.period" },
 		{ "dc.sync0_pulse", "cycle.period", cfg->dc_sync0_pulse_ns < cfg->cycle_period_ns,
 		  "must be below cycle.period" },
+		{ "control.budget", "cycle.period",
+		  cfg->control_program[0] == '\0' || cfg->control_budget_ns < cfg->cycle_period_ns,
+		  "must be below cycle.period" },
+		{ "control.options", "control.program",
+		  cfg->control_options[0] == '\0' || cfg->control_program[0] != '\0',
+		  "there is no control.program to tell them to" },
 		{ "record.sync_period", "record.chunk_period",
 		  cfg->record_sync_period_ns >= cfg->record_chunk_period_ns,
 		  "must not be below record.chunk_period" },
@@ -97,6 +103,9 @@ static int check_dds(const struct config *cfg, const struct option_lines *lines,
 	} else if (!is_made_of(cfg->dds_peers, HOST_CHARS ",")) {
 		*ret_key = "dds.peers";
 		fault = "must be addresses or host names with commas between";
+	} else if (strpbrk(cfg->dds_security, "<>&\"'${}") != NULL) {
+		*ret_key = "dds.security";
+		fault = "must be a path without < > & $ { } and quotes";
 	}
 	if (fault == NULL) {
 		return 0;

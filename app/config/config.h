@@ -18,6 +18,7 @@ enum config_owner { CONFIG_OWNER_LOCAL, CONFIG_OWNER_PROGRAM, CONFIG_OWNER_REMOT
 enum config_presence { CONFIG_ANY_SLAVES, CONFIG_EXACT_SLAVES };
 
 enum { CONFIG_LIMIT_SDOS = 256, CONFIG_LIMIT_OUTPUTS = 512, CONFIG_PATH_BYTES = 256 };
+enum { CONFIG_OPTIONS_BYTES = 512 };
 
 /* slaves[]: what is expected at each position, and how it is set up. */
 struct config_slave {
@@ -88,6 +89,12 @@ struct config {
 	int64_t dc_lock_timeout_ns;
 	uint32_t dc_burst_frames;  /* static drift compensation */
 	int64_t dc_sync0_pulse_ns; /* for documentation and checks: comes from SII */
+	/* control */
+	char control_program[CONFIG_PATH_BYTES];    /* shared object; "" = none */
+	char control_options[CONFIG_OPTIONS_BYTES]; /* "KEY=VALUE, ..."; "" = none */
+	int64_t control_budget_ns;
+	enum config_overrun control_overrun;
+	int64_t control_stuck_ns; /* so long inside one call: the process ends */
 	/* ring */
 	int64_t ring_depth_ns;
 	uint32_t event_depth;
@@ -110,7 +117,7 @@ struct config {
 	char dds_peers[CONFIG_PATH_BYTES]; /* addresses, comma between; "" = none */
 	uint32_t dds_block_cycles;         /* 0 = no blocks */
 	uint32_t dds_allow_insecure_commands;
-	uint32_t dds_command_rate; /* commands a second and commander */
+	uint32_t dds_command_rate;            /* commands a second and commander */
 	char dds_security[CONFIG_PATH_BYTES]; /* folder of our keys; "" = no DDS Security */
 	uint32_t dds_ros2_mirror;
 	/* lists */

@@ -22,6 +22,7 @@ const struct option_section option_sections[] = {
 	{ "bus", "The EtherCAT segment: its NIC and what is expected of it." },
 	{ "cycle", "The real-time loop." },
 	{ "dc", "Distributed clocks: how the master follows the reference clock." },
+	{ "control", "Your own program in the cycle (control.md)." },
 	{ "ring", "Shared memory between ecdaqd and its readers." },
 	{ "record", "Recording to local storage (ecdaq-record)." },
 	{ "dds", "Data and commands over DDS (ecdaq-dds)." },
@@ -298,6 +299,46 @@ const struct option option_table[] = {
 	  .prose = "Length of the SYNC0 pulse as the slaves' SII sets it, for documentation and "
 		   "checks. "
 		   "0s: not stated." },
+	/* control */
+	{ .name = "control.program",
+	  .type = OPTION_TEXT,
+	  FIELD(control_program),
+	  .standard = "",
+	  .unit = "",
+	  .prose = "Path of the shared object that runs in every cycle in OP. Empty: none." },
+	{ .name = "control.options",
+	  .type = OPTION_TEXT,
+	  FIELD(control_options),
+	  .standard = "",
+	  .unit = "",
+	  .prose = "What the program is told: KEY=VALUE with commas between. Which keys there are "
+		   "is the program's matter; one it does not know is refused." },
+	{ .name = "control.budget",
+	  .type = OPTION_DURATION,
+	  FIELD(control_budget_ns),
+	  .standard = "200us",
+	  .min = "1us",
+	  .max = "10ms",
+	  .unit = "us",
+	  .prose = "How long one call of the program may take." },
+	{ .name = "control.overrun",
+	  .type = OPTION_WORD,
+	  FIELD(control_overrun),
+	  .standard = "count",
+	  .unit = "",
+	  .words = "count|fail_safe|stop",
+	  .prose = "What a call beyond the budget leads to: it is counted, or the program's "
+		   "outputs go to fail-safe until the bus comes to OP anew, too, or the bus is "
+		   "stopped in order." },
+	{ .name = "control.stuck",
+	  .type = OPTION_DURATION,
+	  FIELD(control_stuck_ns),
+	  .standard = "250ms",
+	  .min = "10ms",
+	  .max = "10s",
+	  .unit = "ms",
+	  .prose = "A call that has not come back after so long never will: ecdaqd ends at once, "
+		   "and the slaves' watchdogs keep the outputs safe." },
 	/* ring */
 	{ .name = "ring.depth",
 	  .type = OPTION_DURATION,
@@ -460,8 +501,9 @@ const struct option option_table[] = {
 	  FIELD(dds_security),
 	  .standard = "",
 	  .unit = "",
-	  .prose = "Folder of this participant's keys (ecdaq security init makes it): DDS Security "
-		   "is used, and commands are taken from commanders that have a key. Empty: none." },
+	  .prose =
+		  "Folder of this participant's keys (ecdaq security init makes it): DDS Security "
+		  "is used, and commands are taken from commanders that have a key. Empty: none." },
 	{ .name = "dds.ros2_mirror",
 	  .type = OPTION_SWITCH,
 	  FIELD(dds_ros2_mirror),

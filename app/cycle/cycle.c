@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <sys/resource.h>
 
+#include "control/program.h"
 #include "cycle/cycle_inside.h"
 
 enum {
@@ -105,7 +106,7 @@ static void change_phase(struct cycle *cy)
 	}
 	if (wanted == CYCLE_OP) {
 		check_restart(&cy->check);
-		cy->is_latched_safe = 0;
+		cy->is_latched_safe = cy->last_steps > 0;
 	}
 	cy->phase = wanted;
 }
@@ -163,7 +164,7 @@ static void choose_outputs(struct cycle *cy, uint8_t *image)
 {
 	int is_live = cy->phase == CYCLE_OP && !cy->is_latched_safe;
 	unsigned timed_out = outputs_choose(&cy->outputs, image, is_live);
-	int is_fail_safe = !is_live || timed_out > 0;
+	int is_fail_safe = !is_live || timed_out > 0 || cycle_is_control_safe(cy);
 
 	if (is_fail_safe && !cy->was_fail_safe) {
 		cycle_note(cy, EVENT_OUTPUT_FAIL_SAFE, 0, (int64_t)timed_out, 0);
@@ -215,6 +216,7 @@ void cycle_step(struct cycle *cy)
 	cy->sample.round_trip_ns = res.round_trip.ns < 0 ? -1 : (int32_t)res.round_trip.ns;
 	cy->sample.dc_diff_ns = (int32_t)(res.dc_diff_ns > INT32_MAX ? INT32_MAX : res.dc_diff_ns);
 	cycle_push_sample(cy);
+	cycle_control(cy);
 	choose_outputs(cy, cy->image);
 
 	SET(st->cycle_number, cy->sample.cycle);
@@ -229,6 +231,7 @@ void cycle_step(struct cycle *cy)
 	}
 	cy->deadline = mono_add(cy->deadline, (span_t){ cy->period.ns + correction_ns });
 	cy->steps++;
+	cycle_count_down(cy);
 }
 
 /* A stack page first touched in the cycle would be a page fault there. */
@@ -243,16 +246,33 @@ static void touch_stack(void)
 
 int cycle_run(struct cycle *cycle)
 {
+	struct control *control = cycle->spec.control;
+
 	touch_stack();
+	if (control != NULL) {
+		control_enter(control);
+	}
 	while (!atomic_load_explicit(&cycle->stop, memory_order_relaxed)) {
 		cycle_step(cycle);
+	}
+	if (control != NULL) {
+		control_leave(control);
 	}
 	return cycle->result;
 }
 
+int cycle_has_stopped(const struct cycle *cycle, int *ret_result)
+{
+	if (!atomic_load_explicit(&cycle->stop, memory_order_acquire)) {
+		return 0;
+	}
+	*ret_result = cycle->result;
+	return 1;
+}
+
 void cycle_stop(struct cycle *cycle)
 {
-	atomic_store_explicit(&cycle->stop, 1, memory_order_relaxed);
+	atomic_store_explicit(&cycle->stop, 1, memory_order_release);
 }
 
 void cycle_phase_set(struct cycle *cycle, enum cycle_phase phase)

@@ -20,6 +20,8 @@
 
 enum cycle_writer { CYCLE_WRITER_LOCAL, CYCLE_WRITER_PROGRAM, CYCLE_WRITER_REMOTE, CYCLE_WRITERS };
 
+struct control;
+
 /* Everything the cycle works on; all of it outlives the cycle. */
 struct cycle_spec {
 	const struct config *cfg;
@@ -34,6 +36,7 @@ struct cycle_spec {
 	struct ring *events;
 	struct cycle_stats *stats;
 	struct board *boards[CYCLE_WRITERS]; /* NULL: no such writer */
+	struct control *control;             /* the control program; NULL: none */
 };
 
 struct cycle;
@@ -48,6 +51,8 @@ void cycle_step(struct cycle *cycle);
 /** Steps until cycle_stop(); touches its stack first and counts its own page faults. 0 or -errno.
  */
 int cycle_run(struct cycle *cycle);
+/** 1 and cycle_run()'s result in @ret_result if it is to return, or has. Context: any. */
+int cycle_has_stopped(const struct cycle *cycle, int *ret_result);
 /** Ask cycle_run() to return after the step it is in. Context: any, also a signal handler. */
 void cycle_stop(struct cycle *cycle);
 

@@ -40,7 +40,8 @@ struct cycle {
 	int has_started;
 	int was_fail_safe;
 	int has_overrun;     /* this step has passed edges */
-	int is_latched_safe; /* overrun policy fail_safe */
+	int is_latched_safe; /* overrun policy fail_safe, or the cycle is about to end */
+	unsigned last_steps; /* until it ends by itself; 0: it goes on */
 	unsigned lost_in_row;
 	unsigned wkc_low_in_row;
 	uint64_t steps;
@@ -63,6 +64,15 @@ void cycle_note(struct cycle *cy, enum event_id id, int64_t value, int64_t arg0,
 void cycle_count_frames(struct cycle *cy, const struct exchange_result *res);
 /** What the frame's DC time says about the next deadline: the correction, ns. */
 int64_t cycle_follow(struct cycle *cy, const struct exchange_result *res);
+
+/* --- cycle_control.c: the control program --- */
+
+/** Call it, if outputs are real in this cycle. */
+void cycle_control(struct cycle *cy);
+/** 1 if it is there and its outputs are to be fail-safe. */
+int cycle_is_control_safe(const struct cycle *cy);
+/** At the end of a step: stop, if this was the last one. */
+void cycle_count_down(struct cycle *cy);
 
 /* --- cycle_judge.c: one sample for every SYNC0 edge --- */
 

@@ -23,6 +23,39 @@ int session_cancelled(const struct session *s, struct failure *failure)
 		       : 0;
 }
 
+/* --- the control program --- */
+
+/* Before anything is asked of the segment: a path that is wrong is wrong whatever is out there. */
+static int load_control(struct session *s, struct failure *failure)
+{
+	char error[FAILURE_TEXT_BYTES] = "";
+	int r;
+
+	if (s->spec.cfg->control_program[0] == '\0') {
+		return 0;
+	}
+	r = control_load(s->spec.cfg, &s->control, error, sizeof(error));
+	return r < 0 ? failure_set(failure, r == -ENOMEM ? EXIT_CODE_RESOURCES : EXIT_CODE_CONFIG,
+				   r, "%s", error)
+		     : 0;
+}
+
+static int begin_control(struct session *s, struct failure *failure)
+{
+	struct control_spec spec = { .platform = s->spec.platform,
+				     .status = &s->home.page->control };
+	char error[FAILURE_TEXT_BYTES] = "";
+	int r;
+
+	if (s->control == NULL) {
+		return 0;
+	}
+	spec.channels = bus_channels(s->bus, &spec.channel_count);
+	bus_slaves(s->bus, &spec.slave_count);
+	r = control_begin(s->control, &spec, error, sizeof(error));
+	return r < 0 ? failure_set(failure, EXIT_CODE_CONFIG, r, "%s", error) : 0;
+}
+
 /* --- the slaves --- */
 
 static int open_line(struct session *s, struct failure *failure)
@@ -179,6 +212,10 @@ static int make_cycle(struct session *s, struct failure *failure)
 	spec.channels = bus_channels(s->bus, &spec.channel_count);
 	board_init(&s->board);
 	board_init(s->home.remote);
+	if (s->control != NULL) {
+		spec.control = s->control;
+		spec.boards[CYCLE_WRITER_PROGRAM] = control_board(s->control);
+	}
 	memset(&s->home.page->cycle, 0, sizeof(s->home.page->cycle));
 	r = cycle_create(&spec, &s->cycle, error, sizeof(error));
 	if (r < 0) {
@@ -240,10 +277,16 @@ static void arrive(struct session *s)
 
 static int climb(struct session *s, struct failure *failure)
 {
-	int r = open_line(s, failure);
+	int r = load_control(s, failure);
 
 	if (r == 0) {
+		r = open_line(s, failure);
+	}
+	if (r == 0) {
 		r = prepare_slaves(s, failure);
+	}
+	if (r == 0) {
+		r = begin_control(s, failure);
 	}
 	if (r == 0) {
 		r = make_samples(s, failure);

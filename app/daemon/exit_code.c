@@ -25,6 +25,9 @@ static const struct {
 			      EXIT_CODE_PASSING },
 	[EXIT_CODE_WIRE] = { "frames get lost or damaged", EXIT_CODE_PASSING },
 	[EXIT_CODE_OVERRUN] = { "the cycle overran and cycle.overrun is stop", EXIT_CODE_LASTING },
+	[EXIT_CODE_CONTROL] = { "the control program crashed, hung, or took too long and "
+				"control.overrun is stop",
+				EXIT_CODE_LASTING },
 };
 
 const char *exit_code_to_str(enum exit_code code)

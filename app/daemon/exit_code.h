@@ -20,6 +20,7 @@ enum exit_code {
 	EXIT_CODE_STATE = 12,     /* an AL error, or a state was not reached */
 	EXIT_CODE_WIRE = 13,      /* frames get lost or damaged */
 	EXIT_CODE_OVERRUN = 14,   /* an overrun, and cycle.overrun is stop */
+	EXIT_CODE_CONTROL = 15,   /* the control program crashed, hung, or was too slow for stop */
 	EXIT_CODE_COUNT,
 };
 

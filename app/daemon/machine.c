@@ -2,9 +2,13 @@
 #include "daemon/machine.h"
 
 #include <errno.h>
+#include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/timex.h>
+#include <unistd.h>
+
+#include "control/program.h"
 
 /* How long it sleeps while the cycle works for it: a frame of its own rides once a cycle. */
 #define WAIT_NS (150 * NS_PER_US)
@@ -60,22 +64,60 @@ static int open_transport(void *ctx, struct transport *ret_transport, struct fai
 	return 0;
 }
 
+/*
+ * The cycle's thread will not come back, and nothing can be sent without it: end the process, and
+ * let the slaves' watchdogs do the rest. No lock, no exit handler: the program may hold any.
+ */
+static void end_stuck(void *ctx, int64_t busy_ns)
+{
+	struct program *pg = ctx;
+	char text[FAILURE_TEXT_BYTES];
+	char line[FAILURE_TEXT_BYTES + 16];
+	int len;
+
+	snprintf(text, sizeof(text),
+		 "control: %.63s: has not come back from cycle() for %" PRId64
+		 " ms (control.stuck); the slaves' watchdogs make the outputs safe",
+		 control_name(session_control(pg->session)), busy_ns / NS_PER_MS);
+	session_stuck(pg->session, EXIT_CODE_CONTROL, text);
+	len = snprintf(line, sizeof(line), "ecdaqd: %s\n", text);
+	if (write(STDERR_FILENO, line, (size_t)len) < 0) {
+		_exit(EXIT_CODE_CONTROL); /* nobody reads it */
+	}
+	_exit(EXIT_CODE_CONTROL);
+}
+
 static int start_cycle(void *ctx, struct cycle *cycle, struct failure *failure)
 {
 	struct program *pg = ctx;
-	int r = realtime_cycle_start(&pg->realtime, cycle, failure);
+	int r = supervisor_start(&pg->supervisor, &(struct supervisor_spec){
+							  .control = session_control(pg->session),
+							  .limit_ns = pg->cfg.control_stuck_ns,
+							  .stuck = end_stuck,
+							  .ctx = pg,
+						  });
 
-	if (r == 0 && pg->realtime.is_pinned) {
+	if (r < 0) {
+		return failure_set(failure, EXIT_CODE_RESOURCES, r, "supervisor: %s", strerror(-r));
+	}
+	r = realtime_cycle_start(&pg->realtime, cycle, failure);
+	if (r < 0) {
+		supervisor_stop(&pg->supervisor);
+		return r;
+	}
+	if (pg->realtime.is_pinned) {
 		session_cpu_set(pg->session, (uint32_t)pg->cfg.cycle_cpu);
 	}
-	return r;
+	return 0;
 }
 
 static int end_cycle(void *ctx)
 {
 	struct program *pg = ctx;
+	int r = realtime_cycle_end(&pg->realtime);
 
-	return realtime_cycle_end(&pg->realtime);
+	supervisor_stop(&pg->supervisor);
+	return r;
 }
 
 static int has_cycle_ended(void *ctx)

@@ -9,6 +9,7 @@
 #include "daemon/options.h"
 #include "daemon/realtime.h"
 #include "daemon/session.h"
+#include "daemon/supervisor.h"
 #include "link/packet_socket.h"
 
 struct program {
@@ -16,6 +17,7 @@ struct program {
 	struct config cfg;
 	struct notify notify;
 	struct realtime realtime;
+	struct supervisor supervisor;
 	struct session *session;
 	int interface_claim;
 	int has_been_up;

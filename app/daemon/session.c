@@ -30,6 +30,16 @@ void session_emit(struct session *s, const struct event *ev)
 
 /* --- the cycle's platform --- */
 
+static void clear_control(struct control_status *st)
+{
+	ZERO(st->calls);
+	ZERO(st->overruns);
+	ZERO(st->safe_cycles);
+	ZERO(st->limited);
+	ZERO(st->refused);
+	histogram_clear(&st->time);
+}
+
 /* Counters and histograms; not what says where the cycle stands. */
 static void clear_stats(struct cycle_stats *st)
 {
@@ -80,6 +90,7 @@ static int cycle_sleep(void *ctx, mono_t deadline)
 	if (atomic_load_explicit(&s->clear_asked, memory_order_relaxed)) {
 		atomic_store_explicit(&s->clear_asked, 0, memory_order_relaxed);
 		clear_stats(&s->home.page->cycle);
+		clear_control(&s->home.page->control);
 	}
 	return s->spec.platform.sleep_until(s->spec.platform.ctx, deadline);
 }
@@ -176,6 +187,11 @@ struct bus *session_bus(const struct session *session)
 	return session->bus;
 }
 
+struct control *session_control(const struct session *session)
+{
+	return session->control;
+}
+
 struct cycle *session_cycle(const struct session *session)
 {
 	return session->cycle;
@@ -259,6 +275,16 @@ void session_conclude(struct session *session, const struct failure *failure)
 	session_say(session, failure != NULL ? failure->text : "");
 	session_state_set(session, failure != NULL ? BUS_FAILED : BUS_STOPPED);
 	session_emit(session, &ev);
+}
+
+void session_stuck(struct session *session, enum exit_code code, const char *text)
+{
+	struct status_page *page = session->home.page;
+
+	atomic_store_explicit(&page->control.state, CONTROL_STUCK, memory_order_relaxed);
+	atomic_store_explicit(&page->exit_code, (uint32_t)code, memory_order_relaxed);
+	session_say(session, text);
+	atomic_store_explicit(&page->bus_state, BUS_FAILED, memory_order_release);
 }
 
 void session_destroy(struct session *session)

@@ -87,6 +87,12 @@ void session_drop(struct session *session);
 /** How it all ended, for the status page: state STOPPED or FAILED, exit code, message. */
 void session_conclude(struct session *session, const struct failure *failure);
 
+/**
+ * The cycle is stuck in the control program: state FAILED, @code and @text on the status page, and
+ * nothing else. Context: any thread that ends the process right after.
+ */
+void session_stuck(struct session *session, enum exit_code code, const char *text);
+
 /** Without a word on the wire. NULL is fine. */
 void session_destroy(struct session *session);
 
@@ -105,7 +111,10 @@ void session_say(struct session *session, const char *text);
 const struct status_page *session_page(const struct session *session);
 /** The bus, the cycle; NULL while nothing is up. */
 struct bus;
+struct control;
 struct bus *session_bus(const struct session *session);
+/** The control program; NULL: none. */
+struct control *session_control(const struct session *session);
 struct cycle *session_cycle(const struct session *session);
 /** The run directory. */
 const struct home *session_home(const struct session *session);

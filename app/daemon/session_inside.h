@@ -9,6 +9,7 @@
 #include "base/board.h"
 #include "bus/bus.h"
 #include "bus/exchange.h"
+#include "control/program.h"
 #include "daemon/home.h"
 #include "daemon/post.h"
 #include "daemon/session.h"
@@ -28,6 +29,7 @@ struct session {
 	struct ring *samples;
 	struct exchange *exchange;
 	struct cycle *cycle;
+	struct control *control; /* NULL: none is configured */
 	struct board board;
 	int is_riding; /* the cycle owns the transport and the event ring */
 	int is_link_up;

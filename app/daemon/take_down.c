@@ -74,6 +74,8 @@ void session_drop(struct session *session)
 	session_cycle_end(s);
 	cycle_destroy(s->cycle);
 	s->cycle = NULL;
+	control_destroy(s->control);
+	s->control = NULL;
 	exchange_destroy(s->exchange);
 	s->exchange = NULL;
 	if (s->samples != NULL) {

@@ -197,7 +197,14 @@ static int is_wkc_alarming(struct session *s)
 int session_report_ended(struct session *s, struct failure *failure)
 {
 	int r = session_cycle_end(s);
+	char text[FAILURE_TEXT_BYTES] = "";
 
+	if (s->control != NULL) {
+		control_describe_end(s->control, text, sizeof(text));
+	}
+	if (text[0] != '\0') {
+		return failure_set(failure, EXIT_CODE_CONTROL, r < 0 ? r : -EIO, "%s", text);
+	}
 	if (r == -ETIME) {
 		return failure_set(
 			failure, EXIT_CODE_OVERRUN, r,
