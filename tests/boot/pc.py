@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: MIT
+"""The program on the PC: reads samples for some seconds, then switches the LED on, off and on.
+
+pc.py INTERFACE DOMAIN SECONDS; one JSON object on standard output. The kit (app/publish/python) has
+to be on PYTHONPATH.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import ecdaq
+
+LED = "piccolo0.led"
+PATIENCE_S = 120.0
+
+
+def led_follows(link: ecdaq.Link, value: int) -> dict[str, int]:
+    """Command the LED; the first sample from that cycle on, and what the LED was in it."""
+    place = link.channels()[LED].place
+    cycle = link.command({LED: value}, seconds=PATIENCE_S)
+    for sample in link.subscribe(PATIENCE_S, slave=0):
+        if sample.cycle >= cycle:
+            return {"wanted": value, "cycle": cycle, "seen": int(sample.raw[place])}
+    return {"wanted": value, "cycle": cycle, "seen": -1}
+
+
+def main() -> None:
+    interface, domain, seconds = sys.argv[1], int(sys.argv[2]), float(sys.argv[3])
+    with ecdaq.connect(interface, domain=domain) as link:
+        names = [c.name for c in link.channels(PATIENCE_S)]
+        taken = sum(1 for _ in link.subscribe(seconds))
+        result = {
+            "channels": names,
+            "samples": taken,
+            "gaps": link.gaps.gaps,
+            "missing": link.gaps.missing,
+            "doubled": link.gaps.doubled,
+            "led": [led_follows(link, value) for value in (1, 0, 1)],
+        }
+    print(json.dumps(result))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: MIT
+"""The segment is outside: frames leave the machine through its own port to ecdaq-sim on the host,
+samples and commands go over DDS through its other port.
+
+On the host's clock: this shows function, counts and content, not timing. The settings are wide
+(app/tools/image/profile-host.yaml); every frame that is lost or late is counted, not excluded.
+"""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from machine import TOP, Machine, profile, wait_for
+
+OUTSIDE = True
+TIMING = "host"
+DOMAIN = "7"
+OP_S = 1200
+SECONDS = 20
+BIN = Path(os.environ.get("ECDAQ_BIN_DIR", TOP / "build" / "stage" / "bin"))
+BUILD = Path(os.environ.get("ECDAQ_BUILD", TOP / "build" / "release"))
+# The machine's port is the one that is not ecat0; udev calls it after its place on the bus.
+LAN = "enp0s3"
+BOOT_FILES = {
+    "ecdaq.yaml": profile("host")
+    + f"""dds:
+  enable: on
+  interface: {LAN}
+  domain: {DOMAIN}
+  allow_insecure_commands: on
+outputs:
+  - channel: piccolo0.led
+    owner: remote
+    timeout: 30s
+""",
+    "network/50-lan.network": f"[Match]\nName={LAN}\n[Network]\nAddress=192.168.77.2/24\n",
+}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def segment(machine: Machine) -> Iterator[subprocess.Popen[bytes]]:
+    """ecdaq-sim at the other end of the machine's EtherCAT port."""
+    assert machine.space is not None
+    log = (machine.folder / "sim.log").open("wb")
+    process = subprocess.Popen(
+        [*machine.space.enter, BIN / "ecdaq-sim", "--interface", "ecat", "--slaves", "2"],
+        stdout=log,
+        stderr=log,
+    )
+    yield process
+    process.terminate()
+    process.wait(10)
+
+
+def status(machine: Machine) -> dict[str, Any]:
+    result = machine.try_run("ecdaq status --json")
+    found: dict[str, Any] = json.loads(result.stdout) if result.returncode == 0 else {}
+    return found
+
+
+def test_the_bus_comes_to_op_through_the_port(machine: Machine) -> None:
+    wait_for("OP", OP_S, lambda: status(machine).get("state") == "OP")
+    found = status(machine)
+    assert found["slaves"] == 2
+    assert machine.run("readlink /sys/class/net/ecat0/device").strip()
+
+
+def test_interrupts_of_the_port_are_on_the_core_of_the_cycle_above_it(machine: Machine) -> None:
+    irqs = machine.run("/usr/lib/ecdaq/port-irqs ecat0").split()
+    assert irqs
+    for irq in irqs:
+        assert machine.run(f"cat /proc/irq/{irq}/smp_affinity_list").strip() == "1"
+        thread = machine.run(f"pgrep -x 'irq/{irq}-.*'").strip()
+        said = machine.run(f"chrt --pid {thread}")
+        assert "SCHED_FIFO" in said and "priority: 85" in said, said
+
+
+def test_every_frame_is_accounted_for_and_the_recording_has_no_gap(machine: Machine) -> None:
+    before = status(machine)
+    machine.run(f"sleep {SECONDS}")
+    after = status(machine)
+    names = (
+        *("cycles", "cycles_skipped", "frames_sent", "frames_lost", "frames_late", "overruns"),
+        *("samples_good", "samples_bad", "samples_bad_unexplained"),
+    )
+    print(f"\nhost's clock, {SECONDS} s: { {n: after[n] - before[n] for n in names} }")
+    print(f"round trip {after['round_trip_ns']}, wake {after['wake_latency_ns']}")
+    assert after["cycles"] > before["cycles"]
+    assert after["samples_bad_unexplained"] == 0
+    assert after["recorded_gaps"] == 0
+    # Each frame came back in its cycle, or is counted as lost.
+    came = after["round_trip_ns"]["count"] + after["frames_lost"]
+    assert abs(came - after["frames_sent"]) <= 1, after
+
+
+def gaps_of(path: Path) -> tuple[int, int]:
+    """Of the C subscriber's file: samples, and gaps within each slave's cycles of one session."""
+    cycles: dict[tuple[str, str], list[int]] = {}
+    with path.open(newline="") as file:
+        for row in csv.DictReader(file):
+            cycles.setdefault((row["slave"], row["session"]), []).append(int(row["cycle"]))
+    gaps = sum(b != a + 1 for c in cycles.values() for a, b in itertools.pairwise(sorted(c)))
+    return sum(map(len, cycles.values())), gaps
+
+
+def test_subscribers_on_the_host_miss_nothing_and_the_led_obeys(machine: Machine) -> None:
+    assert machine.space is not None
+    kit = str(TOP / "app" / "publish" / "python")
+    program = [sys.executable, Path(__file__).parent / "pc.py", "lan", DOMAIN, str(SECONDS)]
+    c_program = [BUILD / "tests/dds/dds_subscriber", DOMAIN, "lan", str(SECONDS)]
+    c_file = machine.folder / "c.csv"
+    in_c = subprocess.Popen([*machine.space.enter, *c_program, c_file])
+    in_python = subprocess.run(
+        [*machine.space.enter, *program],
+        env=os.environ | {"PYTHONPATH": kit},
+        capture_output=True,
+        text=True,
+        timeout=900,
+        check=False,
+    )
+    assert in_c.wait(300) == 0
+    assert in_python.returncode == 0, in_python.stderr
+    found = json.loads(in_python.stdout)
+    samples, gaps = gaps_of(c_file)
+    print(f"\nPython: {found}\nC: {samples} samples, {gaps} gaps")
+    assert found["samples"] > 100 and samples > 100
+    assert (found["gaps"], found["doubled"], gaps) == (0, 0, 0)
+    assert [step["seen"] for step in found["led"]] == [1, 0, 1]
