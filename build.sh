@@ -30,6 +30,7 @@ environment of every verb:
   PYTHON              Python 3.11 or newer to start from (default: python3 on PATH, else the machine's)
   XDG_CACHE_HOME      where ecdaq/ keeps its downloads and Python environment (default: ~/.cache)
   ECDAQ_SOEM_ARCHIVE  the archive that app/third_party/soem.lock names, where no registry is reached
+  ECDAQ_LIBGPIOD_ARCHIVE  the same of app/third_party/libgpiod.lock
   PIP_*, pip.conf     the machine's own pip configuration holds
   ECDAQ_OS_RELEASE    what says which system this is (default: /etc/os-release)
 USAGE
@@ -151,6 +152,7 @@ prepare_build()
 	want_packages dds ecdaq-dds
 	need_venv
 	need_soem
+	need_libgpiod
 }
 
 do_build()
@@ -213,7 +215,7 @@ do_clean()
 {
 	case ${1:-} in
 	'') rm -rf "$root/build" ;;
-	--all) rm -rf "$root/build" "$root/app/third_party/soem" "$cache" ;;
+	--all) rm -rf "$root/build" "$root/app/third_party/soem" "$root/app/third_party/libgpiod" "$cache" ;;
 	*) die "clean: unknown option '$1' (see ./build.sh help clean)" ;;
 	esac
 }

@@ -25,4 +25,6 @@ install(FILES ../LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/ecdaq/licenses)
 install(DIRECTORY ../LICENSES/ DESTINATION ${CMAKE_INSTALL_DATADIR}/ecdaq/licenses)
 install(FILES third_party/soem.lock third_party/fetch-soem.sh
 	DESTINATION ${CMAKE_INSTALL_DATADIR}/ecdaq/soem)
+install(FILES third_party/libgpiod.lock third_party/fetch-libgpiod.sh
+	DESTINATION ${CMAKE_INSTALL_DATADIR}/ecdaq/libgpiod)
 install(DIRECTORY third_party/patches DESTINATION ${CMAKE_INSTALL_DATADIR}/ecdaq/soem)

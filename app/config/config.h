@@ -15,6 +15,7 @@ enum config_poll { CONFIG_POLL_AUTO, CONFIG_POLL_SPIN, CONFIG_POLL_SLEEP };
 enum config_overrun { CONFIG_OVERRUN_COUNT, CONFIG_OVERRUN_FAIL_SAFE, CONFIG_OVERRUN_STOP };
 enum config_mode { CONFIG_MODE_UNSET, CONFIG_MODE_PERIODIC, CONFIG_MODE_ONESHOT };
 enum config_owner { CONFIG_OWNER_LOCAL, CONFIG_OWNER_PROGRAM, CONFIG_OWNER_REMOTE };
+enum config_edge_clock { CONFIG_EDGE_AUTO, CONFIG_EDGE_MONOTONIC, CONFIG_EDGE_HTE };
 enum config_presence { CONFIG_ANY_SLAVES, CONFIG_EXACT_SLAVES };
 
 enum { CONFIG_LIMIT_SDOS = 256, CONFIG_LIMIT_OUTPUTS = 512, CONFIG_PATH_BYTES = 256 };
@@ -29,6 +30,7 @@ struct config_slave {
 	uint32_t alias;        /* 0 = any */
 	enum config_mode mode; /* FB1111-Piccolo: writes 0x8000:01 in PRE-OP */
 	int64_t sync0_shift_ns;
+	char sync0_line[96];      /* GPIO line its SYNC0 is wired to; "" = none */
 	uint32_t assign_activate; /* 0 = from what the slave is: DC slaves 0x0300 */
 	int line;                 /* in the file, for messages */
 };
@@ -120,6 +122,21 @@ struct config {
 	uint32_t dds_command_rate;            /* commands a second and commander */
 	char dds_security[CONFIG_PATH_BYTES]; /* folder of our keys; "" = no DDS Security */
 	uint32_t dds_ros2_mirror;
+	/* sync0 */
+	uint32_t sync0_enable;
+	char sync0_edges[CONFIG_PATH_BYTES]; /* edge file of ecdaq-sim instead of lines; "" = lines
+					      */
+	int64_t sync0_window_ns;
+	int64_t sync0_lost_ns; /* so long without an edge: lost */
+	uint32_t sync0_buffer; /* events that the kernel queues */
+	enum config_edge_clock sync0_clock;
+	int32_t sync0_cpu; /* -1 = do not pin */
+	char sync0_calibration[CONFIG_PATH_BYTES];
+	double sync0_drift_limit_ppm; /* limits: 0 = not judged */
+	double sync0_rate_limit_ppm;
+	int64_t sync0_jitter_limit_ns;
+	int64_t sync0_phase_limit_ns;
+	int64_t sync0_skew_limit_ns;
 	/* lists */
 	struct config_slave slave[LIMIT_SLAVES];
 	size_t slave_count;
@@ -166,6 +183,9 @@ int config_parse_duration(const char *text, int64_t *ret_ns, char *why);
 #define CONFIG_RUN_RECORD_STATUS "record-status"     /* struct record_status */
 #define CONFIG_RUN_DDS_STATUS "dds-status"           /* struct dds_status */
 #define CONFIG_RUN_COMMANDS_REMOTE "commands-remote" /* socket that gives ecdaq-dds its board */
+#define CONFIG_RUN_SYNC0 "sync0"                     /* ring of struct sync0_result */
+#define CONFIG_RUN_SYNC0_EVENTS "sync0-events"       /* ring of events of ecdaq-sync0 */
+#define CONFIG_RUN_SYNC0_STATUS "sync0-status"       /* struct sync0_status */
 #define CONFIG_RUN_ADMIN "admin"                     /* socket, admin/protocol.h */
 
 /** Where the run directory is: @cfg->run_dir, else $ECDAQ_RUN_DIR, else /run/ecdaq (root) or

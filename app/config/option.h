@@ -42,7 +42,7 @@ struct option {
 extern const struct option option_table[];
 extern const size_t option_count;
 
-enum { OPTION_LIMIT = 96, OPTION_WHY_BYTES = CONFIG_WHY_BYTES, OPTION_KEY_BYTES = 96 };
+enum { OPTION_LIMIT = 128, OPTION_WHY_BYTES = CONFIG_WHY_BYTES, OPTION_KEY_BYTES = 96 };
 
 /* A list of the file. Its items are filled by the options whose name starts with name and "[].". */
 struct option_list {

@@ -179,6 +179,7 @@ static void write_example(const char *prefix, const char *indent, FILE *out)
 		const char *name;
 		const char *value;
 	} examples[] = {
+		{ "slaves[].sync0_line", "pinctrl-bcm2711:17" },
 		{ "slaves[].name", "piccolo0" },
 		{ "slaves[].vendor", "0x00000002" },
 		{ "slaves[].product", "0x04570862" },

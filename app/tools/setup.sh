@@ -160,6 +160,11 @@ need_soem()
 	"$root/app/third_party/fetch-soem.sh" || exit 1
 }
 
+need_libgpiod()
+{
+	"$root/app/third_party/fetch-libgpiod.sh" || exit 1
+}
+
 # configure_flavour NAME: sets $build_dir and configures it.
 configure_flavour()
 {
