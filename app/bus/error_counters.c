@@ -2,6 +2,7 @@
 #include "bus/error_counters.h"
 
 #include <stdatomic.h>
+#include <stddef.h>
 #include <string.h>
 
 #define SET(field, v) atomic_store_explicit(&(field), (v), memory_order_relaxed)
@@ -29,7 +30,7 @@ void error_counters_restart(struct error_counters *ec)
 
 void error_counters_show(const struct error_counters *ec, struct slave_status *page)
 {
-	for (unsigned i = 0; i < ESC_PORTS; i++) {
+	for (size_t i = 0; i < ESC_PORTS; i++) {
 		SET(page->rx_errors[i], ec->sum[2 * i] + ec->sum[2 * i + 1]);
 		SET(page->forwarded_errors[i], ec->sum[ERROR_FORWARDED + i]);
 		SET(page->lost_links[i], ec->sum[ERROR_LINKS + i]);
