@@ -58,6 +58,7 @@ enum cli_exit verb_histogram(struct cli *cli, int argc, char **argv);
 enum cli_exit verb_log(struct cli *cli, int argc, char **argv);
 enum cli_exit verb_oneshot(struct cli *cli, int argc, char **argv);
 enum cli_exit verb_sdo(struct cli *cli, int argc, char **argv);
+enum cli_exit verb_security(struct cli *cli, int argc, char **argv);
 enum cli_exit verb_set(struct cli *cli, int argc, char **argv);
 enum cli_exit verb_slaves(struct cli *cli, int argc, char **argv);
 enum cli_exit verb_status(struct cli *cli, int argc, char **argv);

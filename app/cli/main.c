@@ -52,6 +52,11 @@ static const struct verb verbs[] = {
 	  verb_histogram },
 	{ "log", "...", "Recordings: list, info, check, recover, export (see ecdaq log --help).",
 	  NULL, verb_log },
+	{ "security", "init|add-subscriber|add-commander|check [NAME|DIR]",
+	  "The keys of DDS Security (app/doc/dds.md).",
+	  "ecdaq security init makes a store with the appliance's keys, add-subscriber NAME and\n"
+	  "add-commander NAME those of a participant; check DIR looks at one participant's folder.\n",
+	  verb_security },
 	{ "clear", "", "Set counters and histograms of ecdaqd to zero.", NULL, verb_clear },
 	{ "stop", "", "Stop the bus and ecdaqd in order.", NULL, verb_stop },
 	{ "version", "", "The version of this program.", NULL, verb_version },

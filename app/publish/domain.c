@@ -2,10 +2,14 @@
 #include "publish/domain.h"
 
 #include <errno.h>
+#include <glob.h>
 #include <net/if.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
+#include <time.h>
+
+#include "keystore/keystore.h"
 
 struct text {
 	char *at;
@@ -41,7 +45,81 @@ static void add_peers(struct text *text, const char *peers)
 	}
 }
 
-int domain_xml(const struct config *cfg, char *ret_xml, size_t xml_bytes)
+static void add_plugin(struct text *text, const char *dir, const char *file, const char *function)
+{
+	add(text,
+	    "<Library path=\"%s/libdds_security_%s.so\" initFunction=\"init_%s\" "
+	    "finalizeFunction=\"finalize_%s\"/>",
+	    dir, file, function, function);
+}
+
+static void add_file(struct text *text, const char *element, const char *dir, const char *file)
+{
+	add(text, "<%s>file:%s/%s</%s>", element, dir, file, element);
+}
+
+static void add_security(struct text *text, const char *keys, const char *plugins)
+{
+	add(text, "<Security><Authentication>");
+	add_plugin(text, plugins, "auth", "authentication");
+	add_file(text, "IdentityCA", keys, KEYSTORE_IDENTITY_CA);
+	add_file(text, "IdentityCertificate", keys, KEYSTORE_CERT);
+	add_file(text, "PrivateKey", keys, KEYSTORE_KEY);
+	add(text, "</Authentication><AccessControl>");
+	add_plugin(text, plugins, "ac", "access_control");
+	add_file(text, "PermissionsCA", keys, KEYSTORE_PERMISSIONS_CA);
+	add_file(text, "Governance", keys, KEYSTORE_GOVERNANCE);
+	add_file(text, "Permissions", keys, KEYSTORE_PERMISSIONS);
+	add(text, "</AccessControl><Cryptographic>");
+	add_plugin(text, plugins, "crypto", "crypto");
+	add(text, "</Cryptographic></Security>");
+}
+
+int domain_find_plugins(const char *library, char *ret_dir, size_t dir_bytes)
+{
+	const char *slash = strrchr(library, '/');
+	int folder = slash == NULL ? 0 : (int)(slash - library);
+	char pattern[CONFIG_PATH_BYTES * 2];
+	glob_t found = { .gl_pathc = 0 };
+	int r = -ENOENT;
+
+	snprintf(pattern, sizeof(pattern), "%.*s{,/libddsc*}/libdds_security_auth.so", folder,
+		 library);
+	if (slash != NULL && glob(pattern, GLOB_BRACE, NULL, &found) == 0) {
+		slash = strrchr(found.gl_pathv[0], '/');
+		folder = (int)(slash - found.gl_pathv[0]);
+		r = snprintf(ret_dir, dir_bytes, "%.*s", folder, found.gl_pathv[0]) < (int)dir_bytes
+			    ? 0
+			    : -ENOENT;
+		globfree(&found);
+	}
+	return r;
+}
+
+int domain_check_security(const struct config *cfg, char *said, char *error, size_t error_bytes)
+{
+	struct keystore_identity identity;
+	char why[KEYSTORE_ERROR_BYTES];
+	char until[16];
+	struct tm parts;
+	time_t expires;
+
+	said[0] = '\0';
+	if (!domain_is_secure(cfg)) {
+		return 0;
+	}
+	if (keystore_check(cfg->dds_security, (int64_t)time(NULL), &identity, why) < 0) {
+		snprintf(error, error_bytes, "dds.security: %s", why);
+		return -EKEYREJECTED;
+	}
+	expires = (time_t)identity.expires_s;
+	gmtime_r(&expires, &parts);
+	strftime(until, sizeof(until), "%Y-%m-%d", &parts);
+	snprintf(said, DOMAIN_SAID_BYTES, "DDS Security as %s, until %s", identity.name, until);
+	return 0;
+}
+
+int domain_xml(const struct config *cfg, const char *plugins, char *ret_xml, size_t xml_bytes)
 {
 	struct text text = { .at = ret_xml, .left = xml_bytes };
 	/* Linux' lo does not multicast: participants there find each other by address. */
@@ -66,6 +144,9 @@ int domain_xml(const struct config *cfg, char *ret_xml, size_t xml_bytes)
 		add(&text, "</Peers>");
 	}
 	add(&text, "</Discovery>");
+	if (domain_is_secure(cfg)) {
+		add_security(&text, cfg->dds_security, plugins);
+	}
 	return text.is_full ? -E2BIG : 0;
 }
 

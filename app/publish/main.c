@@ -168,8 +168,10 @@ static int run(struct publisher *publisher)
 
 static int exit_status(int error)
 {
-	return error == -EINVAL || error == -ENODEV || error == -ENAMETOOLONG ? STATUS_CONFIG
-									      : STATUS_FAILED;
+	return error == -EINVAL || error == -ENODEV || error == -ENAMETOOLONG ||
+			       error == -EKEYREJECTED
+		       ? STATUS_CONFIG
+		       : STATUS_FAILED;
 }
 
 int main(int argc, char **argv)

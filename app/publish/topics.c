@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "publish/topics.h"
 
+#include <dlfcn.h>
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
@@ -127,13 +128,35 @@ static int make_all(struct topics *t, const struct config *cfg, const dds_listen
 	return 0;
 }
 
+static int find_plugins(char *ret_dir, size_t dir_bytes, char *error, size_t error_bytes)
+{
+	Dl_info library = { .dli_fname = NULL };
+
+	if (dladdr((const void *)(uintptr_t)&dds_create_domain, &library) == 0 ||
+	    domain_find_plugins(library.dli_fname, ret_dir, dir_bytes) < 0) {
+		snprintf(error, error_bytes,
+			 "dds.security: %s was installed without the DDS Security plug-ins",
+			 library.dli_fname != NULL ? library.dli_fname : "Cyclone DDS");
+		return -EIO;
+	}
+	return 0;
+}
+
 int topics_open(struct topics *topics, const struct config *cfg, const dds_listener_t *on_command,
 		char *error, size_t error_bytes)
 {
 	char xml[DOMAIN_XML_BYTES];
+	char plugins[CONFIG_PATH_BYTES] = "";
+	int r = 0;
 
 	memset(topics, 0, sizeof(*topics));
-	if (domain_xml(cfg, xml, sizeof(xml)) < 0) {
+	if (domain_is_secure(cfg)) {
+		r = find_plugins(plugins, sizeof(plugins), error, error_bytes);
+	}
+	if (r < 0) {
+		return r;
+	}
+	if (domain_xml(cfg, plugins, xml, sizeof(xml)) < 0) {
 		snprintf(error, error_bytes, "dds.peers: too many");
 		return -EIO;
 	}

@@ -1,0 +1,135 @@
+/* SPDX-License-Identifier: MIT */
+/* ecdaq security: the keys of DDS Security, made and looked at. */
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+#include "cli/args.h"
+#include "keystore/keystore.h"
+
+enum { DAYS = 3650, DAYS_MAX = 36500 };
+
+struct security {
+	struct cli *cli;
+	const char *dir;
+	uint64_t days;
+	const char *name; /* of a participant, or a folder; NULL: none given */
+};
+
+static enum cli_exit exit_of(const struct security *s, int r, const char *error)
+{
+	enum cli_exit code = r == -EACCES || r == -EPERM ? CLI_PERMISSION
+			     : r == -EINVAL              ? CLI_USAGE
+							 : CLI_FAILED;
+
+	return r < 0 ? cli_fail(s->cli, code, "%s", error) : CLI_OK;
+}
+
+static enum cli_exit init(const struct security *s)
+{
+	char error[KEYSTORE_ERROR_BYTES];
+	enum cli_exit result = exit_of(s, keystore_init(s->dir, (unsigned)s->days, error), error);
+
+	if (result == CLI_OK) {
+		printf("%s/appliance: for the appliance, where only ecdaq-dds may read it: "
+		       "dds.security\n"
+		       "%s/ca: whoever has it lets people in: keep it away from both\n",
+		       s->dir, s->dir);
+	}
+	return result;
+}
+
+static enum cli_exit add(const struct security *s, enum keystore_role role)
+{
+	char error[KEYSTORE_ERROR_BYTES];
+	enum cli_exit result =
+		exit_of(s, keystore_add(s->dir, s->name, role, (unsigned)s->days, error), error);
+
+	if (result == CLI_OK) {
+		printf("%s/%s: for this %s, and for nobody else\n", s->dir, s->name,
+		       role == KEYSTORE_COMMANDER ? "commander" : "subscriber");
+	}
+	return result;
+}
+
+static enum cli_exit add_subscriber(const struct security *s)
+{
+	return add(s, KEYSTORE_SUBSCRIBER);
+}
+
+static enum cli_exit add_commander(const struct security *s)
+{
+	return add(s, KEYSTORE_COMMANDER);
+}
+
+static enum cli_exit check(const struct security *s)
+{
+	struct keystore_identity identity;
+	char error[KEYSTORE_ERROR_BYTES];
+	char until[16];
+	struct tm parts;
+	time_t expires;
+	enum cli_exit result =
+		exit_of(s, keystore_check(s->name, (int64_t)time(NULL), &identity, error), error);
+
+	if (result == CLI_OK) {
+		expires = (time_t)identity.expires_s;
+		gmtime_r(&expires, &parts);
+		strftime(until, sizeof(until), "%Y-%m-%d", &parts);
+		printf("%s: %s, until %s\n", s->name, identity.name, until);
+	}
+	return result;
+}
+
+static const struct subject {
+	const char *verb;
+	const char *operand; /* NULL: none */
+	enum cli_exit (*run)(const struct security *s);
+} subjects[] = {
+	{ "init", NULL, init },
+	{ "add-subscriber", "NAME", add_subscriber },
+	{ "add-commander", "NAME", add_commander },
+	{ "check", "DIR", check },
+};
+
+static enum cli_exit run(struct security *s, const struct args *args)
+{
+	for (size_t i = 0; i < sizeof(subjects) / sizeof(subjects[0]); i++) {
+		const struct subject *subject = &subjects[i];
+
+		if (strcmp(subject->verb, args->operands[0]) != 0) {
+			continue;
+		}
+		if ((args->operand_count == 2) != (subject->operand != NULL)) {
+			return cli_fail(s->cli, CLI_USAGE, "%s: wants %s", subject->verb,
+					subject->operand != NULL ? subject->operand : "no word");
+		}
+		s->name = args->operand_count == 2 ? args->operands[1] : NULL;
+		return subject->run(s);
+	}
+	return cli_fail(s->cli, CLI_USAGE, "%s: wants init, add-subscriber, add-commander or check",
+			args->operands[0]);
+}
+
+enum cli_exit verb_security(struct cli *cli, int argc, char **argv)
+{
+	struct security security = { .cli = cli, .dir = "security", .days = DAYS };
+	const struct args_option options[] = {
+		{ "dir", 0, ARGS_TEXT, &security.dir, "DIR", "the store (security)" },
+		{ "days", 0, ARGS_COUNT, &security.days, "N",
+		  "how long a participant's key holds (3650)" },
+	};
+	struct args args = {
+		.options = options, .option_count = 2, .operands_min = 1, .operands_max = 2
+	};
+	enum cli_exit result;
+
+	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
+		return result;
+	}
+	if (security.days > DAYS_MAX) {
+		return cli_fail(cli, CLI_USAGE, "--days: at most %d", DAYS_MAX);
+	}
+	return run(&security, &args);
+}

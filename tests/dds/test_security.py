@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: MIT
+"""With DDS Security: who has no key gets nothing, and only a commander's key commands."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from bench import BUILD, Bench, live
+
+LED = "piccolo0.led"
+# No commands are allowed but by keys; a lease of a second.
+SECURED = {
+    "dds.allow_insecure_commands": "off",
+    "outputs[0].channel": LED,
+    "outputs[0].owner": "remote",
+    "outputs[0].timeout": "4s",
+}
+# A handshake, the exchange of keys and the matching of encrypted endpoints, on a busy machine.
+PATIENCE_S = "30"
+# So long somebody listens who is to hear nothing, after others were served on the same machine.
+SILENCE_S = "5"
+
+
+def security(*words: str, check: bool = True) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [str(live.BIN / "ecdaq"), "security", *words], capture_output=True, text=True, check=check
+    )
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("keys") / "store"
+    security("init", "--dir", str(folder))
+    security("add-subscriber", "alice", "--dir", str(folder))
+    security("add-commander", "bob", "--dir", str(folder))
+    return folder
+
+
+def start(bench: Bench, name: str, keys: Path | None, *words: str) -> subprocess.Popen[bytes]:
+    program = str(BUILD / "tests" / "dds" / "dds_secured")
+    return bench.on_pc(name, program, "7", "dds1", str(keys or "-"), *words)
+
+
+def result(bench: Bench, name: str, process: subprocess.Popen[bytes]) -> Any:
+    """What a participant on the PC got, and what became of its command."""
+    assert process.wait(120) == 0, bench.logs()
+    return json.loads(bench.log(name).splitlines()[-1])
+
+
+def test_only_who_has_a_key_hears_and_only_a_commanders_key_commands(
+    make_bench: Callable[..., Bench], store: Path, tmp_path: Path
+) -> None:
+    bench = make_bench(**SECURED, **{"dds.security": str(store / "appliance")})
+    bench.start_all()
+    assert "DDS Security as CN=appliance, until 20" in bench.segment.log("dds")
+
+    friends = {
+        "alice": start(bench, "alice", store / "alice", PATIENCE_S),
+        "bob": start(bench, "bob", store / "bob", PATIENCE_S, LED, "1"),
+    }
+    alice, bob = (result(bench, name, process) for name, process in friends.items())
+    assert alice["samples"] > 100
+    assert bob["accepted"] and bob["samples"] > 100, bob
+
+    other = tmp_path / "other"
+    security("init", "--dir", str(other))
+    security("add-commander", "bob", "--dir", str(other))
+    strangers = {
+        "mallory": start(bench, "mallory", store / "alice", SILENCE_S, LED, "0"),
+        "eve": start(bench, "eve", None, SILENCE_S, LED, "0"),
+        "fake": start(bench, "fake", other / "bob", SILENCE_S, LED, "0"),
+    }
+    mallory, eve, fake = (result(bench, name, process) for name, process in strangers.items())
+    # A subscriber's key does not command: it is refused a writer.
+    assert (mallory["writer"], mallory["answered"], mallory["accepted"]) == (0, 0, 0)
+    # Without keys, or with those of another store, one hears nothing and is not heard.
+    for stranger in (eve, fake):
+        assert (stranger["samples"], stranger["answered"], stranger["accepted"]) == (0, 0, 0)
+
+    status = json.loads(bench.segment.ecdaq("status", "--json").stdout)["dds"]
+    assert (status["secure"], status["commands"]) == (True, True)
+    assert (status["commands_accepted"], status["commands_refused"]) == (1, 0)
+    assert bench.segment.stop("dds") == 0
+    bench.segment.stop("daemon")
+    assert bench.segment.stop("recorder") == 0
+    led = [m.led for m in live.recorded(bench.segment.record_dir, "/ecdaq/piccolo0")]
+    assert any(led)
+
+
+def test_a_subscribers_key_with_a_commanders_claims_is_not_believed(
+    make_bench: Callable[..., Bench], store: Path, tmp_path: Path
+) -> None:
+    """Permissions are signed: alice cannot write herself others."""
+    folder = tmp_path / "alice"
+    folder.mkdir(mode=0o700)
+    for file in (store / "alice").iterdir():
+        (folder / file.name).write_bytes(file.read_bytes())
+        (folder / file.name).chmod(0o600)
+    (folder / "permissions.p7s").write_bytes((store / "bob" / "permissions.p7s").read_bytes())
+    said = security("check", str(folder), check=False)
+    assert said.returncode == 1
+    assert "is for CN=bob, the certificate for CN=alice" in said.stderr
+
+
+@pytest.mark.parametrize(
+    ("spoil", "reason"),
+    [
+        (lambda folder: (folder / "key.pem").unlink(), "key.pem: No such file"),
+        (lambda folder: (folder / "key.pem").chmod(0o644), "key.pem: others may use it"),
+        (
+            lambda folder: (folder / "identity_ca.cert.pem").write_bytes(
+                (folder / "permissions_ca.cert.pem").read_bytes()
+            ),
+            "cert.pem: not issued by identity_ca.cert.pem",
+        ),
+        (
+            lambda folder: (folder / "governance.p7s").write_text("nonsense"),
+            "governance.p7s: not a signed document",
+        ),
+    ],
+)
+def test_keys_that_are_not_fit_are_one_clear_line(
+    make_bench: Callable[..., Bench], tmp_path: Path, spoil: Callable[[Path], None], reason: str
+) -> None:
+    folder = tmp_path / "store"
+    security("init", "--dir", str(folder))
+    spoil(folder / "appliance")
+    ended = subprocess.run(
+        [
+            str(live.BIN / "ecdaq-dds"), "--check", "--set", "dds.enable=on",
+            "--set", "dds.interface=lo", "--set", f"dds.security={folder / 'appliance'}",
+        ],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert ended.returncode == 3
+    assert ended.stderr.count("\n") == 1
+    assert ended.stderr.startswith("ecdaq-dds: dds.security: ")
+    assert reason in ended.stderr
