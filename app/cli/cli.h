@@ -53,6 +53,7 @@ enum cli_exit cli_path(struct cli *cli, const char *file, char *ret_path);
 /* The verbs, one file each. */
 enum cli_exit verb_channels(struct cli *cli, int argc, char **argv);
 enum cli_exit verb_clear(struct cli *cli, int argc, char **argv);
+enum cli_exit verb_doctor(struct cli *cli, int argc, char **argv);
 enum cli_exit verb_events(struct cli *cli, int argc, char **argv);
 enum cli_exit verb_histogram(struct cli *cli, int argc, char **argv);
 enum cli_exit verb_log(struct cli *cli, int argc, char **argv);

@@ -57,6 +57,10 @@ static const struct verb verbs[] = {
 	  "ecdaq security init makes a store with the appliance's keys, add-subscriber NAME and\n"
 	  "add-commander NAME those of a participant; check DIR looks at one participant's folder.\n",
 	  verb_security },
+	{ "doctor", "", "Is this machine fit for the cycle? Each check with what mends it.",
+	  "OK, WARN: costs latency or safety. FAIL: measuring cannot be relied on. SKIP: does not\n"
+	  "apply, or could not be read. Exit code 1 with a FAIL (--strict: or a WARN).\n",
+	  verb_doctor },
 	{ "clear", "", "Set counters and histograms of ecdaqd to zero.", NULL, verb_clear },
 	{ "stop", "", "Stop the bus and ecdaqd in order.", NULL, verb_stop },
 	{ "version", "", "The version of this program.", NULL, verb_version },

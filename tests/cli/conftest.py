@@ -12,6 +12,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 from ecdaq import Fake
+from made_machine import Machine
 
 
 @pytest.fixture
@@ -41,3 +42,8 @@ def fake(run_dir: Path) -> Iterator[Callable[..., Fake]]:
 def daemon(fake: Callable[..., Fake]) -> Fake:
     """A fake ecdaqd, ten times as fast as a real one."""
     return fake("SPEED=10")
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> Machine:
+    return Machine(tmp_path)

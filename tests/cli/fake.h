@@ -31,6 +31,8 @@ struct fake {
 	const char *admin;
 	unsigned mode;
 	unsigned slaves; /* claimed on the status page */
+	uint64_t page_faults;
+	uint32_t degraded; /* bit per enum event_rt */
 	struct meta meta;
 	struct status_page *page;
 	struct record_status *record;

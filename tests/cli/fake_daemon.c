@@ -6,10 +6,10 @@
  * input, by `ecdaq stop`, or by SIGKILL.
  *
  * usage: test_fake_daemon RUN_DIR [SPEED=N] [JUMP=1] [RECORDER=0] [ADMIN=mute|garbage|none]
- * [MODE=octal] [SLAVES=N] JUMP: every hundredth cycle number is followed by a gap of five. Each
- * 64th frame is lost. The admin socket: piccolo1.led belongs to the control program; objects
- * 0x1018:1, 0x1008:0, 0x8000:2 exist, 0x8000:1 cannot be written now; a one-shot time must be in
- * the future.
+ * [MODE=octal] [SLAVES=N] [FAULTS=N] [DEGRADED=BITS] JUMP: every hundredth cycle number is followed
+ * by a gap of five. Each 64th frame is lost. The admin socket: piccolo1.led belongs to the control
+ * program; objects 0x1018:1, 0x1008:0, 0x8000:2 exist, 0x8000:1 cannot be written now; a one-shot
+ * time must be in the future.
  */
 #include <errno.h>
 #include <math.h>
@@ -116,6 +116,10 @@ static void parse(struct fake *f, int argc, char **argv)
 			f->mode = (unsigned)strtoul(value, NULL, 8);
 		} else if (strcmp(argv[i], "SLAVES") == 0) {
 			f->slaves = (unsigned)strtoul(value, NULL, 10);
+		} else if (strcmp(argv[i], "FAULTS") == 0) {
+			f->page_faults = strtoull(value, NULL, 10);
+		} else if (strcmp(argv[i], "DEGRADED") == 0) {
+			f->degraded = (uint32_t)strtoul(value, NULL, 0);
 		} else {
 			fake_die(argv[i], EINVAL);
 		}
@@ -166,6 +170,7 @@ int main(int argc, char **argv)
 				 .admin = "",
 				 .mode = 0640,
 				 .slaves = SLAVES,
+				 .degraded = 1u << EVENT_RT_PRIORITY,
 				 .cycle = FIRST_CYCLE };
 
 	parse(&f, argc, argv);

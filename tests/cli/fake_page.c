@@ -121,7 +121,8 @@ void fake_make_status(struct fake *f)
 	page->slave_count = f->slaves;
 	page->slaves_expected = SLAVES;
 	page->cycle_cpu = UINT32_MAX;
-	page->rt_degraded = 1u << EVENT_RT_PRIORITY;
+	page->rt_degraded = f->degraded;
+	page->cycle.page_faults = f->page_faults;
 	page->cycle.dc_state = DC_LOCKED;
 	page->cycle.dc_lock_ns = 123456789;
 	page->cycle.dc_diff_max_ns = 42;

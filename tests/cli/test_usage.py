@@ -19,6 +19,7 @@ VERBS = {
     "sdo": "read|write",
     "events": "",
     "histogram": "wake|",
+    "doctor": "",
     "clear": "",
     "stop": "",
     "version": "",

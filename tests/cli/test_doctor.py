@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: MIT
+"""ecdaq doctor on machines made of files: a good one, one that is bare, one that runs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ecdaq import NOBODY, OK, USAGE, Fake, ecdaq, fails, works
+from made_machine import (
+    CORE,
+    CPU,
+    GOOD,
+    KTHREAD,
+    NET,
+    OF_A_RUNNING_ECDAQD,
+    OTHER,
+    Files,
+    Machine,
+    checks,
+    disk,
+    examine,
+    report,
+    running_threads,
+    thread,
+)
+
+
+def test_a_good_machine_has_nothing_to_mend(machine: Machine) -> None:
+    text = works(examine(machine, "--strict"))
+    found = checks(machine)
+    assert {name for name, check in found.items() if check["level"] != "OK"} == OF_A_RUNNING_ECDAQD
+    assert "port ecat0, cycle core 3, priority 80" in text.splitlines()[0]
+    assert text.splitlines()[-1] == "30 checks: 28 ok, 0 warn, 0 fail, 2 skipped"
+
+
+# check, what is otherwise and still good, what is said
+ALSO_GOOD: list[tuple[str, Files, str]] = [
+    ("kernel", {"/sys/kernel/realtime": None}, "PREEMPT_RT"),
+    (
+        "isolation",
+        {f"{CPU}/isolated": "\n", "/sys/fs/cgroup/cpuset.cpus.isolated": "3\n"},
+        "core 3",
+    ),
+    ("rcu_nocbs", {"/proc/cmdline": "ro nohz_full=3\n"}, "as nohz_full has it"),
+    ("rcu_nocbs", {"/proc/cmdline": "rcu_nocbs=all"}, "rcu_nocbs=all"),
+    ("rt_throttling", {"/proc/sys/kernel/sched_rt_runtime_us": "1000000\n"}, "off"),
+    ("governor", {f"{CORE}/cpufreq": None}, "does not change"),
+    ("idle_states", {f"{CORE}/cpuidle": None}, "idle states"),
+    (
+        "idle_states",
+        {f"{CORE}/cpuidle/state1/latency": "133\n", "/dev/cpu_dma_latency": None},
+        "while ecdaqd runs",
+    ),
+    ("swap", {"/proc/swaps": None}, "has none"),
+    ("nic", {f"{NET}/device": None}, "virtual port"),
+    ("nic", {f"{NET}/speed": "-1\n"}, "does not tell"),
+    ("eee", {"/calls/eee.ecat0": "unsupported\n"}, "no energy-efficient"),
+    ("coalescing", {"/calls/coalesce.ecat0": "unsupported\n"}, "does not collect"),
+    ("coalescing", {"/calls/coalesce.ecat0": "rx_us 57\nrx_frames 1\nadaptive 0\n"}, "rx-frames 1"),
+    ("core_users", thread(701, "ksmd (odd)", "0-3", flags=KTHREAD), "nothing else"),
+    (
+        "inodes",
+        disk(inodes_total=0),
+        "not count",
+    ),
+    (
+        "nic_irqs",
+        {
+            "/proc/interrupts": " 38:  0  0  0  59224  PCI-MSIX-0000:00:03.0 1-edge virtio2-input",
+            f"{NET}/device": "-> ../../../virtio2",
+            "/sys/virtio2/": "",
+            "/proc/irq/38/effective_affinity_list": "3\n",
+        },
+        "1 of ecat0 on core 3",
+    ),
+]
+
+
+@pytest.mark.parametrize(("name", "other", "said"), ALSO_GOOD)
+def test_what_is_good_in_another_way_is_ok(
+    machine: Machine, name: str, other: Files, said: str
+) -> None:
+    machine.change(other)
+    check = checks(machine)[name]
+    assert check["level"] == "OK" and check["mend"] is None, check
+    assert said in check["value"]
+
+
+def test_a_bare_machine_skips_and_never_crashes(tmp_path: Path) -> None:
+    result = ecdaq(None, "doctor", "--root", str(tmp_path), "--json")
+    found = report(result)
+    assert found["config"] == "defaults"
+    assert found["ok"] + found["warn"] + found["fail"] + found["skip"] == 30
+    assert found["fail"] == 0 and result.returncode == OK
+
+
+@pytest.mark.parametrize("garbage", ["", "\0\0\0", "-\n", "99999999999999999999999\n", "x" * 5000])
+def test_garbage_in_every_file_never_crashes(machine: Machine, garbage: str) -> None:
+    for name, content in GOOD.items():
+        if not name.endswith("/") and not str(content).startswith("-> "):
+            machine.change({name: garbage})
+    found = report(examine(machine, "--json"))
+    assert len(found["check"]) == 30
+
+
+# --- with an ecdaqd ---
+
+RUNNING: list[tuple[str, tuple[str, ...], dict[str, Any], str, str]] = [
+    ("cycle_thread", ("DEGRADED=0",), {}, "OK", "SCHED_FIFO 80 on core 3"),
+    ("cycle_thread", (), {"policy": OTHER, "priority": 0}, "FAIL", "LimitRTPRIO=98"),
+    ("cycle_thread", (), {"priority": 40}, "WARN", "SCHED_FIFO 40, but cycle.priority is 80"),
+    ("cycle_thread", (), {"cores": "0-3"}, "FAIL", "may run on 0-3 instead of core 3 alone"),
+    ("page_faults", (), {}, "OK", "0 in"),
+    ("page_faults", ("FAULTS=7",), {}, "FAIL", "7 in"),
+    ("core_users", (), {}, "OK", "nothing else"),
+    ("memory_lock", ("DEGRADED=0",), {}, "OK", "131072 KiB"),
+    ("memory_lock", ("DEGRADED=4",), {}, "FAIL", "LimitMEMLOCK=infinity"),
+]
+
+
+@pytest.mark.parametrize(("name", "settings", "thread_is", "level", "said"), RUNNING)
+def test_a_running_ecdaqd_is_judged(
+    machine: Machine,
+    fake: Callable[..., Fake],
+    name: str,
+    settings: tuple[str, ...],
+    thread_is: dict[str, Any],
+    level: str,
+    said: str,
+) -> None:
+    running = fake(*settings)
+    machine.change(running_threads(running.process.pid, **thread_is))
+    check = checks(machine, running.run_dir)[name]
+    assert check["level"] == level, check
+    assert said in f"{check['value']} -> {check['mend']}"
+
+
+def test_refused_cpu_dma_latency_shows_in_idle_states(
+    machine: Machine, fake: Callable[..., Fake]
+) -> None:
+    deep: Files = {f"{CORE}/cpuidle/state1/latency": "133\n", "/dev/cpu_dma_latency": None}
+    machine.change(deep)
+    assert checks(machine, fake("DEGRADED=8").run_dir)["idle_states"]["level"] == "WARN"
+
+
+def test_an_ecdaqd_without_a_cycle_or_gone_is_skipped(
+    machine: Machine, fake: Callable[..., Fake]
+) -> None:
+    running = fake()
+    check = checks(machine, running.run_dir)["cycle_thread"]
+    assert check["level"] == "SKIP" and "no cycle now" in check["value"]
+    running.kill()
+    check = checks(machine, running.run_dir)["cycle_thread"]
+    assert check["level"] == "SKIP" and "not running" in check["value"]
+
+
+# --- this machine ---
+
+
+def test_this_machine_is_examined_with_the_port_of_the_ecdaqd_that_runs(daemon: Fake) -> None:
+    found = report(daemon("doctor", "--json"))
+    assert found["running"] is True and found["interface"] == "ecat0"
+    assert len(found["check"]) == 30
+    assert report(daemon("doctor", "--json", "--interface", "lo"))["interface"] == "lo"
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="becomes another user, which takes root")
+def test_who_is_not_root_is_told_what_could_not_be_read(fake: Callable[..., Fake]) -> None:
+    running = fake("MODE=600")
+    result = running("doctor", "--json", user=NOBODY)
+    found = {check["name"]: check for check in report(result)["check"]}
+    assert found["page_faults"]["level"] == "SKIP" and found["page_faults"]["wants_root"] is True
+    text = running("doctor", user=NOBODY).stdout
+    assert "could not be made as this user: run ecdaq doctor as root" in text.splitlines()[-1]
+
+
+def test_mistakes_are_named(machine: Machine, tmp_path: Path) -> None:
+    fails(ecdaq(None, "doctor", "--root", "/nonexistent"), USAGE, "--root: /nonexistent")
+    machine.config.write_text("cycle:\n  cpu: many\n")
+    fails(examine(machine), USAGE, "ecdaq.yaml:2: cycle.cpu")
+    fails(ecdaq(None, "doctor", "word"), USAGE, "one word too many")
+
+
+def test_the_appliance_s_own_configuration_is_found(machine: Machine) -> None:
+    machine.change({"/run/ecdaq-boot/ecdaq.yaml": "bus:\n  interface: ecat7\n"})
+    found = report(ecdaq(None, "doctor", "--root", str(machine.root), "--json"))
+    assert found["interface"] == "ecat7"
+    assert found["config"].endswith("/run/ecdaq-boot/ecdaq.yaml")
