@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 TOP = Path(__file__).resolve().parents[2]
-IMAGE = TOP / "build" / "image" / "qemuarm64"
+IMAGE = Path(os.environ.get("ECDAQ_IMAGE_DIR", TOP / "build" / "image" / "qemuarm64"))
 NAME = "ecdaq-image-ecdaq-qemuarm64"
 TOOLS = TOP / "app" / "tools" / "image"
 # An emulator on a busy machine: limits that only a hang exceeds.
