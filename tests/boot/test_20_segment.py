@@ -9,6 +9,7 @@ ECDAQ_BOOT_CYCLES: how many cycles are looked at (60,000).
 
 from __future__ import annotations
 
+import json
 import os
 import re
 from typing import Any
@@ -86,6 +87,16 @@ def test_cycles_go_on_without_loss(machine: Machine) -> None:
 
 def test_the_cycle_thread_had_no_page_fault(machine: Machine) -> None:
     assert status(machine)["page_faults"] == 0
+
+
+def test_the_doctor_finds_nothing_that_fails(machine: Machine) -> None:
+    result = machine.try_run("sudo ecdaq doctor --json", seconds=600)
+    found = json.loads(result.stdout)
+    not_ok = [(c["name"], c["level"], c["value"]) for c in found["check"] if c["level"] != "OK"]
+    print(f"\ndoctor: {found['ok']} OK, {found['warn']} WARN, {found['skip']} SKIP")
+    print("\n".join(f"  {level} {name}: {value}" for name, level, value in not_ok))
+    assert found["fail"] == 0, not_ok
+    assert result.returncode == 0
 
 
 def test_nobody_had_to_be_started_twice(machine: Machine) -> None:
