@@ -4,7 +4,7 @@ from __future__ import annotations
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -29,8 +29,8 @@ def fake(run_dir: Path) -> Iterator[Callable[..., Fake]]:
     """Starts a fake ecdaqd with the settings given."""
     started: list[Fake] = []
 
-    def start(*settings: str) -> Fake:
-        started.append(Fake(run_dir, *settings))
+    def start(*settings: str, how: Sequence[str] = ()) -> Fake:
+        started.append(Fake(run_dir, *settings, how=how))
         return started[-1]
 
     yield start

@@ -7,7 +7,7 @@ import json
 import os
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -83,12 +83,15 @@ def wait_until(what: Callable[[], bool], seconds: float = 20.0) -> None:
 
 
 class Fake:
-    """A fake ecdaqd in a run directory of its own."""
+    """A fake ecdaqd in a run directory of its own; @how is a program that starts it."""
 
-    def __init__(self, run_dir: Path, *settings: str) -> None:
+    def __init__(self, run_dir: Path, *settings: str, how: Sequence[str] = ()) -> None:
         self.run_dir = run_dir
         self.process = subprocess.Popen(
-            [FAKE, run_dir, *settings], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+            [*how, FAKE, run_dir, *settings],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
         )
         assert self.process.stdout is not None
         assert self.process.stdout.readline() == "ready\n"

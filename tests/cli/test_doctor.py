@@ -168,6 +168,15 @@ def test_this_machine_is_examined_with_the_port_of_the_ecdaqd_that_runs(daemon: 
     assert report(daemon("doctor", "--json", "--interface", "lo"))["interface"] == "lo"
 
 
+@pytest.mark.skipif(os.geteuid() != 0, reason="makes a network namespace, which takes root")
+def test_a_port_in_a_network_of_ecdaqd_s_own_is_skipped(fake: Callable[..., Fake]) -> None:
+    running = fake(how=["unshare", "--net"])
+    found = {check["name"]: check for check in report(running("doctor", "--json"))["check"]}
+    for name in ("nic", "nic_users", "eee", "coalescing"):
+        assert found[name]["level"] == "SKIP"
+        assert "a network namespace of ecdaqd's own" in found[name]["value"]
+
+
 @pytest.mark.skipif(os.geteuid() != 0, reason="becomes another user, which takes root")
 def test_who_is_not_root_is_told_what_could_not_be_read(fake: Callable[..., Fake]) -> None:
     running = fake("MODE=600")

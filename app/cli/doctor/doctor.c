@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* ecdaq doctor: is this machine fit for the cycle? A table of checks, each with its mend. */
 #include <errno.h>
+#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -127,6 +128,18 @@ static void keep_cycle(void *ctx, const struct thread *thread)
 	}
 }
 
+/* Does ecdaqd see other ports than this program (`build.sh run` gives it a network of its own)? */
+static int has_own_network(const struct doctor *d)
+{
+	char its[SIGHT_TEXT_BYTES];
+	char ours[SIGHT_TEXT_BYTES];
+
+	return d->root[0] == '\0' &&
+	       sight_link(&d->patient.sight, its, "/proc/%" PRId64 "/ns/net", d->page->pid) >= 0 &&
+	       sight_link(&d->patient.sight, ours, "/proc/self/ns/net") >= 0 &&
+	       strcmp(its, ours) != 0;
+}
+
 /* What the configuration leaves open, the ecdaqd that runs was told on its command line. */
 static void adopt(struct doctor *d)
 {
@@ -140,6 +153,7 @@ static void adopt(struct doctor *d)
 		d->patient.cpu = (int)cpu;
 	}
 	thread_each(&d->patient.sight, d->page->pid, keep_cycle, &d->patient);
+	d->patient.is_nic_elsewhere = d->nic == NULL && has_own_network(d);
 }
 
 static void prepare(struct doctor *d)

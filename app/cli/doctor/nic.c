@@ -19,6 +19,11 @@ int patient_has_nic(const struct patient *p, struct finding *f)
 		finding_set(f, FINDING_SKIP, "no port is configured");
 		return 0;
 	}
+	if (p->is_nic_elsewhere) {
+		finding_set(f, FINDING_SKIP, "%s is in a network namespace of ecdaqd's own",
+			    p->nic);
+		return 0;
+	}
 	if (!sight_exists(&p->sight, NET_DIR "/%s", p->nic)) {
 		finding_set(f, FINDING_SKIP, "no port %s", p->nic);
 		return 0;
@@ -94,6 +99,8 @@ void check_nic(const struct patient *p, struct finding *f)
 	if (p->nic[0] == '\0') {
 		finding_set(f, FINDING_SKIP, "no port is configured");
 		finding_mend(f, "bus.interface in ecdaq.yaml, or --interface");
+	} else if (p->is_nic_elsewhere) {
+		patient_has_nic(p, f);
 	} else if (!sight_exists(&p->sight, NET_DIR "/%s", p->nic)) {
 		judge_absence(p, f);
 	} else if (sight_text(&p->sight, flags, NET_DIR "/%s/flags", p->nic) >= 0 &&

@@ -20,8 +20,9 @@ struct patient {
 	const struct status_page *page; /* of an ecdaqd that runs; NULL: none is seen */
 	int page_err;                   /* why: 0 it does not run, else -errno */
 	const char *nic;
-	int cpu;             /* the cycle's core; -1: not pinned */
-	struct thread cycle; /* the cycle's thread; tid 0: there is none */
+	int is_nic_elsewhere; /* in a network namespace of ecdaqd's own */
+	int cpu;              /* the cycle's core; -1: not pinned */
+	struct thread cycle;  /* the cycle's thread; tid 0: there is none */
 };
 
 typedef void check_fn(const struct patient *p, struct finding *f);
@@ -70,7 +71,7 @@ int patient_is_isolated(const struct patient *p, int cpu);
 int patient_has_core(const struct patient *p, struct finding *f);
 /** SKIP in @f, and 0, if no running ecdaqd is seen. */
 int patient_has_daemon(const struct patient *p, struct finding *f);
-/** SKIP in @f, and 0, if the EtherCAT port is not there. */
+/** SKIP in @f, and 0, if the EtherCAT port is not there, or cannot be seen from here. */
 int patient_has_nic(const struct patient *p, struct finding *f);
 /** No hardware behind the EtherCAT port: veth, tap. */
 int patient_is_nic_virtual(const struct patient *p);
