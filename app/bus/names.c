@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
+enum { MODULES_FIRST = 0x6000, MODULES_LAST = 0x7fff }; /* inputs, outputs */
+
 static int is_word(char c)
 {
 	return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
@@ -90,6 +92,21 @@ static void name_with_pdo(const struct pdo_entry *e, char *name)
 	}
 }
 
+/*
+ * Modular devices (ETG.5001) number their modules' objects in steps of 0x10 from 0x6000 and 0x7000,
+ * and often give their PDOs no names: the place of the module stands for that.
+ */
+static void name_with_slot(const struct pdo_entry *e, char *name)
+{
+	char joined[2 * PDO_NAME_BYTES];
+
+	if (e->pdo_name[0] == '\0' && e->index >= MODULES_FIRST && e->index <= MODULES_LAST) {
+		snprintf(joined, sizeof(joined), "slot%u_%s", (e->index & 0xfffu) / 0x10 + 1, name);
+		joined[PDO_NAME_BYTES - 1] = '\0';
+		memcpy(name, joined, strlen(joined) + 1);
+	}
+}
+
 static void name_with_suffix(char *name, const char *suffix)
 {
 	size_t room = PDO_NAME_BYTES - 1 - strlen(suffix);
@@ -111,7 +128,7 @@ static void name_with_index(const struct pdo_entry *e, char *name)
 
 void name_entries(const struct pdo_entry *entry, size_t count, char (*ret_name)[PDO_NAME_BYTES])
 {
-	void (*const widen[])(const struct pdo_entry *, char *) = { name_with_pdo,
+	void (*const widen[])(const struct pdo_entry *, char *) = { name_with_pdo, name_with_slot,
 								    name_with_index };
 	uint8_t shared[PDO_LIMIT];
 

@@ -81,3 +81,25 @@ TEST(names, index_and_number_make_the_last_ones_differ)
 	}
 	CHECK_STR(name[0], "inputs_value_6000_01");
 }
+
+TEST(names, modules_without_pdo_names_are_told_apart_by_their_slots)
+{
+	const struct pdo_entry e[] = {
+		entry("", "Channel 1 Data", 0x6000, 1), entry("", "Channel 2 Data", 0x6000, 2),
+		entry("", "Channel 1 Data", 0x7010, 1), entry("", "Channel 1 Data", 0x63f0, 1),
+		entry("", "Status", 0xf100, 1),         entry("", "Status", 0x6030, 5),
+		entry("", "Value", 0x6040, 1),          entry("", "Value", 0x7040, 1),
+	};
+	char name[8][PDO_NAME_BYTES];
+
+	name_entries(e, 8, name);
+	CHECK_STR(name[0], "slot1_channel_1_data");
+	CHECK_STR(name[1], "channel_2_data");
+	CHECK_STR(name[2], "slot2_channel_1_data");
+	CHECK_STR(name[3], "slot64_channel_1_data");
+	CHECK_STR(name[4], "status");
+	CHECK_STR(name[5], "slot4_status");
+	/* A module with inputs and outputs of one name. */
+	CHECK_STR(name[6], "slot5_value_6040_01");
+	CHECK_STR(name[7], "slot5_value_7040_01");
+}
