@@ -9,6 +9,10 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "sim/io_line.h"
+
+enum { ANSWER_BYTES = 1024 };
+
 /* A socket that a run before left there goes; anything else of that name stays. */
 static void remove_socket(const char *path)
 {
@@ -43,13 +47,24 @@ int control_open(const char *path, char *error, size_t error_bytes)
 	return fd;
 }
 
-void control_serve(int fd, struct fault_plan *plan, size_t slave_count, int64_t now_ns)
+static void do_line(struct fault_plan *plan, struct segment *segment, int64_t now_ns,
+		    const char *line, char answer[ANSWER_BYTES])
+{
+	if (io_line(segment, line, answer, ANSWER_BYTES) != -ENOENT) {
+		return;
+	}
+	fault_plan_restart(plan, now_ns);
+	snprintf(answer, ANSWER_BYTES, "ok");
+	fault_plan_add(plan, line, segment_slave_count(segment), answer, ANSWER_BYTES);
+}
+
+void control_serve(int fd, struct fault_plan *plan, struct segment *segment, int64_t now_ns)
 {
 	for (;;) {
 		struct sockaddr_un from;
 		socklen_t from_len = sizeof(from);
 		char line[300];
-		char answer[200];
+		char answer[ANSWER_BYTES];
 		ssize_t n = recvfrom(fd, line, sizeof(line) - 1, 0, (struct sockaddr *)&from,
 				     &from_len);
 
@@ -57,9 +72,7 @@ void control_serve(int fd, struct fault_plan *plan, size_t slave_count, int64_t 
 			return;
 		}
 		line[n] = '\0';
-		fault_plan_restart(plan, now_ns);
-		snprintf(answer, sizeof(answer), "ok");
-		fault_plan_add(plan, line, slave_count, answer, sizeof(answer));
+		do_line(plan, segment, now_ns, line, answer);
 		/* Who has no address does not want an answer. */
 		if (from_len > sizeof(sa_family_t)) {
 			(void)!sendto(fd, answer, strlen(answer), MSG_DONTWAIT,

@@ -6,6 +6,7 @@
 #ifndef SIM_DEVICE_H
 #define SIM_DEVICE_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 #include "sim/esc.h"
@@ -24,6 +25,10 @@ struct sim_device_ops {
 	void (*sync0)(struct sim_device *dev, int64_t t_ns, uint64_t system_time_ns);
 	/** A frame has been through the ESC at @t_ns; may be NULL. */
 	void (*frame_passed)(struct sim_device *dev, int64_t t_ns);
+	/** What its terminals have, as "KEY=VALUE KEY=VALUE ..."; NULL: it has none. */
+	void (*io_get)(const struct sim_device *dev, char *ret_text, size_t text_bytes);
+	/** A hand at its terminals. -EINVAL: no such terminal, or no such value; NULL: as that. */
+	int (*io_set)(struct sim_device *dev, const char *key, const char *value);
 	void (*destroy)(struct sim_device *dev);
 };
 

@@ -11,6 +11,8 @@
 #include "base/prng.h"
 #include "sim/catalogue.h"
 #include "sim/devices/fb1111_piccolo.h"
+#include "sim/devices/wago_750_354.h"
+#include "sim/devices/wago_text.h"
 #include "wire/sii.h"
 
 enum { NAME_BYTES = 96, PATH_BYTES = 1024, LINE_BYTES = PATH_BYTES + 200 };
@@ -125,10 +127,29 @@ static int read_image(struct line_up *l, int i, size_t *ret_bytes)
 	return check_image(path, l->sii[i], *ret_bytes);
 }
 
+static int make_wago(struct line_up *l, int i)
+{
+	char line[LINE_BYTES];
+	int r = wago_750_354_by_name(i, l->name[i], &l->spec[i]);
+
+	if (r == -EINVAL || r == -E2BIG) {
+		snprintf(line, sizeof(line),
+			 "slave '%s': not wago_750_354, or that with +430, +457, +530, +557 for "
+			 "its modules (at most %d)",
+			 l->name[i], WAGO_MODULES_MAX);
+		return sim_complain(line);
+	}
+	return r < 0 ? sim_complain("no memory") : 0;
+}
+
 static int make_slave(struct line_up *l, int i)
 {
 	size_t bytes = 0;
 	int r;
+
+	if (wago_750_354_is_name(l->name[i])) {
+		return make_wago(l, i);
+	}
 
 	if (strcmp(l->name[i], "fb1111_piccolo") == 0) {
 		r = fb1111_piccolo_slave(i, &l->spec[i]);

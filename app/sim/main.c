@@ -208,8 +208,7 @@ static void look_at_control(struct simulation *sim, int64_t now_ns)
 {
 	if (sim->control_fd >= 0 && now_ns - sim->control_ns >= CONTROL_NS) {
 		sim->control_ns = now_ns;
-		control_serve(sim->control_fd, sim->faults, segment_slave_count(sim->segment),
-			      now_ns);
+		control_serve(sim->control_fd, sim->faults, sim->segment, now_ns);
 	}
 }
 

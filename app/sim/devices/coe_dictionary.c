@@ -15,6 +15,9 @@ enum {
 	SM_INPUTS = 4,
 };
 
+/* ETG.1020 base data types. */
+enum { TYPE_UINT8 = 0x05, TYPE_UINT16 = 0x06, TYPE_UINT32 = 0x07, TYPE_STRING = 0x09 };
+
 static void set_value(struct coe_value *v, uint64_t value, size_t len)
 {
 	v->len = len;
@@ -165,10 +168,31 @@ static enum coe_abort read_entry(const struct coe_dictionary *d, uint16_t index,
 	return COE_OK;
 }
 
+static enum coe_abort read_constant(const struct coe_dictionary *d, uint16_t index,
+				    uint8_t subindex, struct coe_value *ret)
+{
+	enum coe_abort abort_code = COE_ABORT_NO_OBJECT;
+
+	for (size_t i = 0; i < d->constant_count; i++) {
+		const struct coe_constant *c = &d->constant[i];
+
+		if (c->index != index) {
+			continue;
+		}
+		if (c->subindex == subindex) {
+			set_value(ret, c->value, c->bytes);
+			return COE_OK;
+		}
+		abort_code = COE_ABORT_NO_SUBINDEX;
+	}
+	return abort_code;
+}
+
 enum coe_abort coe_dictionary_read(const struct coe_dictionary *d, uint16_t index, uint8_t subindex,
 				   struct coe_value *ret)
 {
 	const struct sii_pdo *pdo = find_pdo(d->sii, index);
+	enum coe_abort abort_code;
 
 	if ((index == DEVICE_TYPE || index == DEVICE_NAME) && subindex != 0) {
 		return COE_ABORT_NO_SUBINDEX;
@@ -194,7 +218,8 @@ enum coe_abort coe_dictionary_read(const struct coe_dictionary *d, uint16_t inde
 	if (pdo != NULL) {
 		return read_mapping(d->sii, pdo, subindex, ret);
 	}
-	return read_entry(d, index, subindex, ret);
+	abort_code = read_constant(d, index, subindex, ret);
+	return abort_code != COE_ABORT_NO_OBJECT ? abort_code : read_entry(d, index, subindex, ret);
 }
 
 /* --- writing --- */
@@ -206,6 +231,9 @@ static enum coe_abort write_assignment(struct coe_dictionary *d, uint16_t index,
 	int is_tx = assigned_sm(d->sii, index)->type == SM_INPUTS;
 	const struct sii_pdo *pdo;
 
+	if (d->is_fixed) {
+		return COE_ABORT_READ_ONLY;
+	}
 	if (!d->is_preop) {
 		return COE_ABORT_STATE;
 	}
@@ -262,6 +290,74 @@ enum coe_abort coe_dictionary_write(struct coe_dictionary *d, uint16_t index, ui
 	}
 	d->entry_value[n] = value;
 	return COE_OK;
+}
+
+/* --- SDO information --- */
+
+static const char *text_of(const struct coe_dictionary *d, uint8_t number)
+{
+	return number > 0 && number <= d->text_count ? d->text[number - 1] : "";
+}
+
+enum coe_abort coe_dictionary_entry_info(const struct coe_dictionary *d, uint16_t index,
+					 uint8_t subindex, struct coe_entry_info *ret)
+{
+	static const uint16_t unsigned_by_bytes[] = { 0, TYPE_UINT8, TYPE_UINT16, 0, TYPE_UINT32 };
+	struct coe_value v;
+	enum coe_abort abort_code = coe_dictionary_read(d, index, subindex, &v);
+	uint8_t last;
+	int n = find_entry(d->sii, index, subindex, &last);
+
+	if (abort_code != COE_OK) {
+		return abort_code;
+	}
+	ret->text = "";
+	ret->bit_len = (uint16_t)(v.len * 8);
+	ret->data_type = index == DEVICE_NAME ? TYPE_STRING
+			 : v.len <= 4         ? unsigned_by_bytes[v.len]
+					      : 0;
+	if (n >= 0 && find_pdo(d->sii, index) == NULL) {
+		const struct sii_entry *e = &d->sii->entry[n];
+
+		*ret = (struct coe_entry_info){ .data_type = e->data_type,
+						.bit_len = e->bit_len,
+						.text = text_of(d, e->name) };
+	}
+	return COE_OK;
+}
+
+static void take_lowest(uint16_t index, uint16_t after, uint16_t *lowest)
+{
+	if (index > after && (*lowest == 0 || index < *lowest)) {
+		*lowest = index;
+	}
+}
+
+uint16_t coe_dictionary_next(const struct coe_dictionary *d, uint16_t after)
+{
+	static const uint16_t always[] = { DEVICE_TYPE, DEVICE_NAME, IDENTITY, SM_TYPES };
+	uint16_t lowest = 0;
+
+	for (size_t i = 0; i < sizeof(always) / sizeof(always[0]); i++) {
+		take_lowest(always[i], after, &lowest);
+	}
+	for (size_t n = 0; n < d->sii->sm_count; n++) {
+		uint16_t index = (uint16_t)(COE_ASSIGN_FIRST + n);
+
+		if (assigned_sm(d->sii, index) != NULL) {
+			take_lowest(index, after, &lowest);
+		}
+	}
+	for (size_t i = 0; i < d->sii->pdo_count; i++) {
+		take_lowest(d->sii->pdo[i].index, after, &lowest);
+	}
+	for (size_t i = 0; i < d->sii->entry_count; i++) {
+		take_lowest(d->sii->entry[i].index, after, &lowest);
+	}
+	for (size_t i = 0; i < d->constant_count; i++) {
+		take_lowest(d->constant[i].index, after, &lowest);
+	}
+	return lowest;
 }
 
 uint32_t coe_dictionary_sm_bits(const struct coe_dictionary *d, size_t sm)

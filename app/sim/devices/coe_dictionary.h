@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The CoE dictionary that follows from an SII image: identity, SyncManager kinds, PDO assignment
- * (writable in PRE-OP), PDO mapping (fixed), and the mapped objects themselves, which hold what was
- * written last.
+ * The CoE dictionary that follows from an SII image, or from what stands for one: identity,
+ * SyncManager kinds, PDO assignment (writable in PRE-OP unless fixed), PDO mapping (fixed), and the
+ * mapped objects themselves, which hold what was written last. A device adds constants, and texts
+ * if it has SDO information.
  */
 #ifndef SIM_DEVICES_COE_DICTIONARY_H
 #define SIM_DEVICES_COE_DICTIONARY_H
@@ -12,7 +13,7 @@
 
 #include "wire/sii.h"
 
-enum { COE_VALUE_BYTES = 64, COE_ASSIGNED_MAX = 32, COE_ASSIGN_FIRST = 0x1c10 };
+enum { COE_VALUE_BYTES = 64, COE_ASSIGNED_MAX = 80, COE_ASSIGN_FIRST = 0x1c10 };
 
 /* ETG.1000.6, SDO abort codes. */
 enum coe_abort {
@@ -40,9 +41,24 @@ struct coe_assignment {
 	uint16_t pdo[COE_ASSIGNED_MAX];
 };
 
+/* Something to read that no SII says. */
+struct coe_constant {
+	uint16_t index;
+	uint8_t subindex;
+	uint8_t bytes;
+	uint32_t value;
+};
+
 struct coe_dictionary {
 	const struct sii *sii; /* not taken over */
 	char name[SII_NAME_BYTES];
+	/* What a device adds after init; not taken over. */
+	const struct coe_constant *constant;
+	size_t constant_count;
+	const char *const *text; /* of entries, by their name number - 1; NULL: no SDO information
+				  */
+	size_t text_count;
+	uint8_t is_fixed; /* assignments can never be written */
 	struct coe_assignment assignment[SII_LIMIT_SM];
 	uint64_t entry_value[SII_LIMIT_ENTRIES];
 	uint8_t is_preop; /* assignments can be written */
@@ -57,6 +73,19 @@ enum coe_abort coe_dictionary_read(const struct coe_dictionary *d, uint16_t inde
 				   struct coe_value *ret);
 enum coe_abort coe_dictionary_write(struct coe_dictionary *d, uint16_t index, uint8_t subindex,
 				    const uint8_t *bytes, size_t len);
+
+/* What SDO information says of one entry. */
+struct coe_entry_info {
+	uint16_t data_type; /* ETG.1020 base data type */
+	uint16_t bit_len;
+	const char *text; /* "" where there is none */
+};
+
+/** COE_OK or the abort code; @ret untouched then. */
+enum coe_abort coe_dictionary_entry_info(const struct coe_dictionary *d, uint16_t index,
+					 uint8_t subindex, struct coe_entry_info *ret);
+/** The first index above @after, or 0: no more. From 0 on, all there are. */
+uint16_t coe_dictionary_next(const struct coe_dictionary *d, uint16_t after);
 
 /** Bits that are assigned to SyncManager @sm now. */
 uint32_t coe_dictionary_sm_bits(const struct coe_dictionary *d, size_t sm);

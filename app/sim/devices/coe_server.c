@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/bytes.h"
+#include "sim/devices/coe_information.h"
 
 enum coe_service { COE_SDO_REQUEST = 2, COE_SDO_RESPONSE = 3, COE_SDO_INFORMATION = 8 };
 
@@ -29,8 +30,6 @@ enum layout {
 	SDO_BYTES = 10,
 	SEGMENT_AT = 3,
 	SEGMENT_MIN = 7,
-	INFO_ERROR = 7,
-	INFO_BYTES = 10,
 };
 
 /* One SDO request, taken apart. */
@@ -219,15 +218,6 @@ static size_t download(struct coe_server *server, const struct sdo *sdo, uint8_t
 	return SDO_BYTES;
 }
 
-static size_t refuse_information(const uint8_t *request, uint8_t *answer)
-{
-	memset(answer, 0, INFO_BYTES);
-	memcpy(answer, request, 2);
-	answer[2] = INFO_ERROR;
-	put_le32(answer + 6, (uint32_t)COE_ABORT_ACCESS);
-	return INFO_BYTES;
-}
-
 size_t coe_server_answer(struct coe_server *server, const uint8_t *request, size_t request_len,
 			 uint8_t *answer, size_t capacity)
 {
@@ -239,7 +229,8 @@ size_t coe_server_answer(struct coe_server *server, const uint8_t *request, size
 	}
 	service = get_le16(request) >> 12;
 	if (service == COE_SDO_INFORMATION) {
-		return refuse_information(request, answer);
+		return coe_information_answer(&server->dictionary, request, request_len, answer,
+					      capacity);
 	}
 	if (service != COE_SDO_REQUEST || request_len < SDO_BYTES) {
 		return 0;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * SDO services over a CoE dictionary (ETG.1000.6): upload (expedited, normal, segmented, complete
- * access), download (expedited, normal; complete access of an assignment). SDO information is
- * refused with its error answer.
+ * access), download (expedited, normal; complete access of an assignment); SDO information
+ * (coe_information.h).
  */
 #ifndef SIM_DEVICES_COE_SERVER_H
 #define SIM_DEVICES_COE_SERVER_H

@@ -2,6 +2,7 @@
 #include "sim/devices/fb1111_piccolo.h"
 
 #include <errno.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 #include "firmware/fb1111_piccolo/host/sii.h"
@@ -217,6 +218,11 @@ static void destroy(struct sim_device *dev)
 	free(dev);
 }
 
+static void io_get(const struct sim_device *dev, char *ret_text, size_t text_bytes)
+{
+	snprintf(ret_text, text_bytes, "led=%d", fb1111_piccolo_led(dev));
+}
+
 int fb1111_piccolo_slave(int position, struct segment_slave_spec *ret_spec)
 {
 	static const struct sim_device_ops ops = {
@@ -224,6 +230,7 @@ int fb1111_piccolo_slave(int position, struct segment_slave_spec *ret_spec)
 		.next_wake_ns = next_wake_ns,
 		.run = run,
 		.sync0 = sync0,
+		.io_get = io_get,
 		.destroy = destroy,
 	};
 	struct board *b = calloc(1, sizeof(*b));

@@ -37,9 +37,10 @@ static void make_segment(struct virtual_bench *b)
 {
 	static struct segment_slave_spec slaves[LIMIT_SLAVES];
 	struct prng prng = { b->spec.seed ^ UINT64_C(0x5e9) };
+	virtual_slave_maker make = b->spec.make != NULL ? b->spec.make : fb1111_piccolo_slave;
 
 	for (unsigned n = 0; n < b->spec.slaves; n++) {
-		CHECK_EQ(fb1111_piccolo_slave((int)n, &slaves[n]), 0);
+		CHECK_EQ(make((int)n, &slaves[n]), 0);
 		slaves[n].ppm = b->spec.ppm[n];
 		slaves[n].clock_start_ns = prng_below(&prng, UINT64_C(1) << 52);
 	}

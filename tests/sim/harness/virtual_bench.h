@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What stands on the table in a test: a line of FB1111-Piccolo boards on virtual time, a host
- * clock, a plan of faults, and an oscilloscope on every SYNC0 pin. Masters come and go
- * (virtual_master.h).
+ * What stands on the table in a test: a line of slaves on virtual time, FB1111-Piccolo boards if
+ * nothing else is asked for, a host clock, a plan of faults, and an oscilloscope on every SYNC0
+ * pin. Masters come and go (virtual_master.h).
  */
 #ifndef TESTS_SIM_HARNESS_VIRTUAL_BENCH_H
 #define TESTS_SIM_HARNESS_VIRTUAL_BENCH_H
@@ -16,8 +16,12 @@
 /* 2026-11-19: TAI that the host's clock starts at. */
 #define VIRTUAL_TAI_START_NS (INT64_C(1795000000) * NS_PER_S)
 
+/* Fill the spec of the slave at @position; a negative errno ends the test. */
+typedef int (*virtual_slave_maker)(int position, struct segment_slave_spec *ret_spec);
+
 struct virtual_spec {
 	unsigned slaves;          /* 0: 2 */
+	virtual_slave_maker make; /* NULL: FB1111-Piccolo boards */
 	double ppm[LIMIT_SLAVES]; /* crystals, in order */
 	double host_ppm;
 	uint64_t seed;         /* clocks' start, wake latencies, faults */

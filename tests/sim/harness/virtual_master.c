@@ -81,6 +81,9 @@ static int door_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadl
 	int was_armed = open_door();
 	int r = tr.receive(tr.ctx, frame, capacity, deadline, ret_at);
 
+	if (r > 0 && vm->each_frame != NULL) {
+		vm->each_frame(vm, frame, (size_t)r);
+	}
 	close_door(was_armed);
 	return r;
 }

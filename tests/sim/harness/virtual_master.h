@@ -48,6 +48,9 @@ struct virtual_master {
 	int64_t op_ns;                                 /* virtual time that bring-up took */
 	void (*each_cycle)(struct virtual_master *vm); /* a checker, after every cycle; NULL: none
 							*/
+	/* Every frame that comes back to the master; NULL: none looks. */
+	void (*each_frame)(struct virtual_master *vm, const uint8_t *frame, size_t frame_len);
+	void *user; /* of those two */
 	_Alignas(8) uint8_t newest[sizeof(struct sample_header) + LIMIT_IMAGE_BYTES];
 };
 

@@ -1,0 +1,198 @@
+/* SPDX-License-Identifier: MIT */
+#include "sim/devices/slave_application.h"
+
+#include "base/bytes.h"
+#include "wire/al.h"
+#include "wire/esc_reg.h"
+
+enum { SM_WATCHDOG_TRIGGER = 0x40 };
+
+static uint8_t read8(struct slave_application *app, int64_t t_ns, unsigned reg)
+{
+	uint8_t value;
+
+	esc_pdi_read(app->esc, t_ns, (uint16_t)reg, &value, 1);
+	return value;
+}
+
+static void set_state(struct slave_application *app, int64_t t_ns, uint8_t state, uint16_t code)
+{
+	uint8_t status[2] = { state, 0 };
+	uint8_t code_bytes[2];
+
+	put_le16(code_bytes, code);
+	esc_pdi_write(app->esc, t_ns, ESC_REG_AL_STATUS_CODE, code_bytes, 2);
+	esc_pdi_write(app->esc, t_ns, ESC_REG_AL_STATUS, status, 2);
+}
+
+static void read_sm(struct slave_application *app, int64_t t_ns, size_t n, uint8_t *r)
+{
+	esc_pdi_read(app->esc, t_ns, (uint16_t)(ESC_REG_SM + n * ESC_SM_BYTES), r, ESC_SM_BYTES);
+}
+
+static int sm_fits(struct slave_application *app, int64_t t_ns, size_t n, uint32_t len)
+{
+	uint8_t r[ESC_SM_BYTES];
+
+	read_sm(app, t_ns, n, r);
+	return (r[6] & 1) && get_le16(r) == app->sii->sm[n].start && get_le16(r + 2) == len;
+}
+
+static uint16_t check_mailbox(struct slave_application *app, int64_t t_ns)
+{
+	for (size_t n = 0; n < app->sii->sm_count; n++) {
+		uint8_t type = app->sii->sm[n].type;
+		uint8_t r[ESC_SM_BYTES];
+
+		if (type != SLAVE_SM_MAILBOX_OUT && type != SLAVE_SM_MAILBOX_IN) {
+			continue;
+		}
+		read_sm(app, t_ns, n, r);
+		if (!(r[6] & 1) || get_le16(r + 2) == 0) {
+			return AL_CODE_INVALID_MAILBOX_CONFIG;
+		}
+	}
+	return AL_CODE_NONE;
+}
+
+static uint16_t check_process_data(struct slave_application *app, int64_t t_ns)
+{
+	for (size_t n = 0; n < app->sii->sm_count; n++) {
+		uint8_t type = app->sii->sm[n].type;
+		uint32_t bits = coe_dictionary_sm_bits(&app->coe.dictionary, n);
+
+		if ((type == SLAVE_SM_OUTPUTS || type == SLAVE_SM_INPUTS) && bits > 0 &&
+		    !sm_fits(app, t_ns, n, (bits + 7) / 8)) {
+			return type == SLAVE_SM_OUTPUTS ? AL_CODE_INVALID_OUTPUT_CONFIG
+							: AL_CODE_INVALID_INPUT_CONFIG;
+		}
+	}
+	return AL_CODE_NONE;
+}
+
+static uint16_t check_step(struct slave_application *app, int64_t t_ns, uint8_t from, uint8_t to)
+{
+	if (to == AL_BOOT) {
+		return AL_CODE_BOOT_NOT_SUPPORTED;
+	}
+	if (to != AL_INIT && to != AL_PREOP && to != AL_SAFEOP && to != AL_OP) {
+		return AL_CODE_UNKNOWN_STATE;
+	}
+	/* Up one step at a time, down as far as wanted. */
+	if ((to == AL_SAFEOP && from == AL_INIT) ||
+	    (to == AL_OP && from != AL_SAFEOP && from != AL_OP)) {
+		return AL_CODE_INVALID_STATE_CHANGE;
+	}
+	if (to == AL_PREOP && from == AL_INIT) {
+		return check_mailbox(app, t_ns);
+	}
+	if (to == AL_SAFEOP && from == AL_PREOP) {
+		return check_process_data(app, t_ns);
+	}
+	return AL_CODE_NONE;
+}
+
+static void entered(struct slave_application *app, uint8_t from, uint8_t to)
+{
+	if (from == AL_INIT) {
+		mailbox_reset(&app->mailbox);
+		coe_dictionary_reset(&app->coe.dictionary);
+	}
+	app->coe.dictionary.is_preop = to == AL_PREOP;
+}
+
+static void handle_control(struct slave_application *app, int64_t t_ns)
+{
+	uint8_t status = read8(app, t_ns, ESC_REG_AL_STATUS);
+	uint8_t from = status & AL_STATE_MASK;
+	uint8_t control = read8(app, t_ns, ESC_REG_AL_CONTROL);
+	uint8_t to = control & AL_STATE_MASK;
+	uint16_t code;
+
+	if ((status & AL_ERROR) && !(control & AL_ERROR) && to != AL_INIT) {
+		return; /* an error has to be acknowledged first */
+	}
+	code = check_step(app, t_ns, from, to);
+	if (code == AL_CODE_NONE) {
+		set_state(app, t_ns, to, code);
+		entered(app, from, to);
+	} else {
+		set_state(app, t_ns, (uint8_t)(from | AL_ERROR), code);
+	}
+}
+
+/* Is an SM of outputs watched, and has nothing come for too long, or never? */
+static int is_watchdog_down(struct slave_application *app, int64_t t_ns)
+{
+	for (size_t n = 0; n < app->sii->sm_count; n++) {
+		uint8_t r[ESC_SM_BYTES];
+
+		if (app->sii->sm[n].type != SLAVE_SM_OUTPUTS) {
+			continue;
+		}
+		read_sm(app, t_ns, n, r);
+		if ((r[6] & 1) && (r[4] & SM_WATCHDOG_TRIGGER)) {
+			return !(read8(app, t_ns, ESC_REG_WATCHDOG_STATUS_PD) & 1);
+		}
+	}
+	return 0;
+}
+
+static size_t service(void *ctx, unsigned type, const uint8_t *request, size_t request_len,
+		      uint8_t *answer, size_t capacity)
+{
+	(void)type;
+	return coe_server_answer(ctx, request, request_len, answer, capacity);
+}
+
+void slave_application_run(struct slave_application *app, int64_t t_ns)
+{
+	uint8_t state;
+
+	if (app->esc->al_event & ESC_AL_EVENT_CONTROL) {
+		handle_control(app, t_ns);
+	}
+	state = slave_application_state(app, t_ns);
+	if (state != AL_INIT && (app->sii->mailbox_protocols & SII_MAILBOX_COE)) {
+		mailbox_run(&app->mailbox, app->esc, t_ns, service, &app->coe);
+	}
+	if (state == AL_OP && is_watchdog_down(app, t_ns)) {
+		set_state(app, t_ns, AL_SAFEOP | AL_ERROR, AL_CODE_SM_WATCHDOG);
+	}
+}
+
+/* --- public --- */
+
+void slave_application_init(struct slave_application *app, const struct sii *sii, const char *name)
+{
+	app->sii = sii;
+	app->esc = NULL;
+	coe_dictionary_init(&app->coe.dictionary, sii, name);
+}
+
+void slave_application_power_on(struct slave_application *app, struct esc *esc)
+{
+	app->esc = esc;
+	mailbox_reset(&app->mailbox);
+	coe_dictionary_reset(&app->coe.dictionary);
+	app->coe.dictionary.is_preop = 0;
+}
+
+uint8_t slave_application_state(struct slave_application *app, int64_t t_ns)
+{
+	return read8(app, t_ns, ESC_REG_AL_STATUS) & AL_STATE_MASK;
+}
+
+int slave_application_sm(struct slave_application *app, int64_t t_ns, size_t n, uint16_t *ret_start,
+			 uint16_t *ret_len)
+{
+	uint8_t r[ESC_SM_BYTES];
+
+	read_sm(app, t_ns, n, r);
+	if (!(r[6] & 1) || get_le16(r + 2) == 0) {
+		return 0;
+	}
+	*ret_start = get_le16(r);
+	*ret_len = get_le16(r + 2);
+	return 1;
+}
