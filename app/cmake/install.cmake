@@ -14,6 +14,8 @@ install(TARGETS ecdaq_client ecdaq_client_shared
 install(FILES base/board.h base/clock.h base/event.h base/histogram.h base/limits.h base/ring.h
 	base/sample.h base/status.h base/sync0.h base/timemap.h
 	DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq/base)
+# Control programs say <ecdaq/control.h>.
+install(FILES control/control.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq)
 install(FILES image/image.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq/image)
 
 file(RELATIVE_PATH ECDAQ_PC_TO_PREFIX "/${CMAKE_INSTALL_LIBDIR}/pkgconfig" "/")

@@ -8,7 +8,7 @@
 #include <stddef.h>
 #include <unistd.h>
 
-static const int numbers[] = { SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT };
+static const int numbers[] = { SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGABRT };
 
 enum { NUMBERS = sizeof(numbers) / sizeof(numbers[0]) };
 

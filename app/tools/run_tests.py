@@ -287,7 +287,7 @@ GROUPS: dict[str, list[Suite]] = {
 }
 # Too long for every run: only when named. Their numbers stand in the log.
 ON_REQUEST = ("dds", "boot")
-LATER = ("control", "sync0")
+LATER = ("sync0",)
 
 
 class Builder:

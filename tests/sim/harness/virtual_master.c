@@ -126,19 +126,30 @@ static int start_cycle(void *ctx, struct cycle *cycle, struct failure *failure)
 static int end_cycle(void *ctx)
 {
 	struct virtual_master *vm = ctx;
+	int r = 0;
 
+	if (vm->cycle != NULL) {
+		cycle_has_stopped(vm->cycle, &r);
+	}
 	vm->cycle = NULL;
-	return 0;
+	return r;
 }
 
 static int has_cycle_ended(void *ctx)
 {
-	(void)ctx;
-	return 0;
+	const struct virtual_master *vm = ctx;
+	int r;
+
+	return vm->cycle != NULL && cycle_has_stopped(vm->cycle, &r);
 }
 
 static void step_cycle(struct virtual_master *vm)
 {
+	int r;
+
+	if (cycle_has_stopped(vm->cycle, &r)) {
+		return; /* its thread is no more */
+	}
 	rt_guard_arm();
 	cycle_step(vm->cycle);
 	rt_guard_disarm();
@@ -152,7 +163,7 @@ static void let_pass(void *ctx, mono_t until)
 	struct virtual_master *vm = ctx;
 	struct platform pf = in_process_platform(vm->bench->host);
 
-	if (vm->cycle != NULL) {
+	if (vm->cycle != NULL && !has_cycle_ended(vm)) {
 		step_cycle(vm);
 	} else {
 		pf.sleep_until(pf.ctx, until);
@@ -306,8 +317,10 @@ int virtual_master_run(struct virtual_master *vm, uint64_t cycles)
 	int r = SESSION_GOES_ON;
 
 	while (r == SESSION_GOES_ON && *done < end) {
+		int ended = has_cycle_ended(vm);
+
 		step_cycle(vm);
-		if (++vm->steps >= SERVICE_CYCLES) {
+		if (ended || ++vm->steps >= SERVICE_CYCLES) {
 			vm->steps = 0;
 			r = session_service(vm->session, &vm->failure);
 			take_samples(vm);

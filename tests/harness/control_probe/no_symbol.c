@@ -1,0 +1,4 @@
+/* SPDX-License-Identifier: MIT */
+/* A shared object, but no control program. */
+extern int not_a_program;
+int not_a_program = 1;
