@@ -103,6 +103,9 @@ struct slave_status {
 	_Atomic uint32_t processing_errors;   /* 0x030C */
 	_Atomic uint32_t pdi_errors;          /* 0x030D */
 	_Atomic uint32_t are_errors_short;    /* 1: a counter stood at 255, there were more */
+	_Atomic uint32_t output_sync_type;    /* 0x1C32:01; 0: free run, or no such object */
+	_Atomic uint32_t input_sync_type;     /* 0x1C33:01 */
+	_Atomic uint32_t minimum_cycle_ns;    /* 0x1C32:05, 0x1C33:05, the larger; 0: not told */
 };
 
 struct status_page {

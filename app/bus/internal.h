@@ -48,6 +48,12 @@ enum recovery_step {
 	RECOVERY_OP,
 };
 
+/* What 0x1C32 or 0x1C33 says; 0: nothing. */
+struct sync_limits {
+	uint16_t type; /* 0 free run, 1 SM event, 2 SYNC0, 3 SYNC1, 0x22 SM event of the other */
+	uint32_t minimum_cycle_ns;
+};
+
 struct bus_slave {
 	struct slave_info info;
 	struct dc_node clock; /* ports, receive times, parent, delay */
@@ -58,6 +64,8 @@ struct bus_slave {
 	size_t pdo_first; /* its entries in bus->pdo */
 	size_t pdo_count;
 	enum config_mode mode;
+	struct sync_limits output_sync;
+	struct sync_limits input_sync;
 	uint8_t *sii; /* in bus->sii; shared by slaves of one type and revision */
 	size_t sii_len;
 	/* bus/watch.c */
@@ -172,6 +180,12 @@ const char *bus_abort_text(uint32_t abort);
 /** Tell SOEM the SyncManagers and bits of a slave's entries; *total_bytes counts the image. 0 or
  * -errno with a line. */
 int bus_map_sm(struct bus *bus, size_t pos, uint32_t *total_bytes);
+
+/* --- sync_limits.c --- */
+
+/** Read 0x1C32 and 0x1C33 of a slave that has them; a cycle it cannot follow is -EPROTO. 0 or
+ * -errno with a line. */
+int bus_sync_limits(struct bus *bus, size_t pos);
 
 /* --- map.c --- */
 

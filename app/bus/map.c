@@ -268,6 +268,9 @@ static int read_all(struct bus *bus)
 		if (r >= 0) {
 			r = bus_map_sm(bus, i, &total_bytes);
 		}
+		if (r >= 0) {
+			r = bus_sync_limits(bus, i);
+		}
 		if (r < 0) {
 			return r;
 		}

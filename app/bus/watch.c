@@ -168,6 +168,17 @@ static void count_errors(struct bus *bus, size_t pos, const struct look *look)
 	}
 }
 
+static void show_sync(const struct bus_slave *sl, struct slave_status *page)
+{
+	uint32_t out_ns = sl->output_sync.minimum_cycle_ns;
+	uint32_t in_ns = sl->input_sync.minimum_cycle_ns;
+
+	atomic_store_explicit(&page->output_sync_type, sl->output_sync.type, memory_order_relaxed);
+	atomic_store_explicit(&page->input_sync_type, sl->input_sync.type, memory_order_relaxed);
+	atomic_store_explicit(&page->minimum_cycle_ns, out_ns > in_ns ? out_ns : in_ns,
+			      memory_order_relaxed);
+}
+
 static void show(const struct bus_slave *sl, const struct look *look, struct slave_status *page)
 {
 	atomic_store_explicit(&page->is_lost, (uint32_t)sl->is_lost, memory_order_relaxed);
@@ -181,6 +192,7 @@ static void show(const struct bus_slave *sl, const struct look *look, struct sla
 		atomic_store_explicit(&page->al_state, AL_NONE, memory_order_relaxed);
 	}
 	error_counters_show(&sl->errors, page);
+	show_sync(sl, page);
 	atomic_store_explicit(
 		&page->dc_diff_ns,
 		look->wkc[LOOK_DIFF] > 0 ? (int32_t)(get_le32(look->diff) & DIFF_MAGNITUDE) : -1,

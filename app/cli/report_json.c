@@ -189,6 +189,9 @@ void report_slave_json(const struct status_page *page, uint32_t index, struct js
 	json_i64(js, "dc_diff_ns", GET(slave->dc_diff_ns));
 	json_u64(js, "input_bits", info.input_bits);
 	json_u64(js, "output_bits", info.output_bits);
+	json_u64(js, "output_sync_type", GET(slave->output_sync_type));
+	json_u64(js, "input_sync_type", GET(slave->input_sync_type));
+	json_u64(js, "minimum_cycle_ns", GET(slave->minimum_cycle_ns));
 	write_ports(js, "rx_errors", slave->rx_errors);
 	write_ports(js, "forwarded_errors", slave->forwarded_errors);
 	write_ports(js, "lost_links", slave->lost_links);

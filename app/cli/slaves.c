@@ -55,6 +55,12 @@ static void show_more(const struct status_page *page, uint32_t index)
 	} else {
 		printf("    %-16s none\n", "DC");
 	}
+	printf("    %-16s outputs %u, inputs %u\n", "sync type", GET(slave->output_sync_type),
+	       GET(slave->input_sync_type));
+	if (GET(slave->minimum_cycle_ns) > 0) {
+		printf("    %-16s %s\n", "minimum cycle",
+		       text_ns((int64_t)GET(slave->minimum_cycle_ns), buf));
+	}
 	printf("    %-16s %" PRIu64 " good, %" PRIu64 " bad\n", "samples",
 	       GET(page->cycle.slave_good[index]), GET(page->cycle.slave_bad[index]));
 	show_ports("receive errors", slave->rx_errors);

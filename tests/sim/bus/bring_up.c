@@ -75,6 +75,19 @@ static void check_line_of(unsigned slaves)
 	bench_destroy(b);
 }
 
+TEST(bring_up, sync_type_and_minimum_cycle_are_read_and_shown)
+{
+	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 1, .seed = 17 });
+	const struct slave_status *page = &b->page->slave[0];
+
+	bench_bring_up(b);
+	bench_watch(b);
+	CHECK_EQ(atomic_load(&page->output_sync_type), 2);
+	CHECK_EQ(atomic_load(&page->input_sync_type), 2);
+	CHECK_EQ(atomic_load(&page->minimum_cycle_ns), 100000);
+	bench_destroy(b);
+}
+
 TEST(bring_up, one_piccolo_comes_to_op_and_counts)
 {
 	check_line_of(1);

@@ -31,6 +31,23 @@ TEST(trouble, missing_slave_is_named_by_position_and_identity)
 	bench_destroy(b);
 }
 
+TEST(trouble, cycle_below_a_slave_s_minimum_is_refused_with_the_mend)
+{
+	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 2, .seed = 16 });
+
+	b->cfg.cycle_period_ns = 99999;
+	CHECK_EQ(bench_find(b), 0);
+	CHECK_EQ(bench_map(b), -EPROTO);
+	CHECK(strstr(b->error, "slave 0 (") == b->error);
+	CHECK(strstr(b->error, "cycle.period 99999 ns is below the slave's minimum of 100000 ns "
+			       "(0x1c32:05): set cycle.period to 100us or more") != NULL);
+	b->cfg.cycle_period_ns = 100000;
+	bench_new_master(b);
+	CHECK_EQ(bench_find(b), 0);
+	CHECK_EQ(bench_map(b), 0);
+	bench_destroy(b);
+}
+
 TEST(trouble, blank_eeprom_is_an_error_and_no_hang)
 {
 	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 2, .seed = 14 });
