@@ -3,15 +3,18 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import ecdaq
+import pandas
 import pytest
-from bench import KIT, ROOT, Bench
-from ecdaq import idl_types
+from bench import KIT, ROOT, Bench, live
+from ecdaq import idl_types, keys
 from ecdaq.link import domain_config
 
 IDL = (ROOT / "app" / "publish" / "idl" / "ecdaq.idl").read_text()
@@ -80,6 +83,29 @@ def test_series_of_one_slave_becomes_columns() -> None:
     series = ecdaq.Series(1)
     series.extend([sample(0, 1), sample(1, 1), sample(1, 2)])
     assert series.to_numpy()["cycle"].tolist() == [1, 2]
+    frame = series.to_pandas()
+    assert frame["cycle"].tolist() == [1, 2]
+    assert frame.index[1] == pandas.Timestamp(2, unit="ns", tz="UTC")
+
+
+def test_keys_are_used_where_they_are_there_and_the_library_can(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(ecdaq.LinkError, match=r"identity_ca.cert.pem: not there"):
+        ecdaq.connect("lo", security=tmp_path)
+    for name in keys.KEY_FILES:
+        (tmp_path / name).touch()
+    monkeypatch.setattr(keys, "plugin_folder", lambda: Path("/plugins"))
+    config = keys.security_config(tmp_path)
+    assert f"<PrivateKey>file:{tmp_path}/key.pem</PrivateKey>" in config
+    assert 'path="/plugins/libdds_security_ac.so" initFunction="init_access_control"' in config
+
+
+def test_a_library_without_security_is_said(tmp_path: Path) -> None:
+    for name in keys.KEY_FILES:
+        (tmp_path / name).touch()
+    with pytest.raises(ecdaq.LinkError, match="built without DDS Security"):
+        ecdaq.connect("lo", security=tmp_path)
 
 
 def test_configuration_takes_no_markup() -> None:
@@ -98,12 +124,39 @@ def test_remote_tool_watches_records_sets_and_tells_status(
         ("status", ["status", "--json"], '"state": "OP"'),
         ("watch", ["watch", "--seconds", "2"], "piccolo1 cycle"),
         ("set", ["set", "piccolo0.led=on"], "piccolo0.led=on from cycle"),
-        ("record", ["record", "--seconds", "2", "--dir", str(bench.folder)], "0 gaps, 0 samples"),
+        ("csv", ["record", "--csv", "--seconds", "2", "--dir", str(bench.folder)], "0 gaps, 0 "),
+        ("mcap", ["record", "--seconds", "3", "--dir", str(bench.folder / "mcap")], "0 gaps, 0 "),
     ):
         assert bench.module(name, "ecdaq", *tool, *words).wait(40) == 0, bench.logs()
         assert expected in bench.log(name)
     assert bench.module("refused", "ecdaq", *tool, "set", "piccolo1.led=on").wait(40) == 1
     assert "owned by local" in bench.log("refused")
-    lines = (bench.folder / "piccolo0.csv").read_text().splitlines()
-    assert lines[0].startswith("cycle,dc_time_ns,utc_ns,flags,is_good,led,")
-    assert len(lines) > 1000
+    frame = pandas.read_csv(bench.folder / "piccolo0.csv")
+    assert list(frame.columns)[:6] == ["cycle", "dc_time_ns", "utc_ns", "flags", "is_good", "led"]
+    assert len(frame) > 1000
+    assert (frame["cycle"].diff().dropna() == 1).all()
+    bench.segment.stop("daemon")
+    assert bench.segment.stop("recorder") == 0
+    equals_the_appliances(bench, bench.folder / "mcap")
+
+
+def equals_the_appliances(bench: Bench, folder: Path) -> None:
+    """`ecdaq log check` takes it, and it says the same as what was recorded on the appliance."""
+    (file,) = folder.glob("*.mcap")
+    checked = bench.segment.ecdaq("log", "check", "--json", str(file))
+    told = json.loads(checked.stdout)
+    assert told["clean"] is True
+    assert told["cycles"] > 2000
+    for slave in ("piccolo0", "piccolo1"):
+        topic = f"/ecdaq/{slave}"
+        local = {m.cycle: fields(m) for m in live.recorded(bench.segment.record_dir, topic)}
+        remote = {m.cycle: fields(m) for m in live.recorded(folder, topic)}
+        assert len(remote) >= told["cycles"]
+        assert {cycle: local[cycle] for cycle in remote} == remote
+    assert list(live.recorded(folder, "/ecdaq/timemap"))
+    exported = bench.segment.ecdaq("log", "export", str(file))
+    assert exported.stdout.count("\n") > 2000
+
+
+def fields(message: Any) -> dict[str, Any]:
+    return {name: getattr(message, name) for name in message.__slots__}

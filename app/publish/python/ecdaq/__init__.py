@@ -8,7 +8,8 @@ with ecdaq.connect(interface="eth0") as link:
         print(sample.cycle, sample.adc)
 """
 
-from ecdaq.link import Channel, Channels, Link, LinkError, RefusedError, connect
+from ecdaq.errors import LinkError, RefusedError
+from ecdaq.link import Channel, Channels, Link, connect
 from ecdaq.series import Gaps, Series
 
 __all__ = [

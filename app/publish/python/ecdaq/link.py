@@ -8,6 +8,7 @@ import re
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from types import TracebackType
 
 from cyclonedds.core import (
@@ -25,6 +26,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
+from ecdaq.errors import LinkError, RefusedError
 from ecdaq.idl_types import (
     BlockV1,
     ChannelsV1,
@@ -36,18 +38,11 @@ from ecdaq.idl_types import (
     StatusV1,
     TimeMapV1,
 )
+from ecdaq.keys import security_config
 from ecdaq.series import Gaps
 
 ANY = ViewState.Any | InstanceState.Any | SampleState.Any
 TAKE_AT_ONCE = 4096
-
-
-class LinkError(Exception):
-    """What was asked of the appliance did not come."""
-
-
-class RefusedError(LinkError):
-    """A command was refused; the text says why."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +73,7 @@ class Channels:
         self.session: int = message.session
         self.period_ns: int = message.period_ns
         self.slave_names: list[str] = list(message.slave_name)
+        self.slave_devices: list[str] = list(message.slave_device)
         self.command_lease_ns: int = message.command_lease_ns
         self.are_commands_on: bool = message.are_commands_on
         self.all: list[Channel] = []
@@ -118,7 +114,7 @@ class Channels:
 
 
 def domain_config(interface: str, multicast: bool, peers: list[str], tag: str) -> str:
-    """The same configuration as ecdaq-dds makes for itself."""
+    """The same configuration as ecdaq-dds makes for itself, but for security."""
     for word in [interface, tag, *peers]:
         if not re.fullmatch(r"[A-Za-z0-9._:-]*", word):
             raise ValueError(f"{word!r} is no name")
@@ -144,9 +140,17 @@ def connect(
     peers: list[str] | None = None,
     tag: str = "",
     commander: str = "",
+    security: str | Path | None = None,
 ) -> Link:
-    """Join the appliance's DDS domain on @interface, and on no other."""
-    return Link(domain, domain_config(interface, multicast, peers or [], tag), commander)
+    """Join the appliance's DDS domain on @interface, and on no other.
+
+    @security: the folder of our keys; without it $ECDAQ_SECURITY, and without that none.
+    """
+    config = domain_config(interface, multicast, peers or [], tag)
+    keys = security or os.environ.get("ECDAQ_SECURITY")
+    if keys:
+        config += security_config(Path(keys))
+    return Link(domain, config, commander)
 
 
 class Link:

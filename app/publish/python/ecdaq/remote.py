@@ -7,11 +7,14 @@ import argparse
 import csv
 import dataclasses
 import json
+import os
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from ecdaq.link import Channels, Link, LinkError, connect
+from ecdaq.errors import LinkError
+from ecdaq.link import Channels, Link, connect
 
 
 def watch(link: Link, options: argparse.Namespace) -> int:
@@ -43,8 +46,7 @@ def header(channels: Channels, slave: int) -> list[str]:
     return ["cycle", "dc_time_ns", "utc_ns", "flags", "is_good", *names]
 
 
-def record(link: Link, options: argparse.Namespace) -> int:
-    """A CSV file for each slave, raw and exact where a channel has no scale."""
+def record_csv(link: Link, options: argparse.Namespace) -> int:
     channels = link.channels()
     options.dir.mkdir(parents=True, exist_ok=True)
     files = [(options.dir / f"{name}.csv").open("w", newline="") for name in channels.slave_names]
@@ -69,6 +71,58 @@ def record(link: Link, options: argparse.Namespace) -> int:
         for file in files:
             file.close()
     return report_gaps(link)
+
+
+def next_channels(link: Link, session: int) -> Channels:
+    """The table of a session whose samples have come: it cannot be far."""
+    end = time.monotonic() + 10
+    while (channels := link.channels()).session != session:
+        if time.monotonic() > end:
+            raise LinkError(f"no channel table of session {session}")
+        time.sleep(0.01)
+    return channels
+
+
+def record_mcap(link: Link, options: argparse.Namespace) -> int:
+    from ecdaq import __version__
+    from ecdaq.mcap_file import McapFile
+
+    file = McapFile(options.dir, link.channels(), f"ecdaq-remote {__version__}")
+    reason = "stopped"
+    look_at = 0.0
+    map_told = -1
+    try:
+        for sample in link.subscribe(options.seconds):
+            if sample.session != file.session:
+                print(file.close("the master was restarted"), flush=True)
+                file = McapFile(options.dir, next_channels(link, sample.session), file.program)
+            file.add(sample)
+            if time.monotonic() < look_at:
+                continue
+            look_at = time.monotonic() + 0.5
+            for event in link.events(0):
+                file.add_event(event)
+            timemap = link.timemap()
+            if timemap.session == file.session and timemap.utc_ns != map_told:
+                map_told = timemap.utc_ns
+                file.add_timemap(timemap)
+    except BaseException:
+        reason = "interrupted"
+        raise
+    finally:
+        print(file.close(reason), flush=True)
+    return report_gaps(link)
+
+
+def record(link: Link, options: argparse.Namespace) -> int:
+    """MCAP with the topics and fields of the appliance's recordings, or a CSV file for each slave,
+    raw and exact where a channel has no scale."""
+    if options.csv:
+        return record_csv(link, options)
+    try:
+        return record_mcap(link, options)
+    except ImportError as why:
+        raise LinkError(str(why)) from why
 
 
 def set_outputs(link: Link, options: argparse.Namespace) -> int:
@@ -111,10 +165,13 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--tag", default="", help="as dds.tag of the appliance")
     parser.add_argument("--peer", action="append", default=[], help="address of the appliance")
     parser.add_argument("--no-multicast", action="store_true")
+    parser.add_argument(
+        "--security", type=Path, help="folder of our keys, if the appliance wants any"
+    )
     verbs = parser.add_subparsers(required=True, metavar="VERB")
     for name, function, text in (
         ("watch", watch, "show values as they come"),
-        ("record", record, "a CSV file for each slave"),
+        ("record", record, "to MCAP, or CSV"),
         ("set", set_outputs, "set outputs of owner remote"),
         ("status", status, "how the master is"),
     ):
@@ -124,6 +181,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
             verb.add_argument("--seconds", type=float, default=None)
         if name == "record":
             verb.add_argument("--dir", type=Path, default=Path("."))
+            verb.add_argument("--csv", action="store_true", help="a CSV file for each slave")
         if name == "set":
             verb.add_argument("assignments", nargs="+", metavar="OUTPUT=VALUE")
             verb.add_argument("--hold", type=float, default=0, metavar="SECONDS")
@@ -141,12 +199,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
             multicast=not options.no_multicast,
             peers=options.peer,
             tag=options.tag,
+            security=options.security,
         ) as link:
             return options.function(link, options)
     except LinkError as why:
         print(f"ecdaq-remote: {why}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
+        return 0
+    except BrokenPipeError:  # who read us has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
 
 

@@ -1,0 +1,339 @@
+# SPDX-License-Identifier: MIT
+"""What comes over DDS, as MCAP with the topics and fields of the appliance's own recordings.
+
+Not published, and so zero here: of /ecdaq/cycle the clocks, times and working counters, of
+/ecdaq/event mono_ns and id; sequence is 2^64-1 in every event.
+"""
+
+from __future__ import annotations
+
+import datetime
+import json
+import re
+import struct
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from ecdaq.link import Channel, Channels
+
+try:
+    from mcap.writer import CompressionType, Writer
+except ImportError as why:  # pragma: no cover - said by the program
+    raise ImportError("recording MCAP needs the package mcap: pip install mcap") from why
+
+PACKAGE = "ecdaq_msgs/msg"
+UNKNOWN_SEQUENCE = 2**64 - 1
+# So many cycles a slave's samples may come later than another's before they count as missing.
+PATIENCE_CYCLES = 5000
+CDR_LE = b"\x00\x01\x00\x00"
+
+CYCLE = """\
+# One cycle of the master, as far as it is published.
+uint64 cycle  # index of the SYNC0 edge, one more in every message
+int64 dc_time_ns  # DC time of that edge, ns since 2000-01-01; 0 without DC
+int64 wake_mono_ns  # not published: 0
+int64 wake_tai_ns  # not published: 0
+int64 frame_dc_ns  # not published: 0
+int32 wake_latency_ns  # not published: 0
+int32 round_trip_ns  # not published: 0
+int32 phase_error_ns  # not published: 0
+int32 dc_diff_ns  # not published: 0
+uint32 flags  # 1 lost, 2 late, 4 WKC low, 8 not OP, 16 fail-safe, 32 skipped, 64 bad counter, \
+128 DC unlocked, 256 doubled
+uint16 wkc  # not published: 0
+uint16 wkc_expected  # not published: 0
+uint64 slaves_bad  # bit n: the sample of slave n is not good
+"""
+EVENT = """\
+# Something that happened.
+int64 time_ns  # Unix time
+int64 mono_ns  # not published: 0
+uint64 sequence  # not published: 2^64-1
+uint64 cycle  # in which it was noticed
+int64 value  # see text
+int32 arg0  # see text
+int32 arg1  # see text
+int32 slave  # position; -1: none
+uint16 id  # not published: 0
+string name  # for machines
+string severity  # info, notice, warning, error
+string text  # for people
+"""
+TIMEMAP = """\
+# DC time to UTC: utc = utc_ns + (dc - dc_ns) * (1 + rate_ppb / 1e9).
+int64 dc_ns  # DC time; without DC: cycle number times period
+int64 utc_ns  # Unix time at dc_ns
+int64 rate_ppb  # UTC against DC
+int64 uncertainty_ns  # of utc_ns against the host's clock
+int64 step_ns  # size of the newest step of the host's clock
+uint64 steps  # number of steps so far
+int32 tai_offset_s  # TAI minus UTC; 0: unset, CLOCK_TAI is taken for UTC
+"""
+CYCLE_BYTES = struct.Struct("<4sQqqqqiiiiIHHQ")
+TIMEMAP_BYTES = struct.Struct("<4sqqqqqQi")
+EVENT_BYTES = struct.Struct("<4sqqQQqiiiH")
+# ROS type and struct letter for 1, 2, 4, 8 bytes.
+UNSIGNED = [("uint8", "B"), ("uint16", "H"), ("uint32", "I"), ("uint64", "Q")]
+SIGNED = [("int8", "b"), ("int16", "h"), ("int32", "i"), ("int64", "q")]
+
+
+def size_of(bits: int) -> int:
+    """0, 1, 2, 3 for what fits in 1, 2, 4, 8 bytes."""
+    return next(k for k in range(4) if bits <= 8 << k)
+
+
+def field_name(name: str) -> str:
+    """As the recorder's, but for words that some language reserves: ecdaq's own are none."""
+    plain = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
+    return f"n_{plain}" if plain[:1].isdigit() else plain or "unnamed"
+
+
+class Field:
+    """One channel in a slave's message."""
+
+    def __init__(self, channel: Channel, name: str) -> None:
+        kind, bits = re.fullmatch(r"([A-Z]+)(\d*)", channel.type).groups()  # type: ignore[union-attr]
+        self.channel = channel
+        self.name = name
+        self.bits = int(bits or 1)
+        self.is_signed = kind == "INT"
+        size = size_of(self.bits)
+        if kind == "BOOL":
+            self.ros_type, self.letter = "bool", "B"
+        elif kind == "FLOAT":  # its bits, as they are
+            self.ros_type, self.letter = f"float{self.bits}", UNSIGNED[size][1]
+        else:
+            self.ros_type, self.letter = (SIGNED if self.is_signed else UNSIGNED)[size]
+        self.bytes = 1 << size
+
+    def value(self, raw: int) -> int:
+        """Zero-extended bits as the field has them."""
+        return raw - (1 << self.bits) if self.is_signed and raw >> (self.bits - 1) else raw
+
+
+class SlaveTopic:
+    """How one slave's samples are written."""
+
+    def __init__(self, name: str, device: str, position: int, channels: Iterable[Channel]) -> None:
+        self.name = name
+        self.topic = f"/ecdaq/{field_name(name)}"
+        self.type = "".join(w[:1].upper() + w[1:] for w in field_name(name).split("_"))
+        self.position = position
+        self.device = device
+        self.fields: list[Field] = []
+        taken = {"cycle", "dc_time_ns", "flags", "good"}
+        layout, at = "<4sQqIB", 21  # bytes behind the header
+        for channel in channels:
+            plain = unique = field_name(channel.entry)
+            number = 2
+            while unique in taken:
+                unique, number = f"{plain}_{number}", number + 1
+            taken.add(unique)
+            field = Field(channel, unique)
+            pad = -at % field.bytes
+            layout += f"{pad}x{field.letter}"
+            at += pad + field.bytes
+            self.fields.append(field)
+        self.struct = struct.Struct(layout)
+
+    def schema(self) -> str:
+        lines = [
+            f"# Slave {self.name} at position {self.position}: {self.device}. Values are raw.",
+            "uint64 cycle  # index of the SYNC0 edge, one more in every message",
+            "int64 dc_time_ns  # DC time of that edge, ns since 2000-01-01",
+            f"uint32 flags  # as in {PACKAGE}/Cycle",
+            "bool good  # fresh, and the slave's own checks hold",
+        ]
+        for field in self.fields:
+            c = field.channel
+            way = "output" if c.is_output else "input"
+            unit = f"; {c.unit} = raw * {c.scale!r} + {c.offset!r}" if c.unit else ""
+            lines.append(
+                f"{field.ros_type} {field.name}  # {c.name}, {way}, {field.bits} bit{unit}"
+            )
+        return "\n".join(lines) + "\n"
+
+    def metadata(self) -> dict[str, str]:
+        found = {
+            "offered_qos_profiles": "", "slave": self.name, "position": str(self.position)
+        }  # fmt: skip
+        for field in self.fields:
+            c = field.channel
+            found |= {
+                f"{field.name}.channel": c.name, f"{field.name}.unit": c.unit,
+                f"{field.name}.scale": f"{c.scale:.17g}",
+                f"{field.name}.offset": f"{c.offset:.17g}",
+            }  # fmt: skip
+        return found
+
+    def encode(self, sample: Any) -> bytes:
+        values = [f.value(r) for f, r in zip(self.fields, sample.raw, strict=True)]
+        return self.struct.pack(
+            CDR_LE, sample.cycle, sample.dc_time_ns, sample.flags, sample.is_good, *values
+        )
+
+
+def put_string(data: bytes, text: str) -> bytes:
+    coded = text.encode() + b"\0"
+    pad = -(len(data) - len(CDR_LE)) % 4
+    return data + bytes(pad) + struct.pack("<I", len(coded)) + coded
+
+
+def encode_event(event: Any) -> bytes:
+    data = EVENT_BYTES.pack(
+        CDR_LE, event.utc_ns, 0, UNKNOWN_SEQUENCE, event.cycle, event.value, event.arg0,
+        event.arg1, event.slave, 0,
+    )  # fmt: skip
+    for text in (event.name, event.severity, event.text):
+        data = put_string(data, text)
+    return data
+
+
+def encode_timemap(m: Any) -> bytes:
+    return TIMEMAP_BYTES.pack(
+        CDR_LE, m.dc_ns, m.utc_ns, m.rate_ppb, m.uncertainty_ns, m.step_ns, m.steps,
+        m.tai_offset_s,
+    )  # fmt: skip
+
+
+class McapFile:
+    """The recording of one session of the master. It is NAME.mcap.part until it is closed."""
+
+    def __init__(self, folder: Path, channels: Channels, program: str) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        number = 1 + max(
+            (int(p.name[-11:-5]) for p in folder.glob("ecdaq-*-??????.mcap")), default=0
+        )
+        now = datetime.datetime.now(datetime.UTC).strftime("%Y%m%dT%H%M%SZ")
+        started_ms = channels.session // 1_000_000 & 0xFFFFFFFF
+        name = f"ecdaq-{now}-{started_ms:08x}-{number:06d}.mcap"
+        self.path = folder / name
+        self.part = folder / f"{name}.part"
+        self.session = channels.session
+        self.number = number
+        self.program = program
+        self.channels = channels
+        self.slaves = [
+            SlaveTopic(slave, channels.slave_devices[i], i, channels.of_slave(i))
+            for i, slave in enumerate(channels.slave_names)
+        ]
+        self.cycles = 0
+        self.last_cycle = -1
+        self._stream = self.part.open("wb")
+        self._writer = Writer(self._stream, compression=CompressionType.ZSTD)
+        self._writer.start(profile="ros2", library=program)
+        self._ids = {
+            "cycle": self._register("/ecdaq/cycle", "Cycle", CYCLE, {"offered_qos_profiles": ""}),
+            "event": self._register("/ecdaq/event", "Event", EVENT, {"offered_qos_profiles": ""}),
+            "timemap": self._register(
+                "/ecdaq/timemap", "TimeMap", TIMEMAP, {"offered_qos_profiles": ""}
+            ),
+        }
+        self._slave_ids = [
+            self._register(s.topic, s.type, s.schema(), s.metadata()) if s.fields else None
+            for s in self.slaves
+        ]
+        self._pending: dict[int, list[int]] = {}  # cycle: dc, utc, flags, bad, samples
+        self._waiting: list[Any] = []  # until every slave was heard of
+        self._first: dict[int, int] = {}
+        self._put_channels()
+
+    def _register(self, topic: str, kind: str, schema: str, metadata: dict[str, str]) -> int:
+        number = self._writer.register_schema(f"{PACKAGE}/{kind}", "ros2msg", schema.encode())
+        return self._writer.register_channel(topic, "cdr", number, metadata)
+
+    def _put_channels(self) -> None:
+        listed = [
+            {
+                "name": f.channel.name, "topic": s.topic, "field": f.name, "slave": s.position,
+                "type": f.channel.type, "direction": "output" if f.channel.is_output else "input",
+                "bit_len": f.bits, "unit": f.channel.unit, "scale": f.channel.scale,
+                "offset": f.channel.offset,
+            }
+            for s in self.slaves
+            for f in s.fields
+        ]  # fmt: skip
+        slaves = [{"name": s.name, "device": s.device, "position": s.position} for s in self.slaves]
+        told = {"period_ns": self.channels.period_ns, "slaves": slaves, "channels": listed}
+        self._writer.add_metadata("ecdaq.channels", {"json": json.dumps(told)})
+
+    def _put_session(self, first_cycle: int) -> None:
+        told = {
+            "program": self.program, "session": self.session, "file_sequence": self.number,
+            "period_ns": self.channels.period_ns, "next_cycle": first_cycle, "first_cycle": 0,
+            "cycles_before": 0, "gaps_before": 0, "cycles_missing_before": 0, "event_next": 0,
+            "event_mono_ns": 0, "slaves": len(self.slaves), "channels": len(self.channels),
+        }  # fmt: skip
+        self._writer.add_metadata("ecdaq.session", {k: str(v) for k, v in told.items()})
+
+    def _put(self, channel: int, utc_ns: int, data: bytes) -> None:
+        time_ns = max(0, utc_ns)
+        self._writer.add_message(channel, log_time=time_ns, publish_time=time_ns, data=data)
+
+    def add(self, sample: Any) -> None:
+        """A sample of any slave. The file begins with the first cycle that all slaves have."""
+        if len(self._first) < len(self.slaves):
+            self._first.setdefault(sample.slave, sample.cycle)
+            self._waiting.append(sample)
+            if len(self._first) == len(self.slaves):
+                waiting, self._waiting = self._waiting, []
+                self._put_session(max(self._first.values()))
+                for early in waiting:
+                    self._add(early)
+            return
+        self._add(sample)
+
+    def _add(self, sample: Any) -> None:
+        if sample.cycle < max(self._first.values()):
+            return
+        channel = self._slave_ids[sample.slave]
+        if channel is not None:
+            self._put(channel, sample.utc_ns, self.slaves[sample.slave].encode(sample))
+        entry = self._pending.setdefault(
+            sample.cycle, [sample.dc_time_ns, sample.utc_ns, sample.flags, 0, 0]
+        )
+        if not sample.is_good and sample.slave < 64:
+            entry[3] |= 1 << sample.slave
+        entry[4] += 1
+        if entry[4] == len(self.slaves):
+            self._flush(sample.cycle - PATIENCE_CYCLES)
+
+    def _flush(self, too_old: int) -> None:
+        """Whole cycles, in order; what is missing of one that is too old does not come any more."""
+        for cycle in sorted(self._pending):
+            dc, utc, flags, bad, samples = self._pending[cycle]
+            if samples < len(self.slaves) and cycle > too_old:
+                return
+            del self._pending[cycle]
+            self._put(
+                self._ids["cycle"], utc,
+                CYCLE_BYTES.pack(CDR_LE, cycle, dc, 0, 0, 0, 0, 0, 0, 0, flags, 0, 0, bad),
+            )  # fmt: skip
+            self.cycles += 1
+            self.last_cycle = cycle
+
+    def add_event(self, event: Any) -> None:
+        self._put(self._ids["event"], event.utc_ns, encode_event(event))
+
+    def add_timemap(self, m: Any) -> None:
+        self._put(self._ids["timemap"], m.utc_ns, encode_timemap(m))
+        names = (
+            "dc_ns", "utc_ns", "rate_ppb", "uncertainty_ns", "step_ns", "steps", "tai_offset_s"
+        )  # fmt: skip
+        told = {name: str(getattr(m, name)) for name in names}
+        self._writer.add_metadata("ecdaq.timemap", told | {"quality": m.quality})
+
+    def close(self, reason: str) -> Path:
+        """Finish it; its path."""
+        if len(self._first) < len(self.slaves):
+            self._put_session(0)
+        self._flush(-1)
+        told = {
+            "reason": reason, "cycles": self.cycles, "last_cycle": max(0, self.last_cycle),
+        }  # fmt: skip
+        self._writer.add_metadata("ecdaq.end", {k: str(v) for k, v in told.items()})
+        self._writer.finish()
+        self._stream.close()
+        self.part.rename(self.path)
+        return self.path
