@@ -9,6 +9,7 @@
 
 #include <assert.h>
 #include <stdatomic.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "histogram.h"
@@ -150,6 +151,12 @@ struct sync0_status {
 	_Atomic int64_t window_ns;
 	struct sync0_line_status line[LIMIT_SLAVES];
 };
+
+/**
+ * One line of text. A figure below the noise of the measurement is "< N (unresolved)", never 0.
+ * Returns its length as snprintf does.
+ */
+int sync0_result_format(const struct sync0_result *r, char *buf, size_t buf_len);
 
 const char *sync0_source_to_str(uint32_t source);
 const char *sync0_verdict_to_str(uint32_t verdict);

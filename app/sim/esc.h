@@ -136,6 +136,7 @@ struct esc_sync {
 	uint64_t next1_local_ns;
 	int64_t next1_true_ns;
 	uint64_t edges;
+	uint64_t pulses_lost; /* fault: so many SYNC0 pulses do not come out */
 };
 
 /* Called at each SYNC0 edge, at its true time and its system time. */

@@ -119,19 +119,21 @@ void esc_sync_edge(struct esc *esc)
 	int64_t t_ns = s->next_true_ns;
 	uint64_t system_ns = s->next_local_ns;
 	int was_high = s->is_sync0_high;
+	int is_lost = s->pulses_lost > 0;
 
 	s->edges++;
+	s->pulses_lost -= (uint64_t)is_lost;
 	s->is_pending = 0;
 	/* Without a pulse length the pin stays up until the PDI reads 0x098e (acknowledge mode). */
 	s->is_sync0_high = get_le16(esc->reg + ESC_REG_DC_PULSE_LENGTH) == 0;
-	if (esc->reg[ESC_REG_SYNC_LATCH_CONFIG] & EVENT_SYNC0) {
+	if ((esc->reg[ESC_REG_SYNC_LATCH_CONFIG] & EVENT_SYNC0) && !is_lost) {
 		esc->al_event |= ESC_AL_EVENT_SYNC0;
 	}
 	plan_sync1(esc, t_ns, system_ns);
 	s->is_running = s->cycle_ns != 0;
 	s->next_local_ns = wrapped(esc, system_ns + s->cycle_ns);
 	esc_sync_replan(esc, t_ns);
-	if (esc->sink != NULL && !was_high) {
+	if (esc->sink != NULL && !was_high && !is_lost) {
 		esc->sink(esc->sink_ctx, t_ns, system_ns);
 	}
 }

@@ -191,6 +191,7 @@ static void apply_to_frame(struct fault_plan *plan, const struct fault *f, struc
 	case FAULT_WATCHDOG:
 	case FAULT_MAILBOX_STUCK:
 	case FAULT_IDENTITY:
+	case FAULT_SYNC0_LOST:
 		break;
 	}
 }
@@ -229,6 +230,9 @@ static void apply_to_slave(const struct fault *f, struct segment *segment, int64
 		break;
 	case FAULT_IDENTITY:
 		change_identity(esc, f->product);
+		break;
+	case FAULT_SYNC0_LOST:
+		esc->sync.pulses_lost += f->count;
 		break;
 	case FAULT_PORT_ERROR:
 		esc_count_error(esc, f->port, ESC_ERROR_RX);

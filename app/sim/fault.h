@@ -18,6 +18,7 @@
  *   at=3s port-error slave=1 port=0
  *   at=3s watchdog slave=1             its process data watchdog expires
  *   at=3s mailbox-stuck slave=1 for=1s its answers are lost, for ever without for=
+ *   at=3s sync0-lost slave=1 count=3   its next SYNC0 pulses do not come out of the chip
  *   at=3s identity slave=1 product=0x1 its EEPROM names another product from now on
  */
 #ifndef SIM_FAULT_H
@@ -48,6 +49,7 @@ enum fault_action {
 	FAULT_WATCHDOG,
 	FAULT_MAILBOX_STUCK,
 	FAULT_IDENTITY,
+	FAULT_SYNC0_LOST,
 };
 
 enum fault_trigger { FAULT_AT, FAULT_FRAME, FAULT_EVERY, FAULT_PROBABLY };
@@ -65,6 +67,7 @@ struct fault {
 	double ppm;
 	uint16_t code;
 	uint32_t product;
+	uint32_t count;
 	int is_done;
 };
 

@@ -34,6 +34,7 @@ static const struct {
 	{ "watchdog", FAULT_WATCHDOG, 0, "slave" },
 	{ "mailbox-stuck", FAULT_MAILBOX_STUCK, 0, "slave" },
 	{ "identity", FAULT_IDENTITY, 0, "product" },
+	{ "sync0-lost", FAULT_SYNC0_LOST, 0, "slave" },
 };
 
 enum { ACTIONS = sizeof(actions) / sizeof(actions[0]), KEYS_MAX = 16 };
@@ -141,6 +142,9 @@ static int set_key(struct fault *f, const char *key, const char *value, size_t s
 	}
 	if (strcmp(key, "product") == 0) {
 		return parse_small(value, UINT32_MAX, &f->product);
+	}
+	if (strcmp(key, "count") == 0) {
+		return parse_small(value, UINT32_MAX, &f->count);
 	}
 	if (strcmp(key, "slave") == 0) {
 		r = slave_count == 0 ? -EINVAL : parse_small(value, slave_count - 1, &small);
@@ -263,7 +267,7 @@ static int check_whole(const struct fault *f, const struct seen *seen, char *err
 
 int fault_parse(char *line, size_t slave_count, struct fault *ret, char *error, size_t error_bytes)
 {
-	struct fault f = { .trigger = FAULT_AT };
+	struct fault f = { .trigger = FAULT_AT, .count = 1 };
 	struct seen seen = { .action = -1 };
 	char *comment = strchr(line, '#');
 	char *rest = NULL;

@@ -21,6 +21,7 @@ enum {
 	WAKE_MIN_NS = 200000, /* so near to each other events are run together */
 	WAKE_MAX_NS = 10000000,
 	CONTROL_NS = 10000000, /* how often the control socket is looked at */
+	FLUSH_NS = 50000000,   /* edges are in their file at the latest after this */
 	HELD_MAX = 64,
 	FRAME_BYTES = 1600,
 };
@@ -44,6 +45,7 @@ struct simulation {
 	int fd;
 	int control_fd;
 	int64_t control_ns; /* when it was looked at last */
+	int64_t flushed_ns;
 	uint64_t frames;
 	uint64_t bad_frames;
 };
@@ -96,6 +98,14 @@ static int open_all(struct simulation *sim)
 	}
 	sim->fd = wire_socket_open(sim->opt.interface, error, sizeof(error));
 	return sim->fd < 0 ? sim_complain(error) : 0;
+}
+
+static void flush_edges(struct simulation *sim, int64_t now_ns)
+{
+	if (sim->edges != NULL && now_ns - sim->flushed_ns >= FLUSH_NS) {
+		sim->flushed_ns = now_ns;
+		fflush(sim->edges);
+	}
 }
 
 static void go_real_time(const struct sim_options *opt)
@@ -224,6 +234,7 @@ static int64_t live_on(struct simulation *sim)
 	int64_t wait_ns;
 
 	look_at_control(sim, now_ns);
+	flush_edges(sim, now_ns);
 	segment_advance(sim->segment, now_ns);
 	event_ns = segment_next_event_ns(sim->segment);
 	wait_ns = event_ns == INT64_MAX ? WAKE_MAX_NS : event_ns - now_ns;

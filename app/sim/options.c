@@ -35,7 +35,7 @@ static const char usage_text[] =
 	"         damage slave=N\n"
 	"         to slaves (slave=N): cut, heal, power-off, power-on, reset, drift ppm=X,\n"
 	"         al-error code=X, port-error port=N, watchdog, mailbox-stuck [for=TIME],\n"
-	"         identity product=X\n"
+	"         identity product=X, sync0-lost [count=N]\n"
 	"\n"
 	"io lines: io slave=N [KEY=VALUE...]\n"
 	"         what slave N has at its terminals, some of its inputs set first: slot3=0x01,\n"

@@ -21,7 +21,11 @@ enum checker_grid {
 	CHECKER_GRID_EDGES,  /* there is no master: the first line's own edges are the cycles */
 };
 
-enum checker_mode { CHECKER_PERIODIC = 0, CHECKER_ONESHOT };
+enum checker_mode {
+	CHECKER_PERIODIC = 0,
+	CHECKER_ONESHOT,
+	CHECKER_OFF, /* it cannot be heard: nothing is said of it */
+};
 
 struct checker_line {
 	uint16_t slave_pos;

@@ -70,24 +70,42 @@ static void tell_overflow(struct checker *ck, const struct window *w, size_t num
 	}
 }
 
+/* By how much all lines stepped alike; 0: they did not. */
+static int64_t common_step(const struct checker *ck, const struct window *w, int64_t *ret_cycle)
+{
+	int64_t step_ns = 0;
+	int lines = 0;
+
+	for (size_t i = 0; i < w->line_count; i++) {
+		const struct window_line *wl = &w->line[i];
+
+		if (ck->spec.line[i].mode != CHECKER_PERIODIC) {
+			continue;
+		}
+		if (wl->step_ns == 0 || (lines > 0 && llabs(wl->step_ns - step_ns) >
+							      ck->spec.period_ns / ALIKE_SHARE)) {
+			return 0;
+		}
+		step_ns = wl->step_ns;
+		*ret_cycle = wl->step_cycle;
+		lines++;
+	}
+	return lines > 1 ? step_ns : 0;
+}
+
 /* All lines stepped alike: it was the clock that they are timed with. */
 static void find_common_step(struct checker *ck, struct window *w)
 {
-	int64_t step_ns = w->line[0].step_ns;
+	int64_t cycle = 0;
+	int64_t step_ns = w->clock_step_ns == 0 ? common_step(ck, w, &cycle) : 0;
 	struct event ev;
 
-	if (w->line_count < 2 || step_ns == 0 || w->clock_step_ns != 0) {
+	if (step_ns == 0) {
 		return;
 	}
-	for (size_t i = 1; i < w->line_count; i++) {
-		if (w->line[i].step_ns == 0 ||
-		    llabs(w->line[i].step_ns - step_ns) > ck->spec.period_ns / ALIKE_SHARE) {
-			return;
-		}
-	}
 	w->clock_step_ns = step_ns;
-	w->clock_step_cycle = w->line[0].step_cycle;
-	ev = checker_event(ck, 0, EVENT_SYNC0_CLOCK_STEP, w->clock_step_cycle);
+	w->clock_step_cycle = cycle;
+	ev = checker_event(ck, 0, EVENT_SYNC0_CLOCK_STEP, cycle);
 	ev.slave_pos = EVENT_NO_SLAVE;
 	ev.line = 0;
 	ev.arg[0] = alarm_clamp((double)step_ns);

@@ -144,7 +144,7 @@ void checker_edge(struct checker *ck, const struct edge *edge)
 {
 	struct track_out out;
 
-	if (edge->line >= ck->spec.line_count) {
+	if (edge->line >= ck->spec.line_count || ck->spec.line[edge->line].mode == CHECKER_OFF) {
 		return;
 	}
 	if (ck->spec.line[edge->line].mode == CHECKER_ONESHOT) {

@@ -186,12 +186,14 @@ static void frame_distance(const struct window *w, const struct window_line *wl,
 	ret->frame_ns = stat_median(room->scratch, n);
 }
 
-static void skew(const struct window *w, const struct window_line *wl,
-		 const struct figures_spec *spec, const struct judge_noise *noise,
-		 const struct figures_room *room, struct sync0_result *ret)
+static void skew(const struct window *w, size_t number, const struct figures_spec *spec,
+		 const struct judge_noise *noise, const struct figures_room *room,
+		 struct sync0_result *ret)
 {
+	const struct window_line *wl = &w->line[number];
 	const struct window_line *first = &w->line[0];
-	int64_t asked_ns = spec->shift_ns - spec->first_shift_ns + noise->bias_ns;
+	int is_pair = number == 1 && noise->has_pair;
+	int64_t asked_ns = spec->shift_ns - spec->first_shift_ns + (is_pair ? noise->bias_ns : 0);
 	struct stat_fit fit;
 	size_t n = 0;
 
@@ -206,7 +208,8 @@ static void skew(const struct window *w, const struct window_line *wl,
 	}
 	ret->has |= SYNC0_HAS_SKEW;
 	ret->skew_ns = llround(fit.offset);
-	ret->skew_error_ns = (int64_t)ceil(fit.offset_error) + noise->bias_error_ns;
+	ret->skew_error_ns = (int64_t)ceil(fit.offset_error) + noise->bias_error_ns +
+			     (is_pair ? 0 : llabs(noise->bias_ns));
 }
 
 void figures_compute(const struct window *w, size_t number, const struct figures_spec *spec,
@@ -235,6 +238,6 @@ void figures_compute(const struct window *w, size_t number, const struct figures
 	against_frames(w, &edges, spec, base_ns, room, ret);
 	frame_distance(w, wl, room, ret);
 	if (number > 0) {
-		skew(w, wl, spec, noise, room, ret);
+		skew(w, number, spec, noise, room, ret);
 	}
 }

@@ -27,8 +27,9 @@ struct judge_noise {
 	int64_t sd_ns;
 	int64_t p99_ns; /* of |interval - mean| */
 	int64_t max_ns;
+	int has_pair;          /* first and second line are those of the calibration */
 	int64_t bias_ns;       /* second line behind the first: order of service */
-	int64_t bias_error_ns; /* of that, for another pair, too */
+	int64_t bias_error_ns; /* of that; of other lines, the bias itself is the error */
 };
 
 /** Fill verdict, check and is_resolved of @r. @shift_ns: where the line's SYNC0 was asked to be. */

@@ -1,0 +1,168 @@
+/* SPDX-License-Identifier: MIT */
+#include "sync0/lines.h"
+
+#include <errno.h>
+#include <poll.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/limits.h"
+#include "sync0/gpio.h"
+
+enum { EDGES = 256 };
+
+struct one_line {
+	struct gpio *gpio; /* NULL: not open */
+	uint16_t slave_pos;
+	const char *text;
+	char said[GPIO_WHY_BYTES];
+};
+
+struct lines {
+	const struct config *cfg;
+	const char *dev_dir;
+	struct one_line line[LIMIT_SLAVES];
+	size_t count;
+};
+
+struct lines *lines_create(const struct config *cfg, const char *dev_dir)
+{
+	struct lines *l = calloc(1, sizeof(*l));
+
+	if (l == NULL) {
+		return NULL;
+	}
+	l->cfg = cfg;
+	l->dev_dir = dev_dir;
+	for (size_t i = 0; i < cfg->slave_count; i++) {
+		if (cfg->slave[i].sync0_line[0] != '\0') {
+			l->line[l->count++] = (struct one_line){ .slave_pos = (uint16_t)i,
+								 .text = cfg->slave[i].sync0_line };
+		}
+	}
+	if (l->count == 0) {
+		free(l);
+		errno = ENOENT;
+		return NULL;
+	}
+	return l;
+}
+
+void lines_destroy(struct lines *l)
+{
+	if (l == NULL) {
+		return;
+	}
+	for (size_t i = 0; i < l->count; i++) {
+		gpio_close(l->line[i].gpio);
+	}
+	free(l);
+}
+
+size_t lines_count(const struct lines *l)
+{
+	return l->count;
+}
+
+uint16_t lines_slave(const struct lines *l, size_t line)
+{
+	return l->line[line].slave_pos;
+}
+
+const char *lines_text(const struct lines *l, size_t line)
+{
+	return l->line[line].text;
+}
+
+int lines_is_open(const struct lines *l, size_t line)
+{
+	return l->line[line].gpio != NULL;
+}
+
+int lines_is_hte(const struct lines *l, size_t line)
+{
+	return l->line[line].gpio != NULL && gpio_is_hte(l->line[line].gpio);
+}
+
+/* The same reason is not told a second time. */
+static void complain(struct lines *l, size_t number, const char *why, lines_tell tell, void *ctx)
+{
+	struct one_line *ol = &l->line[number];
+
+	if (strcmp(ol->said, why) != 0) {
+		memcpy(ol->said, why, strlen(why) + 1);
+		tell(ctx, number, why);
+	}
+}
+
+size_t lines_open(struct lines *l, lines_tell tell, void *ctx)
+{
+	size_t open = 0;
+
+	for (size_t i = 0; i < l->count; i++) {
+		struct one_line *ol = &l->line[i];
+		const struct gpio_spec spec = {
+			.line = ol->text,
+			.dev_dir = l->dev_dir,
+			.buffer = l->cfg->sync0_buffer,
+			.clock = l->cfg->sync0_clock,
+		};
+		char why[GPIO_WHY_BYTES] = "";
+
+		if (ol->gpio != NULL) {
+			open++;
+			continue;
+		}
+		if (gpio_open(&spec, &ol->gpio, why) < 0) {
+			ol->gpio = NULL;
+			complain(l, i, why, tell, ctx);
+			continue;
+		}
+		ol->said[0] = '\0';
+		open++;
+		tell(ctx, i, NULL);
+	}
+	return open;
+}
+
+void lines_wait(const struct lines *l, int ms)
+{
+	struct pollfd fds[LIMIT_SLAVES];
+	nfds_t n = 0;
+
+	for (size_t i = 0; i < l->count; i++) {
+		if (l->line[i].gpio != NULL) {
+			fds[n++] =
+				(struct pollfd){ .fd = gpio_fd(l->line[i].gpio), .events = POLLIN };
+		}
+	}
+	poll(fds, n, ms);
+}
+
+static int read_line(struct lines *l, size_t number,
+		     void (*take)(void *ctx, const struct edge *edge), void *ctx)
+{
+	struct edge edges[EDGES];
+	int n;
+
+	do {
+		n = gpio_read(l->line[number].gpio, edges, EDGES);
+		for (int i = 0; i < n; i++) {
+			edges[i].line = (uint16_t)number;
+			take(ctx, &edges[i]);
+		}
+	} while (n == EDGES);
+	return n;
+}
+
+void lines_read(struct lines *l, void (*take)(void *ctx, const struct edge *edge), lines_tell tell,
+		void *ctx)
+{
+	for (size_t i = 0; i < l->count; i++) {
+		if (l->line[i].gpio != NULL && read_line(l, i, take, ctx) < 0) {
+			gpio_close(l->line[i].gpio);
+			l->line[i].gpio = NULL;
+			complain(l, i, "its chip is gone", tell, ctx);
+		}
+	}
+}

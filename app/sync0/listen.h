@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: MIT */
+/* The calibration run: one signal on the first two lines. Context: blocking. */
+#ifndef SYNC0_LISTEN_H
+#define SYNC0_LISTEN_H
+
+#include <signal.h>
+#include <stdio.h>
+
+#include "config/config.h"
+
+/**
+ * Listen to the first two lines of @cfg until there are enough edges, compute, tell @out and store.
+ * Ends early when *@has_stopped. 0, or -errno with a line in @why (512).
+ */
+int listen_calibrate(const struct config *cfg, const char *dev_dir,
+		     const volatile sig_atomic_t *has_stopped, FILE *out, char *why);
+
+#endif

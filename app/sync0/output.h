@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * Where results and alarms go: a ring of results, a ring of events and a status page in the run
+ * directory, for ecdaq-record, ecdaq-dds and ecdaq. Context: blocking.
+ */
+#ifndef SYNC0_OUTPUT_H
+#define SYNC0_OUTPUT_H
+
+#include "base/event.h"
+#include "base/sync0.h"
+#include "config/config.h"
+
+struct output;
+
+/** NULL with errno. Nothing is in the run directory yet. Free with output_destroy(). */
+struct output *output_create(const struct config *cfg, enum sync0_source source);
+void output_destroy(struct output *out);
+
+/** Make rings and page if they are not there yet. 0 or -errno: the run directory is not there. */
+int output_open(struct output *out);
+
+/** The page, to be filled; never NULL (one of its own until output_open() has succeeded). */
+struct sync0_status *output_page(struct output *out);
+/** Say @text on the page, and on standard error if it is not what was said last. */
+void output_say(struct output *out, const char *text);
+
+void output_result(struct output *out, const struct sync0_result *result);
+void output_event(struct output *out, const struct event *event);
+
+#endif

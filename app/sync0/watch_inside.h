@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: MIT */
+/* Between the files of the watch; not for others. */
+#ifndef SYNC0_WATCH_INSIDE_H
+#define SYNC0_WATCH_INSIDE_H
+
+#include "base/limits.h"
+#include "sync0/calibration.h"
+#include "sync0/checker.h"
+#include "sync0/edge_file.h"
+#include "sync0/lines.h"
+#include "sync0/master.h"
+#include "sync0/output.h"
+#include "sync0/watch.h"
+
+struct watch {
+	struct watch_spec spec;
+	struct output *out;
+	struct master *master;
+	struct checker *checker; /* of the session; NULL: none */
+	int has_session;
+	int has_news;            /* a line was opened, or is gone: begin anew */
+	struct lines *lines;     /* NULL: simulated */
+	struct edge_file *edges; /* the simulation's; NULL: not open */
+	struct calibration calibration;
+	uint64_t line_of_slave[LIMIT_SLAVES]; /* plus one; 0: none */
+	size_t line_count;
+	int64_t since_ns;  /* edges are heard from here on */
+	int64_t newest_ns; /* edge of the file */
+	int64_t tried_ns;
+	char master_path[CONFIG_PATH_BYTES];
+};
+
+int64_t watch_now_ns(const struct watch *w);
+void watch_set_state(struct watch *w, enum sync0_state state);
+/** The status page's lines: which they are, of which slaves. */
+void watch_name_lines(struct watch *w);
+/** Make a checker for the master's open session. */
+void watch_begin_session(struct watch *w);
+void watch_end_session(struct watch *w);
+/** Give the master's cycles to the checker. 0 when its session has ended. */
+int watch_read_master(struct watch *w);
+
+#endif

@@ -1,0 +1,193 @@
+/* SPDX-License-Identifier: MIT */
+/* One session of the master: its cycles to a checker, and what that says to the readers. */
+#include <errno.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "sync0/watch_inside.h"
+
+/* Behind the start: listening has begun for sure. */
+#define SETTLE_NS (NS_PER_S / 10)
+
+/* --- what comes out of the checker --- */
+
+static void on_result(void *ctx, const struct sync0_result *r)
+{
+	struct watch *w = ctx;
+
+	output_result(w->out, r);
+	watch_set_state(w, SYNC0_RUNNING);
+}
+
+static void on_event(void *ctx, const struct event *ev)
+{
+	output_event(((struct watch *)ctx)->out, ev);
+}
+
+static void on_deviation(void *ctx, size_t line, int64_t ns)
+{
+	struct watch *w = ctx;
+
+	histogram_add(&output_page(w->out)->line[line].deviation, ns);
+}
+
+/* A simulation has an edge of every slave with DC: each is a line. */
+static void lines_of_session(struct watch *w)
+{
+	const struct sample_meta *meta = master_meta(w->master);
+	const struct slave_info *slave = sample_meta_slaves(meta);
+	struct sync0_status *page = output_page(w->out);
+
+	if (w->lines == NULL) {
+		memset(w->line_of_slave, 0, sizeof(w->line_of_slave));
+		w->line_count = 0;
+		for (uint32_t i = 0; i < meta->slave_count; i++) {
+			if (slave[i].has_dc && slave[i].slave_pos < LIMIT_SLAVES) {
+				w->line_of_slave[slave[i].slave_pos] = ++w->line_count;
+			}
+		}
+		watch_name_lines(w);
+	}
+	for (uint32_t i = 0; i < meta->slave_count; i++) {
+		uint64_t line = slave[i].slave_pos < LIMIT_SLAVES
+					? w->line_of_slave[slave[i].slave_pos]
+					: 0;
+
+		if (line > 0) {
+			snprintf(page->line[line - 1].slave, sizeof(page->line[0].slave), "%.31s",
+				 slave[i].name);
+		}
+	}
+}
+
+static enum checker_mode mode_of(const struct watch *w, uint16_t pos)
+{
+	if (w->lines != NULL && !lines_is_open(w->lines, w->line_of_slave[pos] - 1)) {
+		return CHECKER_OFF;
+	}
+	return w->spec.cfg->slave[pos].mode == CONFIG_MODE_ONESHOT ? CHECKER_ONESHOT
+								   : CHECKER_PERIODIC;
+}
+
+static void fill_lines(const struct watch *w, struct checker_spec *spec)
+{
+	const struct config *cfg = w->spec.cfg;
+
+	spec->line_count = w->line_count;
+	for (uint16_t pos = 0; pos < LIMIT_SLAVES; pos++) {
+		if (w->line_of_slave[pos] > 0) {
+			spec->line[w->line_of_slave[pos] - 1] = (struct checker_line){
+				.slave_pos = pos,
+				.mode = mode_of(w, pos),
+				.shift_ns = cfg->slave[pos].sync0_shift_ns,
+			};
+		}
+	}
+}
+
+static struct checker_spec session_spec(struct watch *w)
+{
+	const struct config *cfg = w->spec.cfg;
+	const struct sample_meta *meta = master_meta(w->master);
+	int64_t now = watch_now_ns(w);
+	int64_t heard_ns = w->since_ns > now ? w->since_ns : now;
+	struct checker_spec spec = {
+		.period_ns = (int64_t)meta->period_ns,
+		.window_ns = cfg->sync0_window_ns,
+		.lost_ns = cfg->sync0_lost_ns,
+		.since_ns = heard_ns + SETTLE_NS,
+		.grid = CHECKER_GRID_MASTER,
+		.source = w->lines == NULL ? SYNC0_SIMULATED : SYNC0_GPIO,
+		.session = meta->session,
+		.mono_to_tai_ns = w->spec.platform.tai_ns(w->spec.platform.ctx) - now,
+		.limits = { .drift_ppb = cfg->sync0_drift_limit_ppm * 1000,
+			    .rate_ppb = cfg->sync0_rate_limit_ppm * 1000,
+			    .jitter_ns = cfg->sync0_jitter_limit_ns,
+			    .phase_ns = cfg->sync0_phase_limit_ns,
+			    .skew_ns = cfg->sync0_skew_limit_ns },
+		.noise = w->calibration.noise,
+		.result = on_result,
+		.event = on_event,
+		.deviation = on_deviation,
+		.ctx = w,
+	};
+
+	fill_lines(w, &spec);
+	return spec;
+}
+
+void watch_begin_session(struct watch *w)
+{
+	struct checker_spec spec;
+	uint64_t shots = 0;
+	int r;
+
+	w->has_session = 1;
+	w->has_news = 0;
+	lines_of_session(w);
+	spec = session_spec(w);
+	r = checker_create(&spec, &w->checker);
+	if (r < 0) {
+		w->checker = NULL;
+		output_say(w->out, r == -EINVAL ? "no slave of the segment has distributed clocks"
+						: strerror(-r));
+		watch_set_state(w, SYNC0_NO_DC);
+		return;
+	}
+	for (size_t i = 0; i < spec.line_count; i++) {
+		if (spec.line[i].mode == CHECKER_ONESHOT) {
+			shots |= UINT64_C(1) << spec.line[i].slave_pos;
+		}
+	}
+	master_watch_shots(w->master, shots);
+	watch_set_state(w, SYNC0_LEARNING);
+}
+
+void watch_end_session(struct watch *w)
+{
+	if (w->checker != NULL) {
+		checker_finish(w->checker);
+		checker_destroy(w->checker);
+		w->checker = NULL;
+	}
+	w->has_session = 0;
+	watch_set_state(w, SYNC0_WAITING);
+}
+
+static void take_cycle(struct watch *w, const struct master_item *item)
+{
+	const struct checker_cycle *cy = &item->cycle;
+
+	if (!item->has_dc) {
+		watch_set_state(w, SYNC0_NO_DC);
+		return;
+	}
+	if (w->spec.dump != NULL) {
+		fprintf(w->spec.dump,
+			"c %" PRId64 " %" PRId64 " %" PRId64 " %" PRId64 " %" PRId64 " %" PRId64
+			" %d\n",
+			cy->cycle, cy->due_dc_ns, cy->frame_dc_ns, cy->frame_mono_ns,
+			cy->frame_latency_ns, cy->dc_diff_ns, cy->is_judged);
+	}
+	if (w->checker == NULL) {
+		return;
+	}
+	checker_cycle(w->checker, cy);
+	for (size_t i = 0; i < item->shots; i++) {
+		checker_shot(w->checker, w->line_of_slave[item->shot[i].slave_pos] - 1,
+			     item->shot[i].dc_ns);
+	}
+}
+
+int watch_read_master(struct watch *w)
+{
+	struct master_item item;
+	int r;
+
+	while ((r = master_next(w->master, &item)) == 1) {
+		take_cycle(w, &item);
+	}
+	return r == 0;
+}
