@@ -68,6 +68,21 @@ enum event_severity event_severity(uint16_t id)
 	return id < EVENT_COUNT ? kinds[id].severity : EVENT_ERROR;
 }
 
+const char *event_severity_to_str(enum event_severity severity)
+{
+	switch (severity) {
+	case EVENT_INFO:
+		return "info";
+	case EVENT_NOTICE:
+		return "notice";
+	case EVENT_WARNING:
+		return "warning";
+	case EVENT_ERROR:
+		break;
+	}
+	return "error";
+}
+
 const char *event_rt_to_str(uint32_t which)
 {
 	static const char *const names[EVENT_RT_COUNT] = {

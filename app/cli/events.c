@@ -24,8 +24,6 @@ struct events {
 	uint64_t count;               /* the last so many; 0: all */
 };
 
-static const char *const severities[] = { "info", "notice", "warning", "error" };
-
 static int64_t clock_ns(clockid_t clock)
 {
 	struct timespec ts;
@@ -48,7 +46,7 @@ static void print_json(const struct event *ev, const char *text)
 	json_init(&js, stdout);
 	json_object_begin(&js, NULL);
 	json_text(&js, "event", event_name(ev->id));
-	json_text(&js, "severity", severities[event_severity(ev->id)]);
+	json_text(&js, "severity", event_severity_to_str(event_severity(ev->id)));
 	json_text(&js, "utc", text_utc(utc_of(ev), utc));
 	json_i64(&js, "mono_ns", ev->mono_ns);
 	json_i64(&js, "tai_ns", ev->tai_ns);
@@ -81,7 +79,7 @@ static void print(const struct events *events, const struct event *ev)
 		print_json(ev, text);
 	} else {
 		printf("%s  %-7s  %s\n", text_utc(utc_of(ev), utc),
-		       severities[event_severity(ev->id)], text);
+		       event_severity_to_str(event_severity(ev->id)), text);
 	}
 }
 
@@ -165,9 +163,9 @@ static enum cli_exit parse_level(struct events *events)
 	if (events->level == NULL) {
 		return CLI_OK;
 	}
-	for (unsigned i = 0; i < sizeof(severities) / sizeof(severities[0]); i++) {
-		if (strcmp(severities[i], events->level) == 0) {
-			events->severity = (enum event_severity)i;
+	for (int level = EVENT_INFO; level <= EVENT_ERROR; level++) {
+		if (strcmp(event_severity_to_str((enum event_severity)level), events->level) == 0) {
+			events->severity = (enum event_severity)level;
 			return CLI_OK;
 		}
 	}

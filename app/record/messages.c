@@ -179,7 +179,7 @@ size_t messages_encode_event(const struct messages_event *ev, uint8_t *buf)
 	cdr_put(&c, (uint32_t)slave, 4);
 	cdr_put(&c, e->id, 2);
 	cdr_put_string(&c, event_name(e->id));
-	cdr_put_string(&c, messages_severity_to_str(event_severity(e->id)));
+	cdr_put_string(&c, event_severity_to_str(event_severity(e->id)));
 	cdr_put_string(&c, text);
 	return c.len;
 }
@@ -216,19 +216,4 @@ int messages_decode_event(const uint8_t *data, size_t data_len, uint64_t *ret_se
 	*ret_mono_ns = (int64_t)get_le64(data + CDR_HEADER_BYTES + 8);
 	*ret_sequence = get_le64(data + CDR_HEADER_BYTES + 16);
 	return 0;
-}
-
-const char *messages_severity_to_str(enum event_severity severity)
-{
-	switch (severity) {
-	case EVENT_INFO:
-		return "info";
-	case EVENT_NOTICE:
-		return "notice";
-	case EVENT_WARNING:
-		return "warning";
-	case EVENT_ERROR:
-		return "error";
-	}
-	return "unknown";
 }

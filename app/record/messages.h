@@ -49,6 +49,4 @@ int messages_decode_cycle(const uint8_t *data, size_t data_len, uint64_t *ret_cy
 int messages_decode_event(const uint8_t *data, size_t data_len, uint64_t *ret_sequence,
 			  int64_t *ret_mono_ns);
 
-const char *messages_severity_to_str(enum event_severity severity);
-
 #endif
