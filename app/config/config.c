@@ -165,6 +165,21 @@ int config_parse_duration(const char *text, int64_t *ret_ns, char *why)
 	return option_parse(&duration, text, ret_ns, why);
 }
 
+int config_assemble(const char *path, const char *const *set, size_t set_count, struct config *cfg,
+		    char *error, size_t error_bytes)
+{
+	int r = 0;
+
+	config_defaults(cfg);
+	if (path != NULL) {
+		r = config_load(path, cfg, error, error_bytes);
+	}
+	for (size_t i = 0; r == 0 && i < set_count; i++) {
+		r = config_set(cfg, set[i], error, error_bytes);
+	}
+	return r;
+}
+
 int config_check(const struct config *cfg, char *error, size_t error_bytes)
 {
 	char why[OPTION_WHY_BYTES] = "";

@@ -164,6 +164,12 @@ int config_parse(const char *name, const char *text, size_t text_len, struct con
  * How options must fit to each other is not looked at: call config_check() after the last one.
  */
 int config_set(struct config *cfg, const char *assignment, char *error, size_t error_bytes);
+/**
+ * What a command line asks for: the defaults, the file @path over them (NULL: none), then
+ * @set_count assignments in order. Same errors. config_check() has not been asked for what was set.
+ */
+int config_assemble(const char *path, const char *const *set, size_t set_count, struct config *cfg,
+		    char *error, size_t error_bytes);
 /** Do the options fit to each other? config_load() and config_parse() have asked already. 0 or
  * -EINVAL. */
 int config_check(const struct config *cfg, char *error, size_t error_bytes);

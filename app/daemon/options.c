@@ -145,15 +145,9 @@ int options_apply(const struct options *options, struct config *ret_cfg, struct 
 {
 	static struct config cfg; /* large, and filled once at start */
 	char error[FAILURE_TEXT_BYTES] = "";
-	int r = 0;
+	int r = config_assemble(options->config_path, options->set, options->set_count, &cfg, error,
+				sizeof(error));
 
-	config_defaults(&cfg);
-	if (options->config_path != NULL) {
-		r = config_load(options->config_path, &cfg, error, sizeof(error));
-	}
-	for (size_t i = 0; r == 0 && i < options->set_count; i++) {
-		r = config_set(&cfg, options->set[i], error, sizeof(error));
-	}
 	if (r < 0) {
 		return refuse(failure, r, error);
 	}

@@ -4,30 +4,7 @@
 
 #include "config/config.h"
 #include "harness/test.h"
-
-static void parse_ok(const char *text, struct config *cfg)
-{
-	char error[256] = "";
-
-	memset(cfg, 0x5a, sizeof(*cfg));
-	if (config_parse("t.yaml", text, strlen(text), cfg, error, sizeof(error)) != 0) {
-		test_fail(__FILE__, __LINE__, "refused: %s", error);
-	}
-}
-
-/* @text must be refused with just this one line, and leave the configuration as it was. */
-static void parse_fails(const char *text, const char *wanted)
-{
-	static struct config before;
-	static struct config cfg;
-	char error[256] = "nothing said";
-
-	memset(&cfg, 0x5a, sizeof(cfg));
-	before = cfg;
-	CHECK_EQ(config_parse("t.yaml", text, strlen(text), &cfg, error, sizeof(error)), -EINVAL);
-	CHECK_STR(error, wanted);
-	CHECK_MEM(&cfg, &before, sizeof(cfg));
-}
+#include "unit/config/parsing.h"
 
 TEST(config, options_that_do_not_fit_to_each_other_blame_a_line_of_the_file)
 {

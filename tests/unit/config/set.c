@@ -115,3 +115,39 @@ TEST(config, dds_wants_an_interface_of_its_own)
 	CHECK_EQ(config_check(&cfg, error, sizeof(error)), -EINVAL);
 	CHECK_STR(error, "dds.peers: must be addresses or host names with commas between");
 }
+
+TEST(config, a_command_line_is_the_defaults_then_the_file_then_what_is_set_in_order)
+{
+	static const char *const set[] = { "cycle.priority=70", "cycle.period=2ms",
+					   "cycle.priority=71" };
+	static const char text[] = "cycle:\n  priority: 60\n  cpu: 2\n";
+	static struct config cfg;
+	char path[] = "/tmp/ecdaq-assemble-XXXXXX";
+	int fd = mkstemp(path);
+	char error[256] = "";
+
+	CHECK(fd >= 0);
+	CHECK_EQ(write(fd, text, sizeof(text) - 1), sizeof(text) - 1);
+	CHECK_EQ(close(fd), 0);
+	CHECK_EQ(config_assemble(path, set, 3, &cfg, error, sizeof(error)), 0);
+	CHECK_EQ(unlink(path), 0);
+	CHECK_EQ(cfg.cycle_priority, 71);
+	CHECK_EQ(cfg.cycle_cpu, 2);
+	CHECK_EQ(cfg.cycle_period_ns, 2000000);
+	CHECK_EQ(config_assemble(NULL, set, 1, &cfg, error, sizeof(error)), 0);
+	CHECK_EQ(cfg.cycle_priority, 70);
+	CHECK_EQ(cfg.cycle_cpu, -1);
+	CHECK_STR(error, "");
+}
+
+TEST(config, a_command_line_ends_at_its_first_mistake)
+{
+	static const char *const set[] = { "cycle.priority=many", "cycle.perid=1ms" };
+	static struct config cfg;
+	char error[256] = "";
+
+	CHECK_EQ(config_assemble("/absent.yaml", set, 2, &cfg, error, sizeof(error)), -ENOENT);
+	CHECK(strstr(error, "/absent.yaml") != NULL);
+	CHECK_EQ(config_assemble(NULL, set, 2, &cfg, error, sizeof(error)), -EINVAL);
+	CHECK(strstr(error, "cycle.priority: ") == error);
+}
