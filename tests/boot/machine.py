@@ -21,6 +21,7 @@ NAME = "ecdaq-image-ecdaq-qemuarm64"
 TOOLS = TOP / "app" / "tools" / "image"
 # An emulator on a busy machine: limits that only a hang exceeds.
 BOOT_S = float(os.environ.get("ECDAQ_BOOT_SECONDS", "900"))
+COMMAND_S = 600.0
 POLL_S = 0.2
 ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]|\r")
 
@@ -197,7 +198,7 @@ class Machine:
             *("-o", "ConnectTimeout=30", *options, f"operator@{where[0]}"),
         ]
 
-    def try_run(self, command: str, seconds: float = 120) -> subprocess.CompletedProcess[str]:
+    def try_run(self, command: str, seconds: float = COMMAND_S) -> subprocess.CompletedProcess[str]:
         """A shell command in the guest; its exit code is the caller's to judge."""
         return subprocess.run(
             [*self.ssh_command(), command],
@@ -207,7 +208,7 @@ class Machine:
             check=False,
         )
 
-    def run(self, command: str, seconds: float = 120) -> str:
+    def run(self, command: str, seconds: float = COMMAND_S) -> str:
         """A shell command in the guest that has to succeed; what it printed."""
         result = self.try_run(command, seconds)
         assert result.returncode == 0, f"{command}: {result.returncode}\n{result.stderr}"
@@ -217,7 +218,7 @@ class Machine:
         """What a command in the guest printed, as JSON."""
         return json.loads(self.run(command))
 
-    def wait_until(self, what: str, command: str, seconds: float = 120) -> None:
+    def wait_until(self, what: str, command: str, seconds: float = COMMAND_S) -> None:
         """Until a command in the guest succeeds."""
         wait_for(what, seconds, lambda: self.try_run(command).returncode == 0)
 
