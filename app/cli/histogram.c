@@ -19,15 +19,17 @@
 enum { ROWS_PER_OCTAVE = 4, BUCKETS_PER_ROW = (1 << HISTOGRAM_SUB_BITS) / ROWS_PER_OCTAVE };
 enum { ROWS = HISTOGRAM_BUCKETS / BUCKETS_PER_ROW };
 
-static const struct histogram *find(const struct cycle_stats *st, const char *name)
+static const struct histogram *find(const struct status_page *page, const char *name)
 {
+	const struct cycle_stats *st = &page->cycle;
 	const struct {
 		const char *name;
 		const struct histogram *histogram;
 	} known[] = { { "wake", &st->wake_latency },
 		      { "round-trip", &st->round_trip },
 		      { "phase", &st->phase },
-		      { "work", &st->work } };
+		      { "work", &st->work },
+		      { "control", &page->control.time } };
 
 	for (size_t i = 0; i < sizeof(known) / sizeof(known[0]); i++) {
 		if (strcmp(known[i].name, name) == 0) {
@@ -149,9 +151,10 @@ enum cli_exit verb_histogram(struct cli *cli, int argc, char **argv)
 	if (result != CLI_OK) {
 		return result;
 	}
-	h = find(&page->cycle, args.operands[0]);
+	h = find(page, args.operands[0]);
 	if (h == NULL) {
-		result = cli_fail(cli, CLI_USAGE, "%s: is none of wake, round-trip, phase, work",
+		result = cli_fail(cli, CLI_USAGE,
+				  "%s: is none of wake, round-trip, phase, work, control",
 				  args.operands[0]);
 	} else if (is_json) {
 		print_json(h, args.operands[0]);

@@ -45,17 +45,19 @@ static const struct verb verbs[] = {
 	  "USINT UINT UDINT ULINT REAL LREAL, and for reading STRING.\n",
 	  verb_sdo },
 	{ "events", "", "What happened, oldest first.", NULL, verb_events },
-	{ "histogram", "wake|round-trip|phase|work", "A histogram as bars.",
+	{ "histogram", "wake|round-trip|phase|work|control", "A histogram as bars.",
 	  "wake: wake-up latency. round-trip: frame out to frame back. phase: magnitude of the "
 	  "phase\n"
-	  "error, from lock on. work: wake to end of work.\n",
+	  "error, from lock on. work: wake to end of work. control: one call of the control "
+	  "program.\n",
 	  verb_histogram },
 	{ "log", "...", "Recordings: list, info, check, recover, export (see ecdaq log --help).",
 	  NULL, verb_log },
 	{ "security", "init|add-subscriber|add-commander|check [NAME|DIR]",
 	  "The keys of DDS Security (app/doc/dds.md).",
 	  "ecdaq security init makes a store with the appliance's keys, add-subscriber NAME and\n"
-	  "add-commander NAME those of a participant; check DIR looks at one participant's folder.\n",
+	  "add-commander NAME those of a participant; check DIR looks at one participant's "
+	  "folder.\n",
 	  verb_security },
 	{ "doctor", "", "Is this machine fit for the cycle? Each check with what mends it.",
 	  "OK, WARN: costs latency or safety. FAIL: measuring cannot be relied on. SKIP: does not\n"

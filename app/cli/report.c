@@ -143,21 +143,46 @@ static void write_cycle(const struct report *report, FILE *out)
 		GET(st->samples_good), GET(st->samples_bad), GET(st->samples_bad_unexplained));
 }
 
-static void write_times(const struct cycle_stats *st, FILE *out)
+/* Nothing where there is none. */
+static void write_control(const struct status_page *page, FILE *out)
 {
+	const struct control_status *st = &page->control;
+	char plain[TEXT_BYTES * 4];
+	char budget[TEXT_BYTES];
+
+	if (GET(st->state) == CONTROL_NONE) {
+		return;
+	}
+	fprintf(out,
+		"control    %s: %s   %" PRIu64 " calls   %" PRIu64
+		" beyond %s   asked for safety %" PRIu64 "   values limited %" PRIu64
+		", refused %" PRIu64 "\n",
+		text_plain(st->name, plain, sizeof(plain)), control_state_to_str(GET(st->state)),
+		GET(st->calls), GET(st->overruns), text_ns(st->budget_ns, budget),
+		GET(st->safe_cycles), GET(st->limited), GET(st->refused));
+}
+
+static void write_times(const struct status_page *page, FILE *out)
+{
+	const struct cycle_stats *st = &page->cycle;
 	const struct {
 		const char *name;
 		const struct histogram *histogram;
 	} rows[] = { { "wake", &st->wake_latency },
 		     { "round trip", &st->round_trip },
 		     { "phase", &st->phase },
-		     { "work", &st->work } };
+		     { "work", &st->work },
+		     { "control", &page->control.time } };
+	size_t count = sizeof(rows) / sizeof(rows[0]);
 	char p50[TEXT_BYTES];
 	char p999[TEXT_BYTES];
 	char max[TEXT_BYTES];
 
 	fprintf(out, "%-10s %11s %11s %11s\n", "time", "p50", "p99.9", "max");
-	for (size_t i = 0; i < sizeof(rows) / sizeof(rows[0]); i++) {
+	if (GET(page->control.state) == CONTROL_NONE) {
+		count--;
+	}
+	for (size_t i = 0; i < count; i++) {
 		const struct histogram *h = rows[i].histogram;
 
 		if (GET(h->count) == 0) {
@@ -270,7 +295,8 @@ void report_write_screen(const struct report *report, FILE *out)
 	write_message(report->page, out);
 	write_degraded(report->page, out);
 	write_cycle(report, out);
-	write_times(&report->page->cycle, out);
+	write_control(report->page, out);
+	write_times(report->page, out);
 	write_recorder(report, out);
 	write_dds(report, out);
 	if (count > 0) {
@@ -295,7 +321,8 @@ void report_write_summary(const struct report *report, FILE *out)
 		GET(st->cycles), GET(st->frames_lost), GET(st->frames_late), GET(st->overruns),
 		GET(st->samples_good), GET(st->samples_bad), GET(st->samples_bad_unexplained),
 		GET(st->page_faults));
-	write_times(st, out);
+	write_control(report->page, out);
+	write_times(report->page, out);
 	write_recorder(report, out);
 	write_dds(report, out);
 	write_message(report->page, out);

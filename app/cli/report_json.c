@@ -150,6 +150,31 @@ static void write_dds(struct json *js, const struct report *report)
 	json_object_end(js);
 }
 
+static void write_control(struct json *js, const struct status_page *page)
+{
+	const struct control_status *st = &page->control;
+	char text[sizeof(st->path)];
+
+	if (GET(st->state) == CONTROL_NONE) {
+		json_null(js, "control");
+		return;
+	}
+	json_object_begin(js, "control");
+	snprintf(text, sizeof(text), "%.*s", (int)sizeof(st->name), st->name);
+	json_text(js, "program", text);
+	snprintf(text, sizeof(text), "%.*s", (int)sizeof(st->path), st->path);
+	json_text(js, "path", text);
+	json_text(js, "state", control_state_to_str(GET(st->state)));
+	json_i64(js, "budget_ns", st->budget_ns);
+	json_u64(js, "calls", GET(st->calls));
+	json_u64(js, "overruns", GET(st->overruns));
+	json_u64(js, "safe_cycles", GET(st->safe_cycles));
+	json_u64(js, "limited", GET(st->limited));
+	json_u64(js, "refused", GET(st->refused));
+	write_histogram(js, "time_ns", &st->time);
+	json_object_end(js);
+}
+
 static void write_ports(struct json *js, const char *key, const _Atomic uint32_t *counts)
 {
 	json_array_begin(js, key);
@@ -248,6 +273,7 @@ void report_write_json(const struct report *report, struct json *js)
 	write_histogram(js, "round_trip_ns", &page->cycle.round_trip);
 	write_histogram(js, "phase_ns", &page->cycle.phase);
 	write_histogram(js, "work_ns", &page->cycle.work);
+	write_control(js, page);
 	write_record(js, report);
 	write_dds(js, report);
 	write_degraded(js, page);

@@ -32,6 +32,7 @@ struct fake {
 	unsigned mode;
 	unsigned slaves; /* claimed on the status page */
 	uint64_t page_faults;
+	unsigned control;  /* calls of a control program; 0: there is none */
 	uint32_t degraded; /* bit per enum event_rt */
 	struct meta meta;
 	struct status_page *page;

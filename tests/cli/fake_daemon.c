@@ -118,6 +118,8 @@ static void parse(struct fake *f, int argc, char **argv)
 			f->slaves = (unsigned)strtoul(value, NULL, 10);
 		} else if (strcmp(argv[i], "FAULTS") == 0) {
 			f->page_faults = strtoull(value, NULL, 10);
+		} else if (strcmp(argv[i], "CONTROL") == 0) {
+			f->control = (unsigned)strtoul(value, NULL, 10);
 		} else if (strcmp(argv[i], "DEGRADED") == 0) {
 			f->degraded = (uint32_t)strtoul(value, NULL, 0);
 		} else {

@@ -99,6 +99,25 @@ void fake_describe(struct fake *f)
 	snprintf(f->meta.channel[2].unit, sizeof(f->meta.channel[2].unit), "V");
 }
 
+static void describe_control(struct control_status *control, unsigned calls)
+{
+	if (calls == 0) {
+		return;
+	}
+	snprintf(control->name, sizeof(control->name), "blink");
+	snprintf(control->path, sizeof(control->path), "/usr/lib/blink.so");
+	control->budget_ns = 200000;
+	control->state = CONTROL_PARKED;
+	control->calls = calls;
+	control->overruns = 2;
+	control->safe_cycles = 1;
+	control->limited = 3;
+	control->refused = 4;
+	for (unsigned i = 0; i < calls; i++) {
+		histogram_add(&control->time, i < 2 ? 300000 : 5000);
+	}
+}
+
 void fake_make_status(struct fake *f)
 {
 	struct status_page *page = status_create(fake_path(f, CONFIG_RUN_STATUS), STATUS_MAGIC,
@@ -131,6 +150,7 @@ void fake_make_status(struct fake *f)
 		page->slave[s].info = f->meta.slave[s];
 		page->slave[s].al_state = 8;
 	}
+	describe_control(&page->control, f->control);
 	page->slave[1].dc_diff_ns = -7;
 	page->slave[1].al_status_code = 0x001b;
 	page->slave[1].rx_errors[0] = 3;

@@ -96,6 +96,24 @@ def test_status_is_one_screen(daemon: Fake) -> None:
         assert said in text
 
 
+def test_status_shows_the_control_program_where_there_is_one(fake: Callable[..., Fake]) -> None:
+    without = fake()
+    assert "control" not in works(without("status"))
+    assert json_of(without("status", "--json"))["control"] is None
+    daemon = fake("CONTROL=5")
+    text = works(daemon("status"))
+    assert "control    blink: parked   5 calls   2 beyond 200 us" in text
+    assert len([line for line in text.splitlines() if line.startswith("control ")]) == 2
+    assert "control    blink: parked" in works(daemon("status", "--summary"))
+    control = json_of(daemon("status", "--json"))["control"]
+    assert control["program"] == "blink" and control["path"] == "/usr/lib/blink.so"
+    assert control["state"] == "parked" and control["budget_ns"] == 200000
+    assert control["calls"] == 5 and control["overruns"] == 2 and control["safe_cycles"] == 1
+    assert control["limited"] == 3 and control["refused"] == 4
+    assert control["time_ns"]["count"] == 5 and control["time_ns"]["max"] == 300000
+    assert json_of(daemon("histogram", "control", "--json"))["count"] == 5
+
+
 def test_status_without_a_recorder_says_so(fake: Callable[..., Fake]) -> None:
     daemon = fake("RECORDER=0")
     assert "recorder   none" in works(daemon("status"))
@@ -277,7 +295,7 @@ def test_events_can_be_followed_to_the_end(daemon: Fake) -> None:
     assert json.loads(rest.splitlines()[-1])["event"] == "stopped"
 
 
-@pytest.mark.parametrize("name", ["wake", "round-trip", "phase", "work"])
+@pytest.mark.parametrize("name", ["wake", "round-trip", "phase", "work", "control"])
 def test_histograms_agree_with_their_count(fake: Callable[..., Fake], name: str) -> None:
     daemon = fake("SPEED=1")
     histogram = json_of(daemon("histogram", name, "--json"))
@@ -286,8 +304,8 @@ def test_histograms_agree_with_their_count(fake: Callable[..., Fake], name: str)
     assert histogram["count"] <= total <= histogram["count"] + 500
     assert all(b["from_ns"] < b["below_ns"] for b in histogram["bucket"])
     text = works(daemon("histogram", name))
-    assert ("no values yet" in text) == (name == "work")
-    assert ("100.0%" in text) == (name != "work")
+    assert ("no values yet" in text) == (name in ("work", "control"))
+    assert ("100.0%" in text) == (name not in ("work", "control"))
 
 
 def test_top_prints_lines_where_there_is_no_terminal(daemon: Fake) -> None:

@@ -101,7 +101,11 @@ def test_a_mistake_is_one_line_and_exit_code_2(words: list[str], said: str) -> N
 
 
 def test_the_wrong_histogram_is_named(daemon: Fake) -> None:
-    fails(daemon("histogram", "sleep"), USAGE, "sleep: is none of wake, round-trip, phase, work")
+    fails(
+        daemon("histogram", "sleep"),
+        USAGE,
+        "sleep: is none of wake, round-trip, phase, work, control",
+    )
 
 
 @pytest.mark.parametrize("words", READING, ids=" ".join)
