@@ -9,10 +9,6 @@ enum vendor { VENDOR_BECKHOFF = 0x00000002, VENDOR_MICROCHIP = 0x00000009 };
 
 enum { PDI_LAN9252 = 0x80 };
 
-/* "hoff" and "Verl": what receive times hold that no frame has ever set (captures). */
-#define TEXT_HOFF 0x66666f68u
-#define TEXT_VERL 0x6c726556u
-
 /*
  * What captures of real devices say of their ESCs: types, ports and feature words as 0x0000 to
  * 0x0008 gave them, counts of FMMUs and SMs and the kind of clock by which registers gave a working
@@ -30,7 +26,7 @@ static const struct esc_features coupler = {
 	.has_sync_unit = 1,
 	.is_dc_by_eeprom = 1,
 	.eeprom_bytes_a_read = 8,
-	.receive_time_at_power_on = { 0, TEXT_HOFF, 0, TEXT_VERL },
+	.receive_time_at_power_on = ESC_RECEIVE_TIME_UNSET,
 };
 
 /* A terminal with an ET1100: as the coupler, but E-bus. */
@@ -46,7 +42,7 @@ static const struct esc_features et1100_terminal = {
 	.has_sync_unit = 1,
 	.is_dc_by_eeprom = 1,
 	.eeprom_bytes_a_read = 8,
-	.receive_time_at_power_on = { 0, TEXT_HOFF, 0, TEXT_VERL },
+	.receive_time_at_power_on = ESC_RECEIVE_TIME_UNSET,
 };
 
 /* EL1004, EL2828, EL3004: an ET1200 of the newer kind. */
@@ -65,7 +61,7 @@ static const struct esc_features et1200_terminal = {
 	.has_open_bits = 1,
 	.eeprom_bytes_a_read = 8,
 	.eeprom_status = 0x0010,
-	.receive_time_at_power_on = { 0, TEXT_HOFF, 0, TEXT_VERL },
+	.receive_time_at_power_on = ESC_RECEIVE_TIME_UNSET,
 };
 
 /* EL2889: of the older kind; it has its system time although its EEPROM leaves both DC units off.
@@ -81,7 +77,7 @@ static const struct esc_features et1200_old_terminal = {
 	.dc = ESC_DC_64,
 	.has_sync_unit = 1,
 	.eeprom_bytes_a_read = 8,
-	.receive_time_at_power_on = { 0, TEXT_HOFF, 0, TEXT_VERL },
+	.receive_time_at_power_on = ESC_RECEIVE_TIME_UNSET,
 };
 
 static const struct esc_features lan9252 = {

@@ -6,10 +6,6 @@
 #include "sim/esc_inside.h"
 #include "wire/al.h"
 
-/* What receive time registers hold that no frame has ever set (captures of ET1100 and ET1200). */
-#define TEXT_HOFF 0x66666f68u
-#define TEXT_VERL 0x6c726556u
-
 const struct esc_features esc_et1100 = {
 	.type = 0x11,
 	.revision = 0x00,
@@ -22,7 +18,7 @@ const struct esc_features esc_et1100 = {
 	.dc = ESC_DC_64,
 	.has_sync_unit = 1,
 	.eeprom_bytes_a_read = 8,
-	.receive_time_at_power_on = { 0, TEXT_HOFF, 0, TEXT_VERL },
+	.receive_time_at_power_on = ESC_RECEIVE_TIME_UNSET,
 };
 
 static void reset_registers(struct esc *esc)

@@ -21,6 +21,10 @@ enum esc_dc_kind {
 	ESC_DC_64,
 };
 
+/* What receive times hold that no frame has ever set, as captures of ET1100 and ET1200 show: "hoff"
+ * and "Verl" in the two that this text reaches. */
+#define ESC_RECEIVE_TIME_UNSET { 0, 0x66666f68u, 0, 0x6c726556u }
+
 struct esc_features {
 	uint8_t type;
 	uint8_t revision;

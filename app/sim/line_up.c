@@ -11,6 +11,7 @@
 #include "base/prng.h"
 #include "sim/catalogue.h"
 #include "sim/devices/fb1111_piccolo.h"
+#include "sim/devices/plant.h"
 #include "sim/devices/wago_750_354.h"
 #include "sim/devices/wago_text.h"
 #include "wire/sii.h"
@@ -142,6 +143,20 @@ static int make_wago(struct line_up *l, int i)
 	return r < 0 ? sim_complain("no memory") : 0;
 }
 
+static int make_plant(struct line_up *l, int i)
+{
+	char line[LINE_BYTES];
+	int r = plant_by_name(i, l->name[i], &l->spec[i]);
+
+	if (r == -EINVAL) {
+		snprintf(line, sizeof(line),
+			 "slave '%s': not plant[:TAU_MS[:GAIN]], each above 0 and up to 1000000",
+			 l->name[i]);
+		return sim_complain(line);
+	}
+	return r < 0 ? sim_complain("no memory") : 0;
+}
+
 static int make_slave(struct line_up *l, int i)
 {
 	size_t bytes = 0;
@@ -149,6 +164,9 @@ static int make_slave(struct line_up *l, int i)
 
 	if (wago_750_354_is_name(l->name[i])) {
 		return make_wago(l, i);
+	}
+	if (plant_is_name(l->name[i])) {
+		return make_plant(l, i);
 	}
 
 	if (strcmp(l->name[i], "fb1111_piccolo") == 0) {

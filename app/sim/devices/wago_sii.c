@@ -24,8 +24,8 @@ enum sii_byte {
 enum coupler {
 	PDI_16_BIT = 0x08,
 	DC_UNITS_ON = 0x0c,
-	SYNC0_TO_AL_EVENT = 0x08,
-	COE_DETAILS = 0x33, /* SDO, information, upload at start, complete access */
+	SYNC0_PIN_AND_EVENT = 0x0c, /* an output, and an AL event */
+	COE_DETAILS = 0x33,         /* SDO, information, upload at start, complete access */
 	MAILBOX_BYTES_EACH = 512,
 	MAILBOX_OUT = 0x1000,
 	MAILBOX_IN = 0x1400,
@@ -147,7 +147,7 @@ static void put_words(uint8_t *image)
 {
 	image[SII_PDI_CONTROL] = PDI_16_BIT;
 	image[SII_ESC_CONFIG] = DC_UNITS_ON;
-	image[SII_SYNC_CONFIG] = SYNC0_TO_AL_EVENT;
+	image[SII_SYNC_CONFIG] = SYNC0_PIN_AND_EVENT;
 	image[SII_CHECKSUM] = sii_checksum(image);
 	put_le32(image + SII_VENDOR, WAGO_VENDOR);
 	put_le32(image + SII_PRODUCT, WAGO_PRODUCT);

@@ -7,7 +7,7 @@
 
 static double signal_hz;
 
-static int make(int position, struct segment_slave_spec *ret_spec)
+int coupler_make(int position, struct segment_slave_spec *ret_spec)
 {
 	int r = wago_750_354_by_name(position, "wago_750_354", ret_spec);
 
@@ -19,8 +19,9 @@ static int make(int position, struct segment_slave_spec *ret_spec)
 void coupler_bench_init(struct virtual_bench *bench, double frequency_hz)
 {
 	signal_hz = frequency_hz;
-	virtual_bench_init(bench, &(struct virtual_spec){
-					  .slaves = 1, .make = make, .ppm = { 60 }, .seed = 3 });
+	virtual_bench_init(bench,
+			   &(struct virtual_spec){
+				   .slaves = 1, .make = coupler_make, .ppm = { 60 }, .seed = 3 });
 }
 
 void coupler_bring_up(struct virtual_master *vm, struct virtual_bench *bench,

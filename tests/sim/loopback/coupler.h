@@ -10,6 +10,8 @@ enum coupler_slot { COUPLER_AI = 0, COUPLER_AO = 1, COUPLER_DI = 2, COUPLER_DO =
 
 /** One coupler that sees a sine of @frequency_hz, 4 V around 1 V. */
 void coupler_bench_init(struct virtual_bench *bench, double frequency_hz);
+/** The coupler as a slave of a bench. */
+int coupler_make(int position, struct segment_slave_spec *ret_spec);
 /** A master on it; ends the test with its line if it does not reach OP. */
 void coupler_bring_up(struct virtual_master *vm, struct virtual_bench *bench,
 		      const char *const *settings);
