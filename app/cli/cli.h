@@ -64,6 +64,7 @@ enum cli_exit verb_set(struct cli *cli, int argc, char **argv);
 enum cli_exit verb_slaves(struct cli *cli, int argc, char **argv);
 enum cli_exit verb_status(struct cli *cli, int argc, char **argv);
 enum cli_exit verb_stop(struct cli *cli, int argc, char **argv);
+enum cli_exit verb_sync0(struct cli *cli, int argc, char **argv);
 enum cli_exit verb_top(struct cli *cli, int argc, char **argv);
 enum cli_exit verb_watch(struct cli *cli, int argc, char **argv);
 

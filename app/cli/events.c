@@ -17,6 +17,9 @@
 struct events {
 	struct cli *cli;
 	struct ring_reader *reader;
+	struct ring_reader *sync0; /* that of ecdaq-sync0; NULL: none */
+	struct event waiting;      /* read from it, and not older than what was printed */
+	int has_waiting;
 	int is_json;
 	int is_follow;
 	const char *level;
@@ -98,6 +101,64 @@ static void print_lost(const struct events *events, uint64_t lost)
 	json_end_line(&js);
 }
 
+/* Both rings as one: what ecdaq-sync0 said before @mono_ns. */
+static void print_sync0_until(struct events *events, int64_t mono_ns)
+{
+	uint64_t lost = 0;
+
+	while (events->sync0 != NULL) {
+		if (!events->has_waiting) {
+			switch (ring_read(events->sync0, &events->waiting, &lost)) {
+			case RING_OK:
+				events->has_waiting = 1;
+				break;
+			case RING_LOST:
+				print_lost(events, lost);
+				continue;
+			case RING_EMPTY:
+			case RING_CLOSED:
+				return;
+			}
+		}
+		if (events->waiting.mono_ns >= mono_ns) {
+			return;
+		}
+		events->has_waiting = 0;
+		print(events, &events->waiting);
+	}
+}
+
+/* It may not have been started, or anew: look again, as long as nothing of it is left to read. */
+static void open_sync0(struct events *events)
+{
+	char path[CONFIG_PATH_BYTES];
+	uint64_t oldest;
+
+	if (events->sync0 != NULL) {
+		if (events->has_waiting || !ring_is_replaced(events->sync0)) {
+			return;
+		}
+		ring_reader_destroy(events->sync0);
+		events->sync0 = NULL;
+	}
+	if (cli_path(events->cli, CONFIG_RUN_SYNC0_EVENTS, path) != CLI_OK ||
+	    ring_reader_open(path, &events->sync0) < 0) {
+		events->sync0 = NULL;
+		return;
+	}
+	if (strcmp(ring_kind(events->sync0), "event") != 0 ||
+	    ring_payload_bytes(events->sync0) != sizeof(struct event)) {
+		ring_reader_destroy(events->sync0);
+		events->sync0 = NULL;
+		return;
+	}
+	oldest = ring_oldest(events->sync0);
+	if (events->count > 0 && ring_newest(events->sync0) - oldest > events->count) {
+		oldest = ring_newest(events->sync0) - events->count;
+	}
+	ring_seek(events->sync0, oldest);
+}
+
 static enum cli_exit run(struct events *events)
 {
 	uint64_t lost = 0;
@@ -106,22 +167,26 @@ static enum cli_exit run(struct events *events)
 	for (;;) {
 		switch (ring_read(events->reader, &ev, &lost)) {
 		case RING_OK:
+			print_sync0_until(events, ev.mono_ns);
 			print(events, &ev);
 			break;
 		case RING_LOST:
 			print_lost(events, lost);
 			break;
 		case RING_EMPTY:
+			print_sync0_until(events, INT64_MAX);
 			if (!events->is_follow || ring_is_orphaned(events->reader)) {
 				return CLI_OK;
 			}
 			fflush(stdout);
+			open_sync0(events);
 			screen_wait(20 * NS_PER_MS);
 			if (screen_is_over() || ferror(stdout)) {
 				return CLI_OK;
 			}
 			break;
 		case RING_CLOSED:
+			print_sync0_until(events, INT64_MAX);
 			return CLI_OK;
 		}
 	}
@@ -203,8 +268,10 @@ enum cli_exit verb_events(struct cli *cli, int argc, char **argv)
 		oldest = ring_newest(events.reader) - events.count;
 	}
 	ring_seek(events.reader, oldest);
+	open_sync0(&events);
 	screen_catch_signals();
 	result = run(&events);
 	ring_reader_destroy(events.reader);
+	ring_reader_destroy(events.sync0);
 	return result;
 }

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "cli/args.h"
+#include "cli/bars.h"
 #include "cli/json.h"
 #include "cli/screen.h"
 #include "cli/source.h"
@@ -65,7 +66,7 @@ static void gather(const struct histogram *h, struct rows *ret)
 	*ret = rows;
 }
 
-static void print_bars(const struct histogram *h)
+void bars_print(const struct histogram *h)
 {
 	int width = screen_size().columns - 42;
 	uint64_t below = 0;
@@ -159,7 +160,7 @@ enum cli_exit verb_histogram(struct cli *cli, int argc, char **argv)
 	} else if (is_json) {
 		print_json(h, args.operands[0]);
 	} else {
-		print_bars(h);
+		bars_print(h);
 	}
 	source_status_close(page);
 	return result;

@@ -45,6 +45,11 @@ static const struct verb verbs[] = {
 	  "USINT UINT UDINT ULINT REAL LREAL, and for reading STRING.\n",
 	  verb_sdo },
 	{ "events", "", "What happened, oldest first.", NULL, verb_events },
+	{ "sync0", "[calibrate]", "The SYNC0 pulses on GPIO lines, as ecdaq-sync0 sees them.",
+	  "calibrate: the same signal is on the first two lines: measure the noise of this "
+	  "board's\n"
+	  "GPIO path and store it (sync0.calibration). ecdaq-sync0 must not run meanwhile.\n",
+	  verb_sync0 },
 	{ "histogram", "wake|round-trip|phase|work|control", "A histogram as bars.",
 	  "wake: wake-up latency. round-trip: frame out to frame back. phase: magnitude of the "
 	  "phase\n"

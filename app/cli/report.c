@@ -8,6 +8,7 @@
 #include "base/clock.h"
 #include "base/event.h"
 #include "cli/source.h"
+#include "cli/sync0_source.h"
 #include "cli/text.h"
 #include "wire/al.h"
 
@@ -23,6 +24,8 @@ void report_gather(struct cli *cli, const struct status_page *page,
 	report.is_recorder_running = record != NULL && source_is_alive(record->pid);
 	report.dds = source_dds(cli);
 	report.is_dds_running = report.dds != NULL && source_is_alive(report.dds->pid);
+	report.sync0 = sync0_source_try(cli);
+	report.is_sync0_running = report.sync0 != NULL && source_is_alive(report.sync0->pid);
 	if (samples_try(cli, &samples) == 0) {
 		if (samples.meta->session == page->session &&
 		    ring_peek_newest(samples.reader, samples.payload) == RING_OK) {
@@ -41,6 +44,7 @@ void report_gather(struct cli *cli, const struct status_page *page,
 void report_release(const struct report *report)
 {
 	source_dds_close(report->dds);
+	sync0_source_close(report->sync0);
 }
 
 void report_al_format(uint32_t al_state, char *buf, size_t buf_len)
@@ -299,6 +303,7 @@ void report_write_screen(const struct report *report, FILE *out)
 	write_times(report->page, out);
 	write_recorder(report, out);
 	write_dds(report, out);
+	report_sync0_line(report, out);
 	if (count > 0) {
 		fprintf(out, "%3s %-16s %-13s %12s %10s %10s %6s %6s\n", "pos", "slave", "state",
 			"good", "bad", "dc diff", "rx err", "links");
@@ -325,5 +330,6 @@ void report_write_summary(const struct report *report, FILE *out)
 	write_times(report->page, out);
 	write_recorder(report, out);
 	write_dds(report, out);
+	report_sync0_line(report, out);
 	write_message(report->page, out);
 }

@@ -6,15 +6,18 @@
 #include <stdio.h>
 
 #include "base/status.h"
+#include "base/sync0.h"
 #include "cli/json.h"
 
 struct report {
 	const struct status_page *page;
 	const struct record_status *record; /* NULL: no recorder was started */
 	const struct dds_status *dds;       /* NULL: no ecdaq-dds was started */
+	const struct sync0_status *sync0;   /* NULL: no ecdaq-sync0 was started */
 	int is_running;                     /* ecdaqd's process is there */
 	int is_recorder_running;
 	int is_dds_running;
+	int is_sync0_running;
 	int has_wkc; /* the newest sample could be read */
 	uint16_t wkc;
 	uint16_t wkc_expected;
@@ -41,6 +44,10 @@ void report_write_json(const struct report *report, struct json *js);
 
 /** "OP", "SAFE-OP+ERROR". */
 void report_al_format(uint32_t al_state, char *buf, size_t buf_len);
+
+/** ecdaq-sync0's part of the screen and of the JSON object. */
+void report_sync0_line(const struct report *report, FILE *out);
+void report_sync0_json(const struct report *report, struct json *js);
 
 /** One slave as a JSON object in an array. */
 void report_slave_json(const struct status_page *page, uint32_t index, struct json *js);

@@ -276,6 +276,7 @@ void report_write_json(const struct report *report, struct json *js)
 	write_control(js, page);
 	write_record(js, report);
 	write_dds(js, report);
+	report_sync0_json(report, js);
 	write_degraded(js, page);
 	json_array_begin(js, "slave");
 	for (uint32_t i = 0; i < source_slave_count(page); i++) {

@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: MIT */
+/* The status page of ecdaq-sync0, mapped read-only. */
+#ifndef CLI_SYNC0_SOURCE_H
+#define CLI_SYNC0_SOURCE_H
+
+#include "base/sync0.h"
+#include "cli/cli.h"
+
+/** CLI_OK, or the code of a failure that was said. */
+enum cli_exit sync0_source_open(struct cli *cli, const struct sync0_status **ret_page);
+/** The same without a word: NULL if there is none. */
+const struct sync0_status *sync0_source_try(struct cli *cli);
+void sync0_source_close(const struct sync0_status *page);
+/** How many lines it has; never more than there is room for. */
+uint32_t sync0_source_lines(const struct sync0_status *page);
+
+#endif
