@@ -138,3 +138,13 @@ const char *mapped_time_quality(const struct timemap_state *state)
 	}
 	return state->tai_offset_s == 0 ? "utc" : "tai";
 }
+
+const char *mapped_time_explain(const struct timemap_state *state)
+{
+	if (state->utc_ns < CLOCK_UNSET_BEFORE_NS) {
+		return "the wall clock was never set, utc_ns means nothing until it is";
+	}
+	return state->tai_offset_s == 0
+		       ? "the kernel's TAI offset is unset, CLOCK_TAI is taken for UTC"
+		       : "UTC from CLOCK_TAI and the kernel's TAI offset";
+}

@@ -27,5 +27,7 @@ int mapped_time_news(struct mapped_time *mt, struct timemap_state *ret);
 
 /** "tai"; "utc": the kernel's TAI offset is unset; "unset": the wall clock itself was never set. */
 const char *mapped_time_quality(const struct timemap_state *state);
+/** The same for people, one line. */
+const char *mapped_time_explain(const struct timemap_state *state);
 
 #endif

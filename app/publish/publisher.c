@@ -15,6 +15,7 @@
 #include "publish/commands.h"
 #include "publish/domain.h"
 #include "publish/events.h"
+#include "publish/mapped_time.h"
 #include "publish/own_status.h"
 #include "publish/samples.h"
 #include "publish/state.h"
@@ -40,6 +41,7 @@ struct publisher {
 	int had_ring;
 	int64_t looked_ns;
 	unsigned looks;
+	const char *time_quality; /* as it was told last; NULL: not yet */
 };
 
 static int64_t now_ns(void)
@@ -248,6 +250,18 @@ static int is_op(const struct publisher *p, const struct slave_table *table)
 	       atomic_load_explicit(&p->page->bus_state, memory_order_relaxed) == BUS_OP;
 }
 
+/* Once, and again when it changes: what UTC in the samples is worth. */
+static void tell_time_quality(struct publisher *p, const struct timemap_state *map)
+{
+	const char *quality = mapped_time_quality(map);
+
+	if (p->time_quality != NULL && strcmp(p->time_quality, quality) == 0) {
+		return;
+	}
+	p->time_quality = quality;
+	fprintf(stderr, "ecdaq-dds: time: %s: %s\n", quality, mapped_time_explain(map));
+}
+
 static int publish(struct publisher *p)
 {
 	enum samples_result result = SAMPLES_EMPTY;
@@ -259,6 +273,7 @@ static int publish(struct publisher *p)
 	result = samples_step(p->samples, SAMPLES_A_STEP);
 	if (samples_timemap_news(p->samples, &map)) {
 		state_put_timemap(&p->topics, samples_table(p->samples)->meta->session, &map);
+		tell_time_quality(p, &map);
 	}
 	if (result == SAMPLES_ENDED) {
 		end_session(p);

@@ -9,6 +9,7 @@
 #include "ecdaq.h"
 #include "image/image.h"
 #include "publish/mapped_time.h"
+#include "ros2.h"
 
 /* One slave's messages; their sequences point to memory of ours. */
 struct slave_out {
@@ -155,6 +156,28 @@ static void put(struct samples *s, dds_entity_t writer, const void *message)
 	s->counts->failed += topics_write(writer, message, s->utc_ns) < 0;
 }
 
+/* The same once more, under the names of ROS 2. One writer for all slaves: the type has no key. */
+static void mirror(struct samples *s, struct slave_out *out)
+{
+	const ecdaq_SampleV1 *m = &out->sample;
+	ecdaq_msgs_msg_dds__Sample_ twin = {
+		.slave_ = m->slave,
+		.session_ = m->session,
+		.cycle_ = m->cycle,
+		.dc_time_ns_ = m->dc_time_ns,
+		.utc_ns_ = m->utc_ns,
+		.flags_ = m->flags,
+		.is_good_ = m->is_good,
+		.adc_ = m->adc,
+		.counter_ = m->counter,
+		.sample_time_ns_ = m->sample_time_ns,
+	};
+
+	SEQUENCE_SET(twin.values_, out->values, m->values._length);
+	SEQUENCE_SET(twin.raw_, out->raw, m->raw._length);
+	put(s, s->topics->ros2_sample, &twin);
+}
+
 static void flush_block(struct samples *s, struct slave_out *out)
 {
 	ecdaq_BlockV1 *b = &out->block;
@@ -243,6 +266,9 @@ static void put_slave(struct samples *s, const struct sample_header *h, const ui
 				    ? 0
 				    : (int64_t)image_get_raw(image, &channels[view->sample_time]);
 	put(s, s->topics->sample, m);
+	if (s->topics->ros2_sample > 0) {
+		mirror(s, out);
+	}
 	add_to_block(s, out);
 }
 

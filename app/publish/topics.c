@@ -10,6 +10,7 @@
 #include "ecdaq.h"
 #include "publish/domain.h"
 #include "publish/gate.h"
+#include "ros2.h"
 
 enum { DEPTH_MIN = 16, DEPTH_EVENTS = 1024, DEPTH_REPLIES = 100, COMMANDS_WAITING = 256 };
 
@@ -117,6 +118,11 @@ static int make_all(struct topics *t, const struct config *cfg, const dds_listen
 		{ "ecdaq/reply",
 		  t->reply = writer(t, &ecdaq_ReplyV1_desc, "ecdaq/reply",
 				    reliable(DDS_DURABILITY_VOLATILE, DEPTH_REPLIES)) },
+		{ "rt/ecdaq/sample",
+		  t->ros2_sample = cfg->dds_ros2_mirror
+					   ? writer(t, &ecdaq_msgs_msg_dds__Sample__desc,
+						    "rt/ecdaq/sample", data(depth_of(cfg, 1)))
+					   : 0 },
 		{ "ecdaq/command", t->command = command_reader(t, cfg, on_command) },
 	};
 

@@ -20,6 +20,7 @@ struct topics {
 	dds_entity_t idl;
 	dds_entity_t command; /* the one reader */
 	dds_entity_t reply;
+	dds_entity_t ros2_sample; /* 0: there is no mirror */
 };
 
 /** 0, or -EIO with one line in @error. Close with topics_close(), also after a failure. */
