@@ -11,6 +11,7 @@
 enum sii_byte {
 	SII_PDI_CONTROL = 0x00,
 	SII_ESC_CONFIG = 0x01,
+	SII_SYNC_CONFIG = 0x03,
 	SII_CHECKSUM = 0x0e,
 	SII_VENDOR = 0x10,
 	SII_PRODUCT = 0x14,
@@ -25,6 +26,7 @@ enum identity { VENDOR = 0x0000ecda, PRODUCT = 0x00000001, REVISION = 0x00000001
 enum plant {
 	PDI_SPI = 0x05,
 	DC_UNITS_ON = 0x0c,
+	SYNC0_PIN_AND_EVENT = 0x0c, /* 0x0151 */
 	OUTPUTS_AT = 0x1000,
 	INPUTS_AT = 0x1100,
 	OUTPUTS_CONTROL = 0x64, /* three buffers, written by the master, with watchdog */
@@ -162,6 +164,7 @@ size_t plant_sii(uint8_t *image)
 	memset(image, 0, PLANT_SII_BYTES);
 	image[SII_PDI_CONTROL] = PDI_SPI;
 	image[SII_ESC_CONFIG] = DC_UNITS_ON;
+	image[SII_SYNC_CONFIG] = SYNC0_PIN_AND_EVENT;
 	image[SII_CHECKSUM] = sii_checksum(image);
 	put_le32(image + SII_VENDOR, VENDOR);
 	put_le32(image + SII_PRODUCT, PRODUCT);
