@@ -46,7 +46,7 @@ def cycles_kept(machine: Machine, status: dict[str, Any]) -> int:
     """How many cycles of the run that `status` tells of are in the recordings."""
     run = Path(status["recording"]).name.rpartition("-")[0]
     rows = json.loads(machine.run("sudo ecdaq log list --dir /data/record --json", seconds=900))
-    found = [row for row in rows if row["name"].startswith(run)]
+    found = [row for row in rows if row["file"].startswith(run)]
     assert found, (run, rows)
     return sum(int(row["cycles"]) for row in found)
 
