@@ -62,6 +62,30 @@ void capture_free(struct bytes *b)
 	b->at = NULL;
 }
 
+/* Calls @each for every datagram of every frame that came back from the slaves. */
+static void each_answer(const struct bytes *capture,
+			void (*each)(void *ctx, const struct ecat_datagram *dg), void *ctx)
+{
+	struct pcapng_packet p;
+	struct pcapng file;
+
+	CHECK_EQ(pcapng_open(&file, capture->at, capture->len), 0);
+	while (pcapng_next(&file, &p) == 1) {
+		uint8_t frame[ECAT_FRAME_MAX_BYTES];
+		struct ecat_datagram dg;
+		size_t pos = 0;
+
+		if (p.len > sizeof(frame) || !ecat_frame_is_valid(p.bytes, p.len) ||
+		    !(p.bytes[6] & 2)) {
+			continue;
+		}
+		memcpy(frame, p.bytes, p.len);
+		while (ecat_frame_next(frame, p.len, &pos, &dg) == 1) {
+			each(ctx, &dg);
+		}
+	}
+}
+
 /* What the answers of one slave have told so far. */
 struct learning {
 	struct bytes image;
@@ -71,8 +95,9 @@ struct learning {
 	uint16_t slaves;
 };
 
-static void learn(struct learning *l, const struct ecat_datagram *dg)
+static void learn(void *ctx, const struct ecat_datagram *dg)
 {
+	struct learning *l = ctx;
 	int is_ours = dg->adp == l->station;
 
 	if (get_le16(dg->wkc) == 0) {
@@ -90,57 +115,24 @@ static void learn(struct learning *l, const struct ecat_datagram *dg)
 	}
 }
 
-static uint16_t count_slaves(const struct bytes *capture)
+static void count_slaves(void *ctx, const struct ecat_datagram *dg)
 {
-	struct pcapng_packet p;
-	struct pcapng file;
-	uint16_t slaves = 0;
+	uint16_t *slaves = ctx;
 
-	CHECK_EQ(pcapng_open(&file, capture->at, capture->len), 0);
-	while (pcapng_next(&file, &p) == 1) {
-		uint8_t frame[ECAT_FRAME_MAX_BYTES];
-		struct ecat_datagram dg;
-		size_t pos = 0;
-
-		if (p.len > sizeof(frame) || !ecat_frame_is_valid(p.bytes, p.len) ||
-		    !(p.bytes[6] & 2)) {
-			continue;
-		}
-		memcpy(frame, p.bytes, p.len);
-		while (ecat_frame_next(frame, p.len, &pos, &dg) == 1) {
-			if (dg.cmd == ECAT_CMD_BRD && dg.adp > slaves) {
-				slaves = dg.adp;
-			}
-		}
+	if (dg->cmd == ECAT_CMD_BRD && dg->adp > *slaves) {
+		*slaves = dg->adp;
 	}
-	return slaves;
 }
 
 struct bytes capture_learn_sii(const struct bytes *capture, uint16_t station, uint16_t position)
 {
 	struct learning l = { .image = { .at = calloc(1, EEPROM_BYTES), .len = EEPROM_BYTES },
 			      .station = station,
-			      .position = position,
-			      .slaves = count_slaves(capture) };
-	struct pcapng_packet p;
-	struct pcapng file;
+			      .position = position };
 
 	CHECK(l.image.at != NULL);
-	CHECK_EQ(pcapng_open(&file, capture->at, capture->len), 0);
-	while (pcapng_next(&file, &p) == 1) {
-		uint8_t frame[ECAT_FRAME_MAX_BYTES];
-		struct ecat_datagram dg;
-		size_t pos = 0;
-
-		if (p.len > sizeof(frame) || !ecat_frame_is_valid(p.bytes, p.len) ||
-		    !(p.bytes[6] & 2)) {
-			continue;
-		}
-		memcpy(frame, p.bytes, p.len);
-		while (ecat_frame_next(frame, p.len, &pos, &dg) == 1) {
-			learn(&l, &dg);
-		}
-	}
+	each_answer(capture, count_slaves, &l.slaves);
+	each_answer(capture, learn, &l);
 	l.image.at[14] = sii_checksum(l.image.at);
 	return l.image;
 }

@@ -77,6 +77,18 @@ static struct admin_reply answer(int fd)
 	return reply;
 }
 
+/* A client whose set waits for the cycle. */
+static int connect_and_set(struct bench *b)
+{
+	struct admin_request rq = fake_request(ADMIN_SET);
+	int fd = bench_connect(b);
+
+	fake_item(&rq, "a.led", 1);
+	ask(fd, &rq);
+	CHECK_EQ(service(b), 1);
+	return fd;
+}
+
 TEST(admin_server, the_socket_is_for_owner_and_group_only)
 {
 	struct bench b;
@@ -128,18 +140,14 @@ TEST(admin_server, its_descriptor_polls_readable_when_there_is_something_to_do)
 TEST(admin_server, a_set_is_answered_only_after_the_cycle_took_it)
 {
 	struct bench b;
-	struct admin_request rq = fake_request(ADMIN_SET);
 	struct admin_request other = fake_request(ADMIN_PING);
 	struct admin_reply reply;
 	int fd;
 	int second;
 
 	bench_open(&b);
-	fd = bench_connect(&b);
+	fd = connect_and_set(&b);
 	second = bench_connect(&b);
-	fake_item(&rq, "a.led", 1);
-	ask(fd, &rq);
-	CHECK_EQ(service(&b), 1);
 	CHECK(!has_answer(fd));
 	ask(second, &other); /* nobody waits for the first one's answer */
 	CHECK_EQ(service(&b), 1);
@@ -157,14 +165,10 @@ TEST(admin_server, a_set_is_answered_only_after_the_cycle_took_it)
 TEST(admin_server, a_cycle_that_does_not_answer_is_given_up_after_a_second)
 {
 	struct bench b;
-	struct admin_request rq = fake_request(ADMIN_SET);
 	int fd;
 
 	bench_open(&b);
-	fd = bench_connect(&b);
-	fake_item(&rq, "a.led", 1);
-	ask(fd, &rq);
-	CHECK_EQ(service(&b), 1);
+	fd = connect_and_set(&b);
 	b.now.ns += ADMIN_ANSWER_TIMEOUT_NS - 1;
 	CHECK_EQ(service(&b), 1);
 	b.now.ns += 1;
@@ -229,14 +233,10 @@ TEST(admin_server, the_seventeenth_client_is_told_so_and_the_others_go_on)
 TEST(admin_server, a_client_that_vanishes_while_it_waits_harms_nobody)
 {
 	struct bench b;
-	struct admin_request rq = fake_request(ADMIN_SET);
 	int fd;
 
 	bench_open(&b);
-	fd = bench_connect(&b);
-	fake_item(&rq, "a.led", 1);
-	ask(fd, &rq);
-	CHECK_EQ(service(&b), 1);
+	fd = connect_and_set(&b);
 	close(fd);
 	CHECK_EQ(service(&b), 1);
 	fake_cycle(&b.fake, 5);

@@ -25,6 +25,15 @@ static void check_cycles(struct bench *b, uint64_t first, uint64_t count, unsign
 	CHECK_EQ(parts, 0);
 }
 
+/* One run of the recorder, from start to stop, over the cycles that come meanwhile. */
+static void record(struct bench *b, uint64_t first, uint64_t count)
+{
+	CHECK_EQ(bench_start(b), 0);
+	bench_push(b, first, count);
+	bench_wait(b, NS_PER_S);
+	CHECK_EQ(bench_stop(b), 0);
+}
+
 static int check_log(struct bench *b)
 {
 	const char *paths[] = { b->dir };
@@ -156,10 +165,7 @@ TEST(recorder, goes_on_by_the_state_file_when_the_recordings_were_taken_away)
 	unsigned parts;
 
 	bench_init(&b, 100, 4096);
-	CHECK_EQ(bench_start(&b), 0);
-	bench_push(&b, 0, 1000);
-	bench_wait(&b, NS_PER_S);
-	CHECK_EQ(bench_stop(&b), 0);
+	record(&b, 0, 1000);
 	{
 		char command[512];
 		struct store_entry *entries;
@@ -171,10 +177,7 @@ TEST(recorder, goes_on_by_the_state_file_when_the_recordings_were_taken_away)
 		CHECK_EQ(remove(command), 0);
 		free(entries);
 	}
-	CHECK_EQ(bench_start(&b), 0);
-	bench_push(&b, 1000, 10);
-	bench_wait(&b, NS_PER_S);
-	CHECK_EQ(bench_stop(&b), 0);
+	record(&b, 1000, 10);
 	CHECK_EQ(bench_read(&b, &finished, &parts).first_cycle, 1000);
 	bench_done(&b);
 }
@@ -185,16 +188,10 @@ TEST(recorder, goes_on_by_the_newest_recording_when_the_state_file_is_lost)
 	char state[512];
 
 	bench_init(&b, 100, 4096);
-	CHECK_EQ(bench_start(&b), 0);
-	bench_push(&b, 0, 1000);
-	bench_wait(&b, NS_PER_S);
-	CHECK_EQ(bench_stop(&b), 0);
+	record(&b, 0, 1000);
 	CHECK_EQ(store_path(b.dir, ".ecdaq-record.state", state, sizeof(state)), 0);
 	CHECK_EQ(remove(state), 0);
-	CHECK_EQ(bench_start(&b), 0);
-	bench_push(&b, 1000, 10);
-	bench_wait(&b, NS_PER_S);
-	CHECK_EQ(bench_stop(&b), 0);
+	record(&b, 1000, 10);
 	check_cycles(&b, 0, 1010, 2);
 	bench_done(&b);
 }
