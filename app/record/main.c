@@ -40,6 +40,8 @@ struct program {
 	struct config cfg;
 	char ring_path[CONFIG_PATH_BYTES];
 	char events_path[CONFIG_PATH_BYTES];
+	char sync0_path[CONFIG_PATH_BYTES];
+	char sync0_events_path[CONFIG_PATH_BYTES];
 	char status_path[CONFIG_PATH_BYTES];
 	char *config_text;
 };
@@ -188,6 +190,12 @@ static int find_paths(struct program *pg)
 	r = r < 0 ? r
 		  : config_run_path(&pg->cfg, CONFIG_RUN_RECORD_STATUS, pg->status_path,
 				    sizeof(pg->status_path));
+	r = r < 0 ? r
+		  : config_run_path(&pg->cfg, CONFIG_RUN_SYNC0, pg->sync0_path,
+				    sizeof(pg->sync0_path));
+	r = r < 0 ? r
+		  : config_run_path(&pg->cfg, CONFIG_RUN_SYNC0_EVENTS, pg->sync0_events_path,
+				    sizeof(pg->sync0_events_path));
 	if (r < 0) {
 		fprintf(stderr, "ecdaq-record: run directory: %s\n", strerror(-r));
 	}
@@ -208,6 +216,8 @@ static struct recorder_options recorder_options(const struct program *pg)
 		.ring_path = pg->ring_path,
 		.events_path = pg->events_path,
 		.status_path = pg->status_path,
+		.sync0_path = pg->sync0_path,
+		.sync0_events_path = pg->sync0_events_path,
 		.dir = cfg->record_dir,
 		.pid = getpid(),
 		.chunk_period_ns = cfg->record_chunk_period_ns,

@@ -13,7 +13,7 @@ struct field {
 	const char *comment;
 };
 
-enum { FIELDS = 16, TEXT_BYTES = 512 };
+enum { FIELDS = 40, TEXT_BYTES = 512 };
 
 static const struct {
 	const char *topic;
@@ -92,6 +92,64 @@ static const struct {
 				      { "int32", "long", "tai_offset_s",
 					"TAI minus UTC; 0: unset, CLOCK_TAI is taken for UTC" },
 			      } },
+	[MESSAGE_SYNC0] = { "/ecdaq/sync0",
+			    "Sync0",
+			    "SYNC0 of one slave as seen on a GPIO line, over a window; a figure "
+			    "that is not "
+			    "resolved is a bound.",
+			    {
+				    { "int64", "long long", "time_ns",
+				      "Unix time of the end of the window, or at which a shot was "
+				      "due" },
+				    { "int64", "long long", "mono_ns", "CLOCK_MONOTONIC" },
+				    { "uint64", "unsigned long long", "first_cycle",
+				      "index of the first SYNC0 of the window" },
+				    { "uint64", "unsigned long long", "cycles",
+				      "pulses that had to come" },
+				    { "uint64", "unsigned long long", "edges", "those that came" },
+				    { "uint64", "unsigned long long", "missing",
+				      "those that did not" },
+				    { "uint64", "unsigned long long", "extra",
+				      "edges of no cycle" },
+				    { "uint64", "unsigned long long", "overflow",
+				      "edges that a full queue dropped" },
+				    { "uint64", "unsigned long long", "first_missing",
+				      "cycle; 0: none" },
+				    { "int64", "long long", "step_ns",
+				      "phase or clock step; 0: none" },
+				    { "float64", "double", "period_ns",
+				      "mean, by the host's clock" },
+				    { "float64", "double", "period_sd_ns",
+				      "with the measurement's own noise" },
+				    { "int64", "long long", "jitter_p99_ns",
+				      "of the period's deviation, the same" },
+				    { "int64", "long long", "jitter_max_ns", "the same" },
+				    { "float64", "double", "drift_ppb",
+				      "DC clock against the host's" },
+				    { "float64", "double", "drift_error_ppb", "bound" },
+				    { "float64", "double", "rate_ppb", "SYNC0 against DC time" },
+				    { "float64", "double", "rate_error_ppb", "bound" },
+				    { "int64", "long long", "phase_ns", "edge after its DC time" },
+				    { "int64", "long long", "phase_error_ns", "bound" },
+				    { "int64", "long long", "frame_ns",
+				      "from the edge to the cycle's frame" },
+				    { "int64", "long long", "skew_ns",
+				      "edge after the first line's" },
+				    { "int64", "long long", "skew_error_ns", "bound" },
+				    { "int64", "long long", "dc_diff_ns",
+				      "largest 0x092C in the window; -1: not read" },
+				    { "int64", "long long", "shot_dc_ns",
+				      "commanded DC time of a shot; 0: a window" },
+				    { "int64", "long long", "shot_late_ns", "edge after it" },
+				    { "uint32", "unsigned long", "has",
+				      "1 period, 2 drift, 4 rate, 8 phase, 16 skew" },
+				    { "uint32", "unsigned long", "resolved",
+				      "the same bits, 32 jitter: above the noise" },
+				    { "uint16", "unsigned short", "slave", "position" },
+				    { "uint16", "unsigned short", "line", "from 0" },
+				    { "string", "string", "source", "gpio, simulated edges" },
+				    { "string", "string", "verdict", "OK, UNRESOLVED, WARN, FAIL" },
+			    } },
 };
 
 const char *messages_topic(enum messages_kind kind)
@@ -195,6 +253,53 @@ size_t messages_encode_timemap(const struct timemap_state *s, uint8_t *buf)
 	cdr_put(&c, (uint64_t)s->step_ns, 8);
 	cdr_put(&c, s->steps, 8);
 	cdr_put(&c, (uint32_t)s->tai_offset_s, 4);
+	return c.len;
+}
+
+static void put_double(struct cdr *c, double value)
+{
+	uint64_t bits;
+
+	memcpy(&bits, &value, sizeof(bits));
+	cdr_put(c, bits, sizeof(bits));
+}
+
+size_t messages_encode_sync0(const struct sync0_result *r, int64_t utc_ns, uint8_t *buf)
+{
+	struct cdr c = cdr_begin(buf, MESSAGES_LARGEST_BYTES);
+
+	cdr_put(&c, (uint64_t)utc_ns, 8);
+	cdr_put(&c, (uint64_t)r->mono_ns, 8);
+	cdr_put(&c, (uint64_t)r->first_cycle, 8);
+	cdr_put(&c, (uint64_t)r->cycles, 8);
+	cdr_put(&c, (uint64_t)r->edges, 8);
+	cdr_put(&c, (uint64_t)r->missing, 8);
+	cdr_put(&c, (uint64_t)r->extra, 8);
+	cdr_put(&c, (uint64_t)r->overflow, 8);
+	cdr_put(&c, (uint64_t)r->first_missing, 8);
+	cdr_put(&c, (uint64_t)r->step_ns, 8);
+	put_double(&c, r->period_ns);
+	put_double(&c, r->period_sd_ns);
+	cdr_put(&c, (uint64_t)r->jitter_p99_ns, 8);
+	cdr_put(&c, (uint64_t)r->jitter_max_ns, 8);
+	put_double(&c, r->drift_ppb);
+	put_double(&c, r->drift_error_ppb);
+	put_double(&c, r->rate_ppb);
+	put_double(&c, r->rate_error_ppb);
+	cdr_put(&c, (uint64_t)r->phase_ns, 8);
+	cdr_put(&c, (uint64_t)r->phase_error_ns, 8);
+	cdr_put(&c, (uint64_t)r->frame_ns, 8);
+	cdr_put(&c, (uint64_t)r->skew_ns, 8);
+	cdr_put(&c, (uint64_t)r->skew_error_ns, 8);
+	cdr_put(&c, (uint64_t)r->dc_diff_ns, 8);
+	cdr_put(&c, (uint64_t)r->shot_dc_ns, 8);
+	cdr_put(&c, (uint64_t)r->shot_late_ns, 8);
+	cdr_put(&c, (uint64_t)r->has, 4);
+	cdr_put(&c, (uint64_t)r->is_resolved, 4);
+	cdr_put(&c, (uint64_t)r->slave_pos, 2);
+	cdr_put(&c, (uint64_t)r->line, 2);
+	cdr_put_string(&c, sync0_source_to_str(r->source));
+	cdr_put_string(&c, sync0_verdict_to_str(r->verdict));
 	return c.len;
 }
 

@@ -12,11 +12,12 @@
 
 #include "base/event.h"
 #include "base/sample.h"
+#include "base/sync0.h"
 #include "base/timemap.h"
 
 #define MESSAGES_PACKAGE "ecdaq_msgs"
 
-enum messages_kind { MESSAGE_CYCLE, MESSAGE_EVENT, MESSAGE_TIMEMAP, MESSAGE_KINDS };
+enum messages_kind { MESSAGE_CYCLE, MESSAGE_EVENT, MESSAGE_TIMEMAP, MESSAGE_SYNC0, MESSAGE_KINDS };
 enum { MESSAGES_LARGEST_BYTES = 1024 };
 
 /** "/ecdaq/cycle" */
@@ -42,6 +43,7 @@ struct messages_event {
 size_t messages_encode_cycle(const struct sample_header *header, uint8_t *buf);
 size_t messages_encode_event(const struct messages_event *ev, uint8_t *buf);
 size_t messages_encode_timemap(const struct timemap_state *state, uint8_t *buf);
+size_t messages_encode_sync0(const struct sync0_result *result, int64_t utc_ns, uint8_t *buf);
 
 /** What tells where a recording ends: of a cycle (or slave) message, of an event message. 0,
  * -EBADMSG. */

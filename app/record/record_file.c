@@ -169,6 +169,14 @@ int record_file_event(struct record_file *f, const struct messages_event *ev)
 	return r;
 }
 
+int record_file_sync0(struct record_file *f, const struct sync0_result *result, int64_t utc_ns)
+{
+	size_t len = messages_encode_sync0(result, utc_ns, f->buf);
+	int r = make_room(f, MCAP_MESSAGE_COST_BYTES + len);
+
+	return r < 0 ? r : put(f, MESSAGE_SYNC0, (uint32_t)result->line, len);
+}
+
 int record_file_timemap(struct record_file *f, const struct timemap_state *state, uint64_t utc_ns)
 {
 	size_t len = messages_encode_timemap(state, f->buf);

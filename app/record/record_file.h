@@ -55,6 +55,7 @@ int record_file_sample(struct record_file *f, const struct sample_header *header
 		       const uint8_t *image, uint64_t utc_ns);
 /** The same for an event and the time map. */
 int record_file_event(struct record_file *f, const struct messages_event *ev);
+int record_file_sync0(struct record_file *f, const struct sync0_result *result, int64_t utc_ns);
 int record_file_timemap(struct record_file *f, const struct timemap_state *state, uint64_t utc_ns);
 
 /** Write the open chunk. 0 or -errno: it stays open, try again. */

@@ -14,6 +14,7 @@
 #include "record/event_feed.h"
 #include "record/sample_feed.h"
 #include "record/sink.h"
+#include "record/sync0_feed.h"
 
 #define LOOK_NS (NS_PER_S / 10) /* for a ring, and between two looks at the status page */
 enum { EVENTS_A_STEP = 256, SAMPLES_A_STEP = 2048 };
@@ -22,6 +23,8 @@ struct recorder {
 	struct recorder_options opt;
 	struct sink *sink;
 	struct event_feed *events;
+	struct event_feed *sync0_events;
+	struct sync0_feed *sync0;
 	struct ring_reader *ring;    /* NULL: waiting for one */
 	struct sample_feed *samples; /* NULL: the ring is done with (or waiting) */
 	struct record_status *page;  /* shared, or own while there is no run directory */
@@ -58,8 +61,11 @@ int recorder_create(const struct recorder_options *opt, struct recorder **ret_re
 	rec->looked_ns = INT64_MIN / 2;
 	rec->told_ns = INT64_MIN / 2;
 	rec->events = event_feed_create(opt->events_path);
-	if (rec->events == NULL) {
-		free(rec);
+	rec->sync0_events =
+		event_feed_create(opt->sync0_events_path == NULL ? "" : opt->sync0_events_path);
+	rec->sync0 = sync0_feed_create(opt->sync0_path == NULL ? "" : opt->sync0_path);
+	if (rec->events == NULL || rec->sync0_events == NULL || rec->sync0 == NULL) {
+		recorder_destroy(rec);
 		snprintf(error, error_bytes, "%s", strerror(ENOMEM));
 		return -ENOMEM;
 	}
@@ -80,6 +86,8 @@ void recorder_destroy(struct recorder *rec)
 	sample_feed_destroy(rec->samples);
 	ring_reader_destroy(rec->ring);
 	event_feed_destroy(rec->events);
+	event_feed_destroy(rec->sync0_events);
+	sync0_feed_destroy(rec->sync0);
 	sink_destroy(rec->sink);
 	if (rec->page != &rec->own) {
 		status_unmap(rec->page, sizeof(*rec->page));
@@ -243,12 +251,67 @@ static int take_events(struct recorder *rec, enum events_until until)
 	return taken;
 }
 
+static struct event_mark sync0_mark(const struct recorder *rec)
+{
+	const struct store_state *resume = sink_resume_point(rec->sink);
+
+	return (struct event_mark){ .next = resume->sync0_next, .mono_ns = resume->sync0_mono_ns };
+}
+
+static struct event_mark sync0_event_mark(const struct recorder *rec)
+{
+	const struct store_state *resume = sink_resume_point(rec->sink);
+
+	return (struct event_mark){ .next = resume->sync0_event_next,
+				    .mono_ns = resume->sync0_event_mono_ns };
+}
+
+/* Alarms of ecdaq-sync0 are events, too; they carry no sequence of ecdaqd's ring. */
+static void take_sync0_events(struct recorder *rec)
+{
+	struct event_mark mark = sync0_event_mark(rec);
+	struct event ev;
+	uint64_t sequence;
+	uint64_t lost;
+
+	event_feed_open(rec->sync0_events, &mark);
+	while (event_feed_read(rec->sync0_events, &ev, &sequence, &lost)) {
+		if (sample_feed_event(rec->samples, &ev, UINT64_MAX) < 0) {
+			event_feed_unread(rec->sync0_events);
+			break;
+		}
+		sink_mark_sync0_event(rec->sink, &ev, sequence);
+	}
+}
+
+/* What ecdaq-sync0 said of this session. */
+static void take_sync0(struct recorder *rec)
+{
+	struct event_mark mark = sync0_mark(rec);
+	struct sync0_result result;
+	uint64_t sequence;
+
+	if (sink_state(rec->sink) != SINK_READY) {
+		return;
+	}
+	take_sync0_events(rec);
+	sync0_feed_open(rec->sync0, &mark);
+	while (sync0_feed_read(rec->sync0, &result, &sequence)) {
+		if (result.session == sample_feed_number(rec->samples) &&
+		    sample_feed_sync0(rec->samples, &result, sequence) < 0) {
+			sync0_feed_unread(rec->sync0);
+			break;
+		}
+	}
+}
+
 static int end_session(struct recorder *rec, const char *reason)
 {
 	int r;
 
 	while (take_events(rec, EVENTS_ALL) == EVENTS_A_STEP) {
 	}
+	take_sync0(rec);
 	r = sink_end_session(rec->sink, reason);
 	if (r < 0) {
 		return r;
@@ -273,6 +336,7 @@ static enum recorder_result follow(struct recorder *rec)
 		return RECORDER_BUSY;
 	case SAMPLE_FEED_EMPTY:
 		(void)take_events(rec, EVENTS_ALL);
+		take_sync0(rec);
 		if (is_gone && sink_state(rec->sink) == SINK_READY &&
 		    end_session(rec, "producer gone") == 0) {
 			return RECORDER_ENDED;
@@ -300,6 +364,10 @@ enum recorder_result recorder_step(struct recorder *rec)
 
 		sample_feed_rewind(rec->samples);
 		event_feed_seek(rec->events, &mark);
+		mark = sync0_event_mark(rec);
+		event_feed_seek(rec->sync0_events, &mark);
+		mark = sync0_mark(rec);
+		sync0_feed_seek(rec->sync0, &mark);
 	}
 	if (rec->samples != NULL && sink_state(rec->sink) == SINK_READY) {
 		result = follow(rec);

@@ -20,8 +20,10 @@ struct recorder_options {
 	const char *ring_path;
 	const char *events_path;
 	const char *status_path; /* "": none */
-	const char *dir;         /* of the recordings */
-	int64_t pid;             /* for the status page */
+	const char *sync0_path;  /* results of ecdaq-sync0; "" or NULL: none */
+	const char *sync0_events_path;
+	const char *dir; /* of the recordings */
+	int64_t pid;     /* for the status page */
 	int64_t chunk_period_ns;
 	int64_t sync_period_ns;
 	int64_t rotate_period_ns; /* 0: never */

@@ -324,6 +324,14 @@ int sample_feed_is_behind(const struct sample_feed *s, const struct event *ev)
 	return timemap_tai_to_utc_ns(s->map, ev->tai_ns) > s->utc_ns;
 }
 
+int sample_feed_sync0(struct sample_feed *s, const struct sync0_result *result, uint64_t sequence)
+{
+	int64_t utc_ns = timemap_tai_to_utc_ns(s->map, result->tai_ns);
+	int r = sink_open_file(s->sink, s->next_cycle, s->utc_ns != 0 ? s->utc_ns : utc_ns);
+
+	return r < 0 ? r : sink_sync0(s->sink, result, utc_ns, sequence);
+}
+
 int sample_feed_event(struct sample_feed *s, const struct event *ev, uint64_t sequence)
 {
 	int64_t utc_ns = timemap_tai_to_utc_ns(s->map, ev->tai_ns);

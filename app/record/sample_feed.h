@@ -8,6 +8,7 @@
 
 #include "base/event.h"
 #include "base/ring.h"
+#include "base/sync0.h"
 #include "record/sink.h"
 
 struct sample_feed;
@@ -41,6 +42,9 @@ void sample_feed_rewind(struct sample_feed *s);
 int sample_feed_is_behind(const struct sample_feed *s, const struct event *ev);
 /** Give an event of the master to the sink, with text and time. 0 or -errno. */
 int sample_feed_event(struct sample_feed *s, const struct event *ev, uint64_t sequence);
+
+/** A result of ecdaq-sync0, the same. */
+int sample_feed_sync0(struct sample_feed *s, const struct sync0_result *result, uint64_t sequence);
 
 /** The kernel's TAI offset is @tai_offset_s. */
 void sample_feed_note_tai_offset(struct sample_feed *s, int32_t tai_offset_s);

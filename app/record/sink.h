@@ -53,6 +53,10 @@ int sink_open_file(struct sink *s, uint64_t first_cycle, int64_t utc_ns);
 int sink_sample(struct sink *s, const struct sample_header *header, const uint8_t *image,
 		int64_t utc_ns);
 int sink_event(struct sink *s, const struct messages_event *ev);
+/** A result of ecdaq-sync0, and its place in that ring; an alarm of it, the same. */
+int sink_sync0(struct sink *s, const struct sync0_result *result, int64_t utc_ns,
+	       uint64_t sequence);
+void sink_mark_sync0_event(struct sink *s, const struct event *ev, uint64_t sequence);
 int sink_timemap(struct sink *s, const struct timemap_state *state);
 /** UTC took a step: what follows goes to a new file, so that log times go up inside each. */
 int sink_clock_step(struct sink *s, const struct timemap_state *state);

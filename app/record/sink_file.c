@@ -190,6 +190,25 @@ int sink_event(struct sink *s, const struct messages_event *ev)
 	return 0;
 }
 
+int sink_sync0(struct sink *s, const struct sync0_result *result, int64_t utc_ns, uint64_t sequence)
+{
+	int r = record_file_sync0(s->file, result, utc_ns);
+
+	if (r < 0) {
+		return sink_trouble(s, r, record_file_path(s->file));
+	}
+	note_open(s);
+	s->resume.sync0_next = sequence + 1;
+	s->resume.sync0_mono_ns = result->mono_ns;
+	return 0;
+}
+
+void sink_mark_sync0_event(struct sink *s, const struct event *ev, uint64_t sequence)
+{
+	s->resume.sync0_event_next = sequence + 1;
+	s->resume.sync0_event_mono_ns = ev->mono_ns;
+}
+
 int sink_timemap(struct sink *s, const struct timemap_state *state)
 {
 	int r = 0;

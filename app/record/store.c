@@ -251,9 +251,14 @@ static const struct {
 	{ "event_next", offsetof(struct store_state, event_next) },
 	{ "event_mono_ns", offsetof(struct store_state, event_mono_ns) },
 	{ "sequence", offsetof(struct store_state, sequence) },
+	{ "sync0_next", offsetof(struct store_state, sync0_next) },
+	{ "sync0_mono_ns", offsetof(struct store_state, sync0_mono_ns) },
+	{ "sync0_event_next", offsetof(struct store_state, sync0_event_next) },
+	{ "sync0_event_mono_ns", offsetof(struct store_state, sync0_event_mono_ns) },
 };
 
-enum { STATE_FIELDS = sizeof(state_fields) / sizeof(state_fields[0]) };
+/* The first so many were always there; a file without the rest is from before ecdaq-sync0. */
+enum { STATE_FIELDS = sizeof(state_fields) / sizeof(state_fields[0]), STATE_FIELDS_OLD = 9 };
 
 /* "key=number"; each field must come in its place. */
 static int parse_state_line(const char *line, size_t field, struct store_state *state)
@@ -293,8 +298,11 @@ int store_load_state(const struct store *s, struct store_state *ret_state)
 		r = -EBADMSG;
 	}
 	for (size_t i = 0; i < STATE_FIELDS && r == 0; i++) {
-		r = fgets(line, sizeof(line), in) == NULL ? -EBADMSG
-							  : parse_state_line(line, i, &state);
+		if (fgets(line, sizeof(line), in) == NULL) {
+			r = i == STATE_FIELDS_OLD ? 0 : -EBADMSG;
+			break;
+		}
+		r = parse_state_line(line, i, &state);
 	}
 	fclose(in);
 	if (r == 0) {

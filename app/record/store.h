@@ -33,6 +33,10 @@ struct store_state {
 	uint64_t event_next;
 	int64_t event_mono_ns; /* of the event before that */
 	uint64_t sequence;     /* of the newest file */
+	uint64_t sync0_next;   /* the same of the rings of ecdaq-sync0: results and alarms */
+	int64_t sync0_mono_ns;
+	uint64_t sync0_event_next;
+	int64_t sync0_event_mono_ns;
 };
 
 /**
