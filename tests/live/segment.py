@@ -159,7 +159,7 @@ class Segment:
         return process.wait(60)
 
     def close(self) -> None:
-        for name in ("watch", "daemon", "recorder", "sim"):
+        for name in ("watch", "sync0", "daemon", "recorder", "sim"):
             process = self.processes.pop(name, None)
             if process is not None and process.poll() is None:
                 process.send_signal(signal.SIGCONT)

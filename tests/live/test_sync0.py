@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: MIT
+"""ecdaq-sync0 beside the master, on the edges of the simulated segment."""
+
+from __future__ import annotations
+
+import json
+import signal
+import socket
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from segment import BIN, Segment, recorded, wait_for
+
+WINDOW = "1s"
+
+
+class Checked:
+    """A segment whose edges ecdaq-sync0 follows."""
+
+    def __init__(self, segment: Segment) -> None:
+        self.segment = segment
+        self.edges = segment.folder / "edges"
+        self.control = segment.folder / "control"
+        self.dump = segment.folder / "dump"
+        segment.start_sim("--edges", str(self.edges), "--control", str(self.control))
+        segment.start_daemon()
+        segment.wait_for_op()
+        self.start_check()
+
+    def start_check(self) -> None:
+        self.segment.start(
+            "sync0",
+            str(BIN / "ecdaq-sync0"),
+            *self.segment.options(),
+            *["--edges", str(self.edges), "--dump", str(self.dump)],
+            *["--set", f"sync0.window={WINDOW}"],
+        )
+
+    def fault(self, line: str) -> None:
+        answer = self.segment.folder / "answer"
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sock:
+            sock.bind(str(answer))
+            sock.settimeout(30)
+            sock.sendto(line.encode(), str(self.control))
+            assert sock.recv(256).decode().strip() == "ok"
+        answer.unlink()
+
+    def report(self) -> dict[str, Any]:
+        got = self.segment.ecdaq("sync0", "--json", check=False)
+        return json.loads(got.stdout) if got.returncode == 0 else {}
+
+    def events(self) -> list[dict[str, Any]]:
+        lines = self.segment.ecdaq("events", "--json").stdout.splitlines()
+        return [e for e in map(json.loads, lines) if e["event"].startswith("sync0_")]
+
+    def wait_for_windows(self, count: int) -> dict[str, Any]:
+        def closed() -> dict[str, Any]:
+            report = self.report()
+            return report if report.get("windows", 0) >= count else {}
+
+        return wait_for(f"{count} windows", closed, 120)
+
+
+def silent_cycles(dump: Path, edges: Path, slave: int, other: int) -> list[int]:
+    """The cycles in which @other had an edge and @slave had none, by their DC times."""
+    due: dict[int, int] = {}
+    for line in dump.read_text().splitlines():
+        if line.startswith("c "):
+            words = line.split()
+            due[int(words[2])] = int(words[1])
+    seen: dict[int, set[int]] = {slave: set(), other: set()}
+    for line in edges.read_text().splitlines()[:-1]:
+        pos, _, dc = line.split()
+        seen[int(pos)].add(int(dc))
+    return sorted(due[dc] for dc in seen[other] - seen[slave] if dc in due)
+
+
+def test_pulses_that_do_not_come_are_told_with_slave_and_cycle(
+    make_segment: Callable[..., Segment],
+) -> None:
+    checked = Checked(make_segment())
+    segment = checked.segment
+    segment.start_recorder()
+    report = checked.wait_for_windows(2)
+    assert report["source"] == "simulated edges"
+    assert [line["slave"] for line in report["lines"]] == [0, 1]
+    assert checked.events() == []
+    checked.fault("at=0s sync0-lost slave=1 count=3")
+
+    def told() -> list[dict[str, Any]]:
+        return [e for e in checked.events() if e["event"] == "sync0_missing"]
+
+    events = wait_for("a missing pulse", told, 120)
+    assert len(events) == 1
+    assert events[0]["slave"] == 1
+    assert events[0]["arg"][0] == 3
+    first = events[0]["value"]
+    done = checked.report()["windows"]
+    wait_for("another window", lambda: checked.report()["windows"] > done, 120)
+    assert "missing" in segment.ecdaq("sync0").stdout
+    assert "lines" in segment.status()["sync0"]
+    assert "values" in segment.ecdaq("sync0", "--histogram").stdout
+    segment.stop("sync0")
+    truth = silent_cycles(checked.dump, checked.edges, slave=1, other=0)
+    assert truth == [first, first + 1, first + 2]
+    segment.stop("recorder")
+    bad = [m for m in recorded(segment.record_dir, "/ecdaq/sync0") if m.missing > 0]
+    assert [(m.slave, m.missing, m.first_missing, m.verdict) for m in bad] == [
+        (1, 3, first, "FAIL")
+    ]
+    names = [m.name for m in recorded(segment.record_dir, "/ecdaq/event")]
+    assert names.count("sync0_missing") == 1
+
+
+def test_a_slave_that_loses_power_is_lost_and_the_check_may_die_without_harm(
+    make_segment: Callable[..., Segment],
+) -> None:
+    checked = Checked(make_segment())
+    segment = checked.segment
+    checked.wait_for_windows(1)
+    before = segment.status()
+    segment.stop("sync0", signal.SIGKILL)
+    checked.start_check()
+    checked.wait_for_windows(1)
+    after = segment.wait_for_cycles(100, 60)
+    assert after["state"] == "OP"
+    assert after["pid"] == before["pid"]
+    checked.fault("at=0s sync0-lost slave=0 count=100000")
+    events = wait_for(
+        "SYNC0 lost",
+        lambda: [e for e in checked.events() if e["event"] == "sync0_lost"],
+        120,
+    )
+    assert [e["slave"] for e in events] == [0]
+    assert checked.report()["lines"][0]["lost"] is True
+    assert segment.stop("sync0") == 0
