@@ -23,7 +23,7 @@ MIB = 1 << 20
 SIZES_MIB = {"boot": 128, "rootA": 512, "rootB": 512}
 KERNEL = {"qemuarm64": "Image", "raspberrypi4-64": "kernel8.img"}
 TREES = ("bcm2711-rpi-4-b.dtb", "bcm2711-rpi-cm4-io.dtb")
-FIRMWARE = ("start4.elf", "fixup4.dat", "overlays/disable-bt.dtbo", "config.txt", *TREES)
+FIRMWARE = ("start4.elf", "fixup4.dat", "config.txt", *TREES)
 
 
 @dataclass(frozen=True)

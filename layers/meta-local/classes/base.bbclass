@@ -29,12 +29,6 @@ addtask unpack after do_fetch
 do_unpack[cleandirs] = "${S}"
 python do_unpack() {
     uris = local_sources(d)
-    # What was renamed or taken away since the last time must not stay in a folder.
-    for uri in uris:
-        kind, _, path, _, _, parameters = bb.fetch2.decodeurl(uri)
-        place = os.path.join(d.getVar("WORKDIR"), parameters.get("subdir", ""), path)
-        if kind == "file" and os.path.isdir(place):
-            bb.utils.remove(place, recurse=True)
     if uris:
         bb.fetch2.Fetch(uris, d).unpack(d.getVar("WORKDIR"))
 }

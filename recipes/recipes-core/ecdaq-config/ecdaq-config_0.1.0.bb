@@ -16,6 +16,9 @@ DEBIAN_SECTION = "admin"
 DEBIAN_DEPENDS = "chrony, e2fsprogs, ecdaq, ethtool, fdisk, iproute2, openssh-server, procps, sudo, \
                   systemd, udev, util-linux"
 
+# What was renamed or taken away since the last time does not stay in the folder.
+do_unpack[cleandirs] += "${WORKDIR}/root"
+
 # files/root is the root file system's tree as it is on the target.
 do_install() {
 	cp -r "${WORKDIR}/root/." "${D}/"
