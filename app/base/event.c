@@ -40,6 +40,7 @@ static const struct {
 	[EVENT_RECORD_DISK_FULL] = { "record_disk_full", EVENT_ERROR },
 	[EVENT_RECORD_RESUMED] = { "record_resumed", EVENT_NOTICE },
 	[EVENT_COMMAND] = { "command", EVENT_NOTICE },
+	[EVENT_EMERGENCY] = { "emergency", EVENT_WARNING },
 	[EVENT_CONTROL_OVERRUN] = { "control_overrun", EVENT_WARNING },
 	[EVENT_CONTROL_CRASHED] = { "control_crashed", EVENT_ERROR },
 	[EVENT_SYNC0_LOST] = { "sync0_lost", EVENT_ERROR },
@@ -238,6 +239,20 @@ static int format_sync0(const struct event *ev, char *buf, size_t buf_len)
 	return snprintf(buf, buf_len, "%scycle %" PRId64 ": %s", where, ev->value, text);
 }
 
+/* Error code 0 takes an emergency back (ETG.1000.6). */
+static int format_emergency(const struct event *ev, char *buf, size_t buf_len)
+{
+	uint64_t data = (uint64_t)ev->value;
+
+	return snprintf(buf, buf_len,
+			"slave %u: emergency %s0x%04" PRIx32 ", error register 0x%02" PRIx32
+			", data %02x %02x %02x %02x %02x",
+			ev->slave_pos, ev->arg[0] == 0 ? "over, " : "", (uint32_t)ev->arg[0],
+			(uint32_t)ev->arg[1], (unsigned)(data & 0xff), (unsigned)(data >> 8 & 0xff),
+			(unsigned)(data >> 16 & 0xff), (unsigned)(data >> 24 & 0xff),
+			(unsigned)(data >> 32 & 0xff));
+}
+
 /* NOLINTNEXTLINE(readability-function-size): a table, one text an event */
 int event_format(const struct event *ev, char *buf, size_t buf_len)
 {
@@ -329,6 +344,8 @@ int event_format(const struct event *ev, char *buf, size_t buf_len)
 	case EVENT_RT_DEGRADED:
 		return snprintf(buf, buf_len, "degraded: no %s: %s",
 				event_rt_to_str((uint32_t)a[0]), reason(a[1]));
+	case EVENT_EMERGENCY:
+		return format_emergency(ev, buf, buf_len);
 	case EVENT_SDO_ABORT:
 		return snprintf(buf, buf_len,
 				"slave %u: SDO 0x%04" PRIx32 ":%02" PRIx32 " abort 0x%08" PRIx64,

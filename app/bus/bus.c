@@ -49,6 +49,11 @@ int bus_create(const struct config *cfg, struct line *line, struct bus **ret_bus
 	return 0;
 }
 
+void bus_listen(struct bus *bus, void (*emit)(void *ctx, const struct event *ev), void *emit_ctx)
+{
+	bus->listener = (struct bus_emit){ .call = emit, .ctx = emit_ctx };
+}
+
 void bus_destroy(struct bus *bus)
 {
 	free(bus);

@@ -32,6 +32,9 @@ struct bus;
 int bus_create(const struct config *cfg, struct line *line, struct bus **ret_bus);
 void bus_destroy(struct bus *bus);
 
+/** Where SDO aborts and CoE emergencies go, from any call below; nowhere at first. */
+void bus_listen(struct bus *bus, void (*emit)(void *ctx, const struct event *ev), void *emit_ctx);
+
 /* --- bring-up, in this order --- */
 
 /** Find the slaves, to PRE-OP, SYNC0 of an earlier run stopped first (T09); names them. */

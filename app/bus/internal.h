@@ -80,8 +80,14 @@ struct bus_slave {
 	mono_t retry_at;
 };
 
+struct bus_emit {
+	void (*call)(void *ctx, const struct event *ev);
+	void *ctx;
+};
+
 struct bus {
 	const struct config *cfg;
+	struct bus_emit listener; /* of mailbox events */
 	struct line *line;
 	char *error;      /* of the public call that runs */
 	uint8_t sequence; /* index byte of our own frames */
@@ -174,6 +180,8 @@ int bus_sdo_value(struct bus *bus, size_t pos, uint16_t index, uint8_t subindex,
 /** Mode and configured start-up SDOs of one slave, in PRE-OP. */
 int bus_startup_sdos(struct bus *bus, size_t pos);
 const char *bus_abort_text(uint32_t abort);
+/** Take what lies in the mailbox of a slave unasked: emergencies. */
+void bus_take_mail(struct bus *bus, size_t pos);
 
 /* --- map_sm.c --- */
 
@@ -219,10 +227,6 @@ void bus_sync0_stop(struct bus *bus);
 
 /* --- recover.c --- */
 
-struct bus_emit {
-	void (*call)(void *ctx, const struct event *ev);
-	void *ctx;
-};
 /** One step towards OP for a slave that is not there. */
 void bus_recover(struct bus *bus, size_t pos, const struct bus_emit *emit);
 void bus_emit_event(struct bus *bus, const struct bus_emit *emit, struct event ev);

@@ -27,7 +27,20 @@ const char *bus_abort_text(uint32_t abort)
 	return ec_sdoerror2string(abort);
 }
 
-/* What SOEM noted about the transfer that failed: -EREMOTEIO abort, -EMSGSIZE, -ETIMEDOUT nothing.
+static void tell_emergency(struct bus *bus, const ec_errort *note)
+{
+	uint64_t data = (uint64_t)note->b1 | (uint64_t)note->w1 << 8 | (uint64_t)note->w2 << 24;
+
+	bus_emit_event(bus, &bus->listener,
+		       (struct event){ .id = EVENT_EMERGENCY,
+				       .slave_pos = (uint16_t)(note->Slave - 1),
+				       .value = (int64_t)data,
+				       .arg = { note->ErrorCode, note->ErrorReg } });
+}
+
+/*
+ * What SOEM noted about the transfer that failed: -EREMOTEIO abort, -EMSGSIZE, -ETIMEDOUT nothing.
+ * An emergency that came meanwhile is told, whose ever it is (T30).
  */
 static int take_errors(struct bus *bus, uint16_t index, uint32_t *ret_abort)
 {
@@ -35,7 +48,9 @@ static int take_errors(struct bus *bus, uint16_t index, uint32_t *ret_abort)
 	ec_errort note;
 
 	while (ecx_poperror(&bus->context, &note)) {
-		if (note.Etype == EC_ERR_TYPE_SDO_ERROR && note.Index == index) {
+		if (note.Etype == EC_ERR_TYPE_EMERGENCY) {
+			tell_emergency(bus, &note);
+		} else if (note.Etype == EC_ERR_TYPE_SDO_ERROR && note.Index == index) {
 			*ret_abort = (uint32_t)note.AbortCode;
 			result = -EREMOTEIO;
 		} else if (note.Etype == EC_ERR_TYPE_PACKET_ERROR && note.Index == index &&
@@ -63,9 +78,23 @@ static int patience_us(const struct bus *bus, size_t pos)
 	return bus->slave[pos].step != RECOVERY_NONE ? FAST_US : EC_TIMEOUTRXM;
 }
 
-/* NOLINTNEXTLINE(readability-function-size): the promise of bus.h */
-int bus_sdo_read(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t subindex,
-		 uint8_t *ret_data, size_t *len, uint32_t *ret_abort)
+static void tell_abort(struct bus *bus, size_t pos, int32_t object, uint32_t abort)
+{
+	bus_emit_event(bus, &bus->listener,
+		       (struct event){ .id = EVENT_SDO_ABORT,
+				       .slave_pos = (uint16_t)pos,
+				       .value = abort,
+				       .arg = { object, 0 } });
+}
+
+static int32_t object_of(uint16_t index, uint8_t subindex)
+{
+	return (int32_t)((uint32_t)index << 8 | subindex);
+}
+
+/* NOLINTNEXTLINE(readability-function-size): as bus_sdo_read() */
+static int read_sdo(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t subindex,
+		    uint8_t *ret_data, size_t *len, uint32_t *ret_abort)
 {
 	int r = check_request(bus, slave_pos);
 	uint32_t abort = 0;
@@ -82,9 +111,22 @@ int bus_sdo_read(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t su
 		if (ecx_SDOread(&bus->context, soem_index(slave_pos), index, subindex, FALSE, &size,
 				ret_data, patience_us(bus, slave_pos)) > 0) {
 			*len = (size_t)size;
+			take_errors(bus, index, &abort);
 			return 0;
 		}
 		r = take_errors(bus, index, ret_abort);
+	}
+	return r;
+}
+
+/* NOLINTNEXTLINE(readability-function-size): the promise of bus.h */
+int bus_sdo_read(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t subindex,
+		 uint8_t *ret_data, size_t *len, uint32_t *ret_abort)
+{
+	int r = read_sdo(bus, slave_pos, index, subindex, ret_data, len, ret_abort);
+
+	if (r == -EREMOTEIO) {
+		tell_abort(bus, slave_pos, object_of(index, subindex), *ret_abort);
 	}
 	return r;
 }
@@ -105,19 +147,34 @@ int bus_sdo_write(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t s
 	for (int i = 0; i < TRIES && r == -ETIMEDOUT; i++) {
 		if (ecx_SDOwrite(&bus->context, soem_index(slave_pos), index, subindex, FALSE,
 				 (int)len, data, patience_us(bus, slave_pos)) > 0) {
+			take_errors(bus, index, &abort);
 			return 0;
 		}
 		r = take_errors(bus, index, ret_abort);
 	}
+	if (r == -EREMOTEIO) {
+		tell_abort(bus, slave_pos, object_of(index, subindex), *ret_abort);
+	}
 	return r;
 }
 
+void bus_take_mail(struct bus *bus, size_t pos)
+{
+	ec_mbxbuft mail = { 0 };
+	uint32_t abort;
+
+	/* An answer that nobody waits for any more is thrown away with it. */
+	ecx_mbxreceive(&bus->context, soem_index(pos), &mail, 0);
+	take_errors(bus, 0, &abort);
+}
+
+/* Looking whether an object is there: an abort is an answer, and no event. */
 int bus_sdo_value(struct bus *bus, size_t pos, uint16_t index, uint8_t subindex,
 		  uint64_t *ret_value, uint32_t *ret_abort)
 {
 	uint8_t data[8] = { 0 };
 	size_t len = sizeof(data);
-	int r = bus_sdo_read(bus, (uint16_t)pos, index, subindex, data, &len, ret_abort);
+	int r = read_sdo(bus, (uint16_t)pos, index, subindex, data, &len, ret_abort);
 
 	if (r < 0) {
 		return r;

@@ -11,7 +11,10 @@ enum {
 	MISSES_LOST = 2,
 	RECOVERIES_PER_CALL = 8,
 	DIFF_MAGNITUDE = 0x7fffffff,
-	LOOKS = 4, /* registers read of one slave */
+	LOOKS = 5, /* registers read of one slave */
+	SM_MAILBOX_IN = ESC_REG_SM + ESC_SM_BYTES,
+	SM_STATUS = 5,
+	SM_STATUS_FULL = 0x08,
 };
 
 struct look {
@@ -19,10 +22,11 @@ struct look {
 	uint8_t errors[ERROR_PORT_BYTES];
 	uint8_t lost_links[ERROR_LINK_BYTES];
 	uint8_t diff[4];
+	uint8_t mailbox;
 	uint16_t wkc[LOOKS];
 };
 
-enum { LOOK_AL, LOOK_ERRORS, LOOK_LOST_LINKS, LOOK_DIFF };
+enum { LOOK_AL, LOOK_ERRORS, LOOK_LOST_LINKS, LOOK_DIFF, LOOK_MAILBOX };
 
 static int look_at_all(struct bus *bus, struct look *look)
 {
@@ -43,6 +47,8 @@ static int look_at_all(struct bus *bus, struct look *look)
 					      look[i].lost_links },
 			[LOOK_DIFF] = { ESC_REG_DC_SYSTEM_TIME_DIFF, sizeof(look->diff),
 					look[i].diff },
+			[LOOK_MAILBOX] = { SM_MAILBOX_IN + SM_STATUS, sizeof(look->mailbox),
+					   &look[i].mailbox },
 		};
 
 		for (int k = 0; k < LOOKS; k++) {
@@ -168,6 +174,15 @@ static void count_errors(struct bus *bus, size_t pos, const struct look *look)
 	}
 }
 
+/* Nobody asked, for requests are answered one at a time: a slave has something to say. */
+static int has_mail(const struct bus *bus, size_t pos, const struct look *look)
+{
+	const struct bus_slave *sl = &bus->slave[pos];
+
+	return look->wkc[LOOK_MAILBOX] > 0 && (look->mailbox & SM_STATUS_FULL) != 0 &&
+	       !sl->is_lost && sl->step == RECOVERY_NONE && bus_has_coe(bus, pos);
+}
+
 static void show_sync(const struct bus_slave *sl, struct slave_status *page)
 {
 	uint32_t out_ns = sl->output_sync.minimum_cycle_ns;
@@ -252,6 +267,9 @@ int bus_watch(struct bus *bus, struct status_page *page,
 		if (is_here) {
 			note_state(bus, i, &look[i], &out);
 			count_errors(bus, i, &look[i]);
+		}
+		if (has_mail(bus, i, &look[i])) {
+			bus_take_mail(bus, i);
 		}
 		if (page != NULL) {
 			show(&bus->slave[i], &look[i], &page->slave[i]);

@@ -58,6 +58,11 @@ static int begin_control(struct session *s, struct failure *failure)
 
 /* --- the slaves --- */
 
+static void hear_bus(void *ctx, const struct event *ev)
+{
+	session_emit(ctx, ev);
+}
+
 static int open_line(struct session *s, struct failure *failure)
 {
 	struct transport transport;
@@ -76,7 +81,11 @@ static int open_line(struct session *s, struct failure *failure)
 	line_patience_set(s->line, (span_t){ s->spec.cfg->bus_frame_timeout_ns });
 	line_attend(s->line, s->spec.hooks.alive, s->spec.hooks.ctx);
 	r = bus_create(s->spec.cfg, s->line, &s->bus);
-	return r < 0 ? failure_set(failure, EXIT_CODE_RESOURCES, r, "bus: %s", strerror(-r)) : 0;
+	if (r < 0) {
+		return failure_set(failure, EXIT_CODE_RESOURCES, r, "bus: %s", strerror(-r));
+	}
+	bus_listen(s->bus, hear_bus, s);
+	return 0;
 }
 
 static void show_slaves(struct session *s)

@@ -1,0 +1,128 @@
+/* SPDX-License-Identifier: MIT */
+/* What slaves say in their mailboxes unasked, and what they refuse. */
+#include <errno.h>
+
+#include "base/bytes.h"
+#include "harness/test.h"
+#include "sim/bus/bus_bench.h"
+#include "wire/esc_reg.h"
+
+enum {
+	SM_IN = ESC_REG_SM + ESC_SM_BYTES,
+	MAILBOX_BYTES = 128,
+	MAILBOX_TYPE_COE = 3,
+	COE_EMERGENCY = 1,
+	CODE = 0x5112,
+	REGISTER = 0x21,
+};
+
+static struct {
+	unsigned count[EVENT_COUNT];
+	struct event last[EVENT_COUNT];
+} heard;
+
+static void hear(void *ctx, const struct event *ev)
+{
+	(void)ctx;
+	heard.count[ev->id]++;
+	heard.last[ev->id] = *ev;
+}
+
+static struct bus_bench *start(unsigned piccolos, uint64_t seed)
+{
+	struct bus_bench *b =
+		bench_create(&(struct bench_spec){ .piccolos = piccolos, .seed = seed });
+
+	bus_listen(b->bus, hear, NULL);
+	bench_bring_up(b);
+	bench_run(b, 100);
+	CHECK_EQ(heard.count[EVENT_SDO_ABORT], 0);
+	return b;
+}
+
+/* The application of @slave puts an emergency into its mailbox. */
+static void put_emergency(struct bus_bench *b, size_t slave)
+{
+	struct esc *esc = segment_esc(b->segment, slave);
+	uint8_t box[MAILBOX_BYTES] = { [0] = 10, [5] = MAILBOX_TYPE_COE | 1 << 4 };
+	uint8_t sm[4];
+
+	put_le16(box + 6, COE_EMERGENCY << 12);
+	put_le16(box + 8, CODE);
+	box[10] = REGISTER;
+	for (uint8_t i = 0; i < 5; i++) {
+		box[11 + i] = (uint8_t)(0xa0 + i);
+	}
+	esc_pdi_read(esc, bench_now_ns(b), SM_IN, sm, sizeof(sm));
+	CHECK_EQ(get_le16(sm + 2), sizeof(box));
+	esc_pdi_write(esc, bench_now_ns(b), get_le16(sm), box, sizeof(box));
+}
+
+static void check_emergency(unsigned count, uint16_t slave)
+{
+	const struct event *ev = &heard.last[EVENT_EMERGENCY];
+	char text[200];
+
+	CHECK_EQ(heard.count[EVENT_EMERGENCY], count);
+	CHECK_EQ(ev->slave_pos, slave);
+	CHECK_EQ(ev->arg[0], CODE);
+	CHECK_EQ(ev->arg[1], REGISTER);
+	event_format(ev, text, sizeof(text));
+	CHECK(strstr(text, "emergency 0x5112, error register 0x21, data a0 a1 a2 a3 a4") != NULL);
+}
+
+TEST(mailbox, emergency_that_nobody_asks_for_becomes_an_event)
+{
+	struct bus_bench *b = start(3, 111);
+	uint64_t bad = b->cycles - b->ok;
+
+	for (unsigned i = 1; i <= 5; i++) {
+		put_emergency(b, i % 3);
+		bench_run(b, 50);
+		CHECK_EQ(heard.count[EVENT_EMERGENCY], i - 1);
+		CHECK_EQ(bench_watch(b).is_all_op, 1);
+		check_emergency(i, (uint16_t)(i % 3));
+		bench_watch(b);
+		CHECK_EQ(heard.count[EVENT_EMERGENCY], i);
+	}
+	CHECK_EQ(b->cycles - b->ok, bad);
+	bench_destroy(b);
+}
+
+TEST(mailbox, emergency_in_front_of_an_answer_is_told_and_the_answer_is_read)
+{
+	struct bus_bench *b = start(2, 112);
+	uint8_t data[64];
+
+	for (unsigned i = 1; i <= 5; i++) {
+		uint32_t abort = 0;
+		size_t len = sizeof(data);
+
+		put_emergency(b, 1);
+		CHECK_EQ(bus_sdo_read(b->bus, 1, 0x1008, 0, data, &len, &abort), 0);
+		CHECK_EQ(len, strlen("FB1111-Piccolo"));
+		check_emergency(i, 1);
+	}
+	CHECK_EQ(heard.count[EVENT_SDO_ABORT], 0);
+	bench_destroy(b);
+}
+
+TEST(mailbox, sdo_that_a_slave_aborts_is_an_event_with_object_and_code)
+{
+	struct bus_bench *b = start(2, 113);
+	const struct event *ev = &heard.last[EVENT_SDO_ABORT];
+	uint8_t data[8] = { 0 };
+	uint32_t abort = 0;
+	size_t len = sizeof(data);
+
+	CHECK_EQ(bus_sdo_read(b->bus, 1, 0x5555, 3, data, &len, &abort), -EREMOTEIO);
+	CHECK_EQ(heard.count[EVENT_SDO_ABORT], 1);
+	CHECK_EQ(ev->slave_pos, 1);
+	CHECK_EQ(ev->arg[0], 0x555503);
+	CHECK_EQ(ev->value, 0x06020000);
+	CHECK_EQ(bus_sdo_write(b->bus, 0, 0x1008, 0, data, 4, &abort), -EREMOTEIO);
+	CHECK_EQ(heard.count[EVENT_SDO_ABORT], 2);
+	CHECK_EQ(ev->slave_pos, 0);
+	CHECK_EQ(ev->value, abort);
+	bench_destroy(b);
+}
