@@ -61,7 +61,7 @@ static struct coupler *self(struct sim_device *dev)
 
 static uint32_t get_bits(const uint8_t *image, uint32_t bit, uint8_t bits)
 {
-	return bits == 1 ? (image[bit / 8] >> bit % 8 & 1u) : get_le16(image + bit / 8);
+	return bits == 1 ? (uint32_t)image[bit / 8] >> bit % 8 & 1u : get_le16(image + bit / 8);
 }
 
 static void put_bits(uint8_t *image, uint32_t bit, uint8_t bits, uint32_t value)
@@ -87,7 +87,7 @@ static uint32_t measure(const struct coupler *c, size_t slot, unsigned channel, 
 	struct signal_spec signal;
 
 	if (c->node.slot[slot].module->bits == 1) {
-		return c->digital_in[slot] >> (channel - 1) & 1u;
+		return (uint32_t)c->digital_in[slot] >> (channel - 1) & 1u;
 	}
 	if (c->dev.signal == NULL) {
 		return 0;

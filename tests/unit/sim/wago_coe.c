@@ -3,7 +3,6 @@
 #include "base/bytes.h"
 #include "harness/test.h"
 #include "sim/devices/coe_dictionary.h"
-#include "sim/devices/wago_750_354.h"
 #include "wago_bench.h"
 
 enum { INFORMATION = 8, LIST = 1, OBJECT = 3, ENTRY = 5, REFUSED = 7 };
