@@ -17,9 +17,10 @@ It needs no privilege where the kernel grants users their own namespaces; real-t
 not to be had, and ecdaqd says so once.
 
   --seconds N     end after N seconds in OP (default: at Ctrl-C)
-  --slaves WHAT   1 to 64: so many FB1111+Piccolo slaves; or names, in order, from the folder of SII
-                  images: ek1100,el2828,el2889 (default: 2)
-  --sii DIR       folder of SII images for --slaves NAMES (default: $ECDAQ_SII)
+  --slaves WHAT   1 to 64: so many FB1111+Piccolo slaves; or names, in order: those that ecdaq-sim
+                  has built in (fb1111_piccolo, wago_750_354, plant; ecdaq-sim --help), and those of
+                  SII images: ek1100,el2828,el2889 (default: 2)
+  --sii DIR       folder of the SII images (default: $ECDAQ_SII)
   --config FILE   ecdaq.yaml for ecdaqd and ecdaq-record (default: built-in defaults)
   --record DIR    where recordings go (default: build/run/record)
   --no-dds        without ecdaq-dds. Else it publishes on this machine's loopback, in a domain and with a
@@ -29,7 +30,8 @@ not to be had, and ecdaqd says so once.
 environment:
   ECDAQ_BIN_DIR  folder of the programs (default: build/stage/bin)
   ECDAQ_RUN_DIR  run directory: rings, status, admin socket (default: a new one in /dev/shm, removed
-                 at the end). With it set, `ecdaq` in a second terminal reads what runs here.
+                 at the end). With it set, `ecdaq` in a second terminal reads what runs here, and
+                 app/tools/tell-segment.py sets inputs of the simulated slaves, or makes faults.
   ECDAQ_SII      as --sii
 USAGE
 }
@@ -80,6 +82,21 @@ parse_options()
 	done
 }
 
+# Is there a name among $slaves that ecdaq-sim has not built in?
+has_images()
+{
+	local name names
+
+	IFS=, read -ra names <<< "$slaves"
+	for name in "${names[@]}"; do
+		case $name in
+		fb1111_piccolo | wago_750_354 | wago_750_354+* | plant | plant:*) ;;
+		*) return 0 ;;
+		esac
+	done
+	return 1
+}
+
 check_options()
 {
 	case $seconds in
@@ -88,8 +105,8 @@ check_options()
 	case $slaves in
 	'') die "--slaves: nothing given" ;;
 	*[!0-9]*)
-		[ -n "$sii" ] || die "--slaves $slaves: names need --sii DIR, the folder of their SII images"
-		[ -d "$sii" ] || die "--sii: $sii: no such folder"
+		[ -n "$sii" ] || ! has_images || die "--slaves $slaves: names need --sii DIR, the folder of their SII images"
+		[ -z "$sii" ] || [ -d "$sii" ] || die "--sii: $sii: no such folder"
 		;;
 	*)
 		if [ "${#slaves}" -gt 2 ] || [ "$slaves" -lt 1 ] || [ "$slaves" -gt 64 ]; then
@@ -248,7 +265,7 @@ run_inside()
 {
 	local set_options=(--set bus.interface=ecat0 --set "record.dir=$record")
 	local daemon_options=(--simulated)
-	local segment_options=(--interface ecsim0 --slaves "$slaves")
+	local segment_options=(--interface ecsim0 --slaves "$slaves" --control "$ECDAQ_RUN_DIR/segment")
 
 	# As root the segment gets a real-time priority below the master's: it stands for hardware.
 	! chrt -f 1 true 2> /dev/null || segment_options+=(--priority 50)

@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 import pytest
-from ecdaq import BIN, environment
+from ecdaq import BIN, ROOT, environment
 
 SEGMENT = BIN / "ecdaq-sim"
 FAILED, USAGE = 1, 2
@@ -29,6 +29,8 @@ MISTAKES = [
     (FAILED, [*NIC, "--slaves", "plant:0"], "not plant[:TAU_MS[:GAIN]]"),
     (FAILED, [*NIC, "--slaves", "plant:50:nan"], "not plant[:TAU_MS[:GAIN]]"),
     (FAILED, [*NIC, "--slaves", "plant:50:1:"], "not plant[:TAU_MS[:GAIN]]"),
+    (FAILED, [*NIC, "--slaves", "wago_750_354+431"], "'wago_750_354+431': not wago_750_354"),
+    (FAILED, [*NIC, "--slaves", "wago_750_354+"], "'wago_750_354+': not wago_750_354"),
     (FAILED, [*NIC, "--ppm", "1,x"], "--ppm"),
     (FAILED, [*NIC, "--ppm", "1,2,3"], "more numbers than slaves"),
     (FAILED, [*NIC, "--ppm", "nan"], "--ppm"),
@@ -104,7 +106,7 @@ def test_a_fault_plan_names_the_line_of_its_mistake(tmp_path: Path) -> None:
 
 
 def ask(path: Path, here: Path, line: str) -> str:
-    """One fault line to the control socket, and its answer."""
+    """One line to the control socket, and its answer."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as s:
         s.bind(str(here))
         s.settimeout(10)
@@ -129,6 +131,31 @@ def test_it_takes_faults_while_it_runs_and_ends_with_a_summary(run_dir: Path) ->
     assert running.returncode == 0
     assert one_line(stderr) == "ecdaq-sim: 0 frames, 0 damaged\n"
     assert not control.exists()
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="a packet socket needs CAP_NET_RAW")
+def test_io_lines_reach_the_terminals_while_it_runs(run_dir: Path) -> None:
+    control = run_dir / "control"
+    slaves = ["--slaves", "wago_750_354,wago_750_354+530,fb1111_piccolo"]
+    with subprocess.Popen([SEGMENT, *NIC, *slaves, "--control", control]) as running:
+        wait_for(control)
+        for line, answer in (
+            ("io slave=0", "slot1=0,0,0,0 slot2=0,0,0,0 slot3=0x00 slot4=0x00"),
+            ("io slave=1", "slot1=0x00"),
+            ("io slave=2", "led=0"),
+            ("io slave=3", "io: slave=N is missing, or no such slave"),
+            ("io slave=0 slot3.9=1", "slot3.9=1: no such input, or no such value"),
+            ("io slave=2 led=1", "led=1: no such input, or no such value"),
+        ):
+            assert ask(control, run_dir / "me", line) == answer
+        tell = [ROOT / "app" / "tools" / "tell-segment.py", "--control", control]
+        said = subprocess.run([*tell, "io", "slave=1"], capture_output=True, text=True, check=True)
+        assert said.stdout == "slot1=0x00\n"
+        running.send_signal(signal.SIGTERM)
+        assert running.wait(10) == 0
+    gone = subprocess.run([*tell, "io slave=1"], capture_output=True, text=True, check=False)
+    assert gone.returncode == FAILED
+    assert gone.stderr == f"tell-segment: {control}: No such file or directory\n"
 
 
 def wait_for(path: Path) -> None:
