@@ -28,15 +28,22 @@ static struct line *line_on(struct fake_wire *wire)
 	return line;
 }
 
+/* Ask slave 0x1001 for its AL status, index 7, with 2 ms for the answer. */
+static int ask_status(struct line *line, uint8_t answer[LIMIT_FRAME_BYTES])
+{
+	uint8_t frame[LIMIT_FRAME_BYTES];
+	size_t len = make_frame(frame, ECAT_CMD_FPRD, 7, 0x1001, ESC_REG_AL_STATUS);
+
+	return line_transact(line, frame, len, answer, LIMIT_FRAME_BYTES, (span_t){ 2000000 });
+}
+
 TEST(line, direct_transaction_returns_the_echo)
 {
 	struct fake_wire wire = { 0 };
 	struct line *line = line_on(&wire);
-	uint8_t frame[LIMIT_FRAME_BYTES];
 	uint8_t answer[LIMIT_FRAME_BYTES];
-	size_t len = make_frame(frame, ECAT_CMD_FPRD, 7, 0x1001, ESC_REG_AL_STATUS);
 
-	CHECK_EQ(line_transact(line, frame, len, answer, sizeof(answer), (span_t){ 2000000 }), len);
+	CHECK_EQ(ask_status(line, answer), 60);
 	CHECK_EQ(answer[28], 1);
 	CHECK_EQ(wire.now_ns, FAKE_TRAVEL_NS);
 	CHECK_EQ(line_thrown_away(line), 0);
@@ -62,15 +69,13 @@ TEST(line, answer_to_an_earlier_index_is_thrown_away)
 {
 	struct fake_wire wire = { 0 };
 	struct line *line = line_on(&wire);
-	uint8_t frame[LIMIT_FRAME_BYTES];
 	uint8_t stale[LIMIT_FRAME_BYTES];
 	uint8_t answer[LIMIT_FRAME_BYTES];
 	size_t len = make_frame(stale, ECAT_CMD_FPRD, 6, 0x1001, ESC_REG_AL_STATUS);
 
 	fake_pass_slave(stale, len);
 	fake_queue(&wire, stale, len, 0);
-	make_frame(frame, ECAT_CMD_FPRD, 7, 0x1001, ESC_REG_AL_STATUS);
-	CHECK_EQ(line_transact(line, frame, len, answer, sizeof(answer), (span_t){ 2000000 }), len);
+	CHECK_EQ(ask_status(line, answer), len);
 	CHECK_EQ(answer[17], 7);
 	CHECK_EQ(line_thrown_away(line), 1);
 	line_destroy(line);
@@ -80,15 +85,12 @@ TEST(line, flood_of_foreign_frames_costs_the_timeout_and_no_more)
 {
 	struct fake_wire wire = { .drop = 1, .flood_ns = 3000 };
 	struct line *line = line_on(&wire);
-	uint8_t frame[LIMIT_FRAME_BYTES];
 	uint8_t answer[LIMIT_FRAME_BYTES];
-	size_t len = make_frame(frame, ECAT_CMD_FPRD, 7, 0x1001, ESC_REG_AL_STATUS);
 
-	CHECK_EQ(line_transact(line, frame, len, answer, sizeof(answer), (span_t){ 2000000 }),
-		 -ETIMEDOUT);
+	CHECK_EQ(ask_status(line, answer), -ETIMEDOUT);
 	CHECK(wire.now_ns >= 2000000 && wire.now_ns <= 2003000);
 	CHECK_EQ(line_thrown_away(line), wire.flooded);
-	CHECK_EQ(line_transact(line, frame, len, answer, sizeof(answer), (span_t){ 2000000 }), len);
+	CHECK_EQ(ask_status(line, answer), 60);
 	line_destroy(line);
 }
 
@@ -117,12 +119,9 @@ static void check_refused(void (*answer_fn)(struct fake_wire *, uint8_t *, size_
 {
 	struct fake_wire wire = { .answer = answer_fn };
 	struct line *line = line_on(&wire);
-	uint8_t frame[LIMIT_FRAME_BYTES];
 	uint8_t answer[LIMIT_FRAME_BYTES];
-	size_t len = make_frame(frame, ECAT_CMD_FPRD, 7, 0x1001, ESC_REG_AL_STATUS);
 
-	CHECK_EQ(line_transact(line, frame, len, answer, sizeof(answer), (span_t){ 2000000 }),
-		 -ETIMEDOUT);
+	CHECK_EQ(ask_status(line, answer), -ETIMEDOUT);
 	CHECK_EQ(line_thrown_away(line), 1);
 	line_destroy(line);
 }
