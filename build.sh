@@ -65,9 +65,9 @@ Without GROUP all groups run, the fast ones first:
   fuzz     every fuzz target: its corpus, then some seconds of search
   recipes  the image's recipes and layers, parsed by BitBake, held against their rules
   live     everything over a veth pair, in real time
+  dds      samples and commands over DDS between two namespaces
 Only when named:
   boot     the image in QEMU; needs root and ./build.sh image
-  dds      samples and commands over DDS between two namespaces; needs CycloneDDS
 To come: control sync0.
 
   --keep-going      run all groups even if one fails (default)

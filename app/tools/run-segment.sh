@@ -139,7 +139,7 @@ start_dds()
 		return 0
 	fi
 	setpriv --pdeathsig TERM setsid "$bin/ecdaq-dds" "${options[@]}" < /dev/null &
-	export ECDAQ_RUN_DDS_PID=$!
+	export run_dds_pid=$!
 	[[ ${options[*]} != *dds.tag=run-$$ ]] ||
 		note "DDS: ecdaq-remote --interface lo --domain $private_domain --tag run-$$ watch"
 }
@@ -153,7 +153,7 @@ enter_namespace()
 		die "this kernel grants no network namespace to user $(id -un): run it as root"
 	if [ -z "${ECDAQ_RUN_DIR:-}" ]; then
 		ECDAQ_RUN_DIR=$(mktemp -d /dev/shm/ecdaq-run-XXXXXX)
-		export ECDAQ_RUN_DIR ECDAQ_RUN_DIR_IS_OWN=yes
+		export ECDAQ_RUN_DIR run_dir_is_own=yes
 	fi
 	mkdir -p "$ECDAQ_RUN_DIR"
 	start_dds
@@ -209,15 +209,15 @@ stop()
 # ecdaq-dds was started before this shell: tail stands in for it, and ends when it does.
 adopt_dds()
 {
-	[ -n "${ECDAQ_RUN_DDS_PID:-}" ] || return 0
-	setsid tail --pid="$ECDAQ_RUN_DDS_PID" -s 0.1 -f /dev/null &
+	[ -n "${run_dds_pid:-}" ] || return 0
+	setsid tail --pid="$run_dds_pid" -s 0.1 -f /dev/null &
 	pid[dds]=$!
 }
 
 stop_dds()
 {
 	[ -n "${pid[dds]:-}" ] || return 0
-	kill -TERM "$ECDAQ_RUN_DDS_PID" 2> /dev/null || true
+	kill -TERM "$run_dds_pid" 2> /dev/null || true
 	wait "${pid[dds]}" || true
 	unset 'pid[dds]'
 }
@@ -238,7 +238,7 @@ clean_up()
 {
 	trap '' INT TERM
 	end_in_order
-	[ -z "${ECDAQ_RUN_DIR_IS_OWN:-}" ] || rm -rf "$ECDAQ_RUN_DIR"
+	[ -z "${run_dir_is_own:-}" ] || rm -rf "$ECDAQ_RUN_DIR"
 }
 
 # Which of the children ended? Waits for the first.

@@ -286,7 +286,7 @@ GROUPS: dict[str, list[Suite]] = {
     "boot": [replace(pytest("boot", "release", "-s"), seconds=BOOT_SECONDS)],
 }
 # Too long for every run: only when named. Their numbers stand in the log.
-ON_REQUEST = ("dds", "boot")
+ON_REQUEST = ("boot",)
 LATER = ("sync0",)
 
 
