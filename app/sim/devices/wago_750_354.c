@@ -314,12 +314,13 @@ int wago_750_354_get(const struct sim_device *dev, size_t slot, unsigned channel
 int wago_750_354_set(struct sim_device *dev, size_t slot, unsigned channel, int is_on)
 {
 	struct coupler *c = self(dev);
-	unsigned bit = 1u << (channel - 1);
+	unsigned bit;
 
 	if (!has_channel(c, slot, channel) || c->node.slot[slot].module->is_output ||
 	    c->node.slot[slot].module->bits != 1) {
 		return -EINVAL;
 	}
+	bit = 1u << (channel - 1);
 	c->digital_in[slot] =
 		(uint8_t)(is_on ? c->digital_in[slot] | bit : c->digital_in[slot] & ~bit);
 	return 0;
