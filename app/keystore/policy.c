@@ -85,10 +85,10 @@ static void format_time(int64_t unix_s, char *ret_text)
 
 size_t policy_permissions(const struct policy_grant *grant, char *ret_text)
 {
-	static const char *const published[] = {
-		"ecdaq/sample",  "ecdaq/block", "ecdaq/channels",  "ecdaq/status", "ecdaq/event",
-		"ecdaq/timemap", "ecdaq/idl",   "rt/ecdaq/sample", "ecdaq/reply"
-	};
+	static const char *const published[] = { "ecdaq/sample", "ecdaq/block", "ecdaq/channels",
+						 "ecdaq/status", "ecdaq/event", "ecdaq/timemap",
+						 "ecdaq/sync0",  "ecdaq/idl",   "rt/ecdaq/sample",
+						 "ecdaq/reply" };
 	static const char *const commands[] = { "ecdaq/command" };
 	enum { PUBLISHED = sizeof(published) / sizeof(published[0]) };
 	struct text text = { .start = ret_text, .len = 0 };

@@ -19,6 +19,7 @@
 #include "publish/own_status.h"
 #include "publish/samples.h"
 #include "publish/state.h"
+#include "publish/sync0.h"
 #include "publish/topics.h"
 
 #define LOOK_NS (NS_PER_S / 10) /* for rings and pages */
@@ -31,6 +32,8 @@ struct publisher {
 	dds_entity_t waitset;
 	struct commands *commands;
 	struct events events;
+	struct events sync0_events; /* its alarms go to ecdaq/event, too */
+	struct sync0 sync0;
 	struct own_status own;
 	char ring_path[CONFIG_PATH_BYTES];
 	char status_path[CONFIG_PATH_BYTES];
@@ -59,6 +62,11 @@ static int find_paths(struct publisher *p)
 	r = r < 0 ? r
 		  : config_run_path(p->cfg, CONFIG_RUN_EVENTS, p->events.path,
 				    sizeof(p->events.path));
+	r = r < 0 ? r
+		  : config_run_path(p->cfg, CONFIG_RUN_SYNC0_EVENTS, p->sync0_events.path,
+				    sizeof(p->sync0_events.path));
+	r = r < 0 ? r
+		  : config_run_path(p->cfg, CONFIG_RUN_SYNC0, p->sync0.path, sizeof(p->sync0.path));
 	r = r < 0 ? r
 		  : config_run_path(p->cfg, CONFIG_RUN_DDS_STATUS, p->own.path,
 				    sizeof(p->own.path));
@@ -167,6 +175,8 @@ void publisher_destroy(struct publisher *p)
 	topics_close(&p->topics); /* no listener is called from here on */
 	commands_destroy(p->commands);
 	events_close(&p->events);
+	events_close(&p->sync0_events);
+	sync0_close(&p->sync0);
 	ring_reader_destroy(p->ring);
 	status_unmap(p->page, sizeof(*p->page));
 	free(p);
@@ -235,6 +245,8 @@ static int look(struct publisher *p, int64_t now, char *error, size_t error_byte
 	look_at_page(p);
 	follow_ring(p);
 	events_follow(&p->events);
+	events_follow(&p->sync0_events);
+	sync0_follow(&p->sync0);
 	commands_follow(p->commands);
 	if (p->looks++ % LOOKS_A_STATUS == 0) {
 		tell_state(p);
@@ -313,6 +325,8 @@ int publisher_step(struct publisher *publisher, char *error, size_t error_bytes)
 	}
 	is_in_flight = commands_step(p->commands, &p->topics, &view);
 	events_step(&p->events, &p->topics, p->samples);
+	events_step(&p->sync0_events, &p->topics, p->samples);
+	sync0_step(&p->sync0, &p->topics, p->samples);
 	if (!has_more) {
 		wait_for_news(p, is_in_flight);
 	}

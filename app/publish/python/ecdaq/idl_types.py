@@ -129,6 +129,44 @@ class TimeMapV1(IdlStruct, typename="ecdaq.TimeMapV1"):
 
 @dataclass
 @final
+class Sync0V1(IdlStruct, typename="ecdaq.Sync0V1"):
+    slave: types.uint16
+    key("slave")
+    line: types.uint16
+    session: types.uint64
+    utc_ns: types.int64
+    source: str
+    verdict: str
+    first_cycle: types.uint64
+    cycles: types.uint64
+    edges: types.uint64
+    missing: types.uint64
+    extra: types.uint64
+    overflow: types.uint64
+    first_missing: types.uint64
+    step_ns: types.int64
+    period_ns: types.float64
+    period_sd_ns: types.float64
+    jitter_p99_ns: types.int64
+    jitter_max_ns: types.int64
+    drift_ppb: types.float64
+    drift_error_ppb: types.float64
+    rate_ppb: types.float64
+    rate_error_ppb: types.float64
+    phase_ns: types.int64
+    phase_error_ns: types.int64
+    frame_ns: types.int64
+    skew_ns: types.int64
+    skew_error_ns: types.int64
+    dc_diff_ns: types.int64
+    shot_dc_ns: types.int64
+    shot_late_ns: types.int64
+    has: types.uint32
+    resolved: types.uint32
+
+
+@dataclass
+@final
 class IdlV1(IdlStruct, typename="ecdaq.IdlV1"):
     text: str
 
