@@ -18,5 +18,6 @@ def test_nobody_is_let_in(machine: Machine) -> None:
 
 
 def test_the_bus_runs_all_the_same(machine: Machine) -> None:
-    machine.wait_for_console(r"login:")
+    machine.wait_for_console(r"ecat0: entered promiscuous mode")
+    machine.wait_for_console(r"Started .*ecdaqd.service")
     assert "ecdaq-preinit: memory instead" not in machine.console()
