@@ -51,7 +51,8 @@ def test_types_are_those_of_the_idl() -> None:
     assert of_idl() == of_python()
     keys = dict(re.findall(r"@final struct (\w+) \{[^}]*?@key [a-z ]+ (\w+);", IDL))
     assert keys == {
-        "SampleV1": "slave", "BlockV1": "slave", "Sync0V1": "slave", "CommandV1": "commander", "ReplyV1": "commander",
+        "SampleV1": "slave", "BlockV1": "slave", "Sync0V1": "slave",
+        "CommandV1": "commander", "ReplyV1": "commander",
     }  # fmt: skip
     for name, key in keys.items():
         text = (KIT / "ecdaq" / "idl_types.py").read_text()
