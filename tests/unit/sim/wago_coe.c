@@ -1,8 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* The WAGO coupler's object dictionary, and what SDO information says of it. */
 #include "base/bytes.h"
+#include "base/prng.h"
 #include "harness/test.h"
 #include "sim/devices/coe_dictionary.h"
+#include "sim/devices/coe_server.h"
+#include "sim/devices/wago_node.h"
 #include "wago_bench.h"
 
 enum { INFORMATION = 8, LIST = 1, OBJECT = 3, ENTRY = 5, REFUSED = 7 };
@@ -212,4 +215,53 @@ TEST(wago_coe, an_object_is_a_variable_or_a_record)
 	CHECK_EQ(answer[10], 4);
 	CHECK_EQ(answer[11], 9);
 	bench_destroy(b);
+}
+
+/* Buffers of exactly their size, so that a sanitizer sees each byte beyond. */
+static size_t answer_random(struct coe_server *server, struct prng *prng)
+{
+	size_t len = (size_t)prng_below(prng, 40);
+	size_t capacity = 10 + (size_t)prng_below(prng, 200);
+	uint8_t *request = malloc(len + 1);
+	uint8_t *answer = malloc(capacity);
+	size_t n;
+
+	CHECK(request != NULL && answer != NULL);
+	for (size_t i = 0; i < len; i++) {
+		request[i] = (uint8_t)prng_next(prng);
+	}
+	if (len >= 9) {
+		static const uint16_t known[] = { 0x1000, 0x1008, 0x1018, 0x1c12, 0x1aff, 0x1601,
+						  0x6000, 0x7030, 0xf050, 0x9000, 0xf100, 0x10f3 };
+
+		request[1] = (uint8_t)(prng_below(prng, 2) != 0 ? INFORMATION << 4 : 2 << 4);
+		request[2] = (uint8_t)(prng_below(prng, 3) != 0 ? request[2] : prng_below(prng, 8));
+		put_le16(request + (request[1] == INFORMATION << 4 ? 6 : 3),
+			 known[prng_below(prng, sizeof(known) / sizeof(known[0]))]);
+	}
+	n = coe_server_answer(server, request, len, answer, capacity);
+	CHECK(n <= capacity);
+	free(request);
+	free(answer);
+	return n;
+}
+
+TEST(wago_coe, no_request_whatever_its_bytes_breaks_it)
+{
+	static struct wago_node node;
+	static struct coe_server server;
+	const struct wago_module *modules[] = { wago_module_find(457), wago_module_find(530) };
+	struct prng prng = { 20261121 };
+	struct coe_value v;
+	unsigned answers = 0;
+
+	CHECK_EQ(wago_node_init(&node, modules, 2), 0);
+	coe_dictionary_init(&server.dictionary, &node.sii, "fuzzed");
+	wago_node_complete(&node, &server.dictionary);
+	for (int i = 0; i < 50000; i++) {
+		answers += answer_random(&server, &prng) > 0;
+	}
+	CHECK(answers > 25000);
+	CHECK_EQ(coe_dictionary_read(&server.dictionary, 0x1c12, 0, &v), COE_OK);
+	CHECK_EQ(v.bytes[0], 3);
 }
