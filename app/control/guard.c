@@ -3,7 +3,6 @@
 
 #include <errno.h>
 #include <fenv.h>
-#include <pthread.h>
 #include <stdatomic.h>
 #include <stddef.h>
 #include <unistd.h>

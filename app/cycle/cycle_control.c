@@ -68,7 +68,11 @@ int cycle_is_control_safe(const struct cycle *cy)
 
 void cycle_count_down(struct cycle *cy)
 {
-	if (cy->last_steps > 0 && --cy->last_steps == 0) {
+	if (cy->last_steps == 0) {
+		return;
+	}
+	cy->last_steps--;
+	if (cy->last_steps == 0) {
 		cycle_stop(cy);
 	}
 }

@@ -28,6 +28,7 @@ SUITE_SECONDS = 3000
 BOOT_SECONDS = 9000
 # What two threads share, and how they hand it over: these run under ThreadSanitizer.
 SHARED_STATE_TESTS = r"^(ring|line|board|handover|status|histogram)[._]"
+CONTROL_TESTS = r"^(control|sim_control|sim_loopback)[.]"
 
 
 @dataclass
@@ -283,10 +284,21 @@ GROUPS: dict[str, list[Suite]] = {
     "recipes": [pytest("recipes", "release")],
     "live": [ctest("live", "release"), pytest("live", "release")],
     "dds": [pytest("dds", "release", "-s")],
+    # What unit, sim, cli and live have of control programs, together.
+    "control": [
+        Suite("control release", "release", run_ctest, ("-R", CONTROL_TESTS)),
+        Suite("control cli python", "release", run_pytest, ("tests/cli", "-k", "control")),
+        Suite(
+            "control live python",
+            "release",
+            run_pytest,
+            ("tests/live", "-k", "control or loopback"),
+        ),
+    ],
     "boot": [replace(pytest("boot", "release", "-s"), seconds=BOOT_SECONDS)],
 }
-# Too long for every run: only when named. Their numbers stand in the log.
-ON_REQUEST = ("boot",)
+# Too long for every run, or part of other groups: only when named.
+ON_REQUEST = ("boot", "control")
 LATER = ("sync0",)
 
 

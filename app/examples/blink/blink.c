@@ -26,7 +26,7 @@ struct blink {
 
 static int option_cycles(const struct ecdaq_init *in, const char *key, int64_t *ret_ns)
 {
-	double cycles = (double)(*ret_ns / in->period_ns);
+	double cycles = (double)*ret_ns / (double)in->period_ns;
 	int r = ecdaq_option_number(in, key, &cycles);
 
 	if (r == -EINVAL) {

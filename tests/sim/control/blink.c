@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* The example "blink": the LED by process data, a pulse by one-shot SYNC0. */
-#include "harness/control_probe/probe.h"
 #include "harness/test.h"
 #include "sim/devices/fb1111_piccolo.h"
 #include "sim/harness/virtual_master.h"
