@@ -38,12 +38,32 @@ is_present()
 	hdr:*) printf '#include <%s>\n' "${1#hdr:}" | gcc -E - > /dev/null 2>&1 ;;
 	pymod:*) find_python > /dev/null ;;
 	file:*) [ -e "${1#file:}" ] ;;
+	hdr++:*) printf '#include <%s>\n' "${1#hdr++:}" | c++ -x c++ -E - > /dev/null 2>&1 ;;
 	fuzzer)
 		printf 'int LLVMFuzzerTestOneInput(const char *d, unsigned long n) { return !d || !n; }\n' |
 			clang -x c -fsanitize=fuzzer -o /dev/null - > /dev/null 2>&1
 		;;
 	*) die "app/tools/packages.txt: unknown check '$1'" ;;
 	esac
+}
+
+# "A@12|B@13" is A in Debian 12 and B in Debian 13.
+package_here()
+{
+	case $1 in *@*) ;; *)
+		printf '%s\n' "$1"
+		return
+		;;
+	esac
+	# shellcheck disable=SC1090 # a file of the machine
+	version=$(. "${ECDAQ_OS_RELEASE:-/etc/os-release}" && printf '%s\n' "${VERSION_ID:-}")
+	for name in $(printf '%s\n' "$1" | tr '|' ' '); do
+		if [ "${name#*@}" = "$version" ]; then
+			printf '%s\n' "${name%@*}"
+			return
+		fi
+	done
+	printf '%s\n' "${1%%@*}"
 }
 
 # Lines "PACKAGE WHY" of what is missing for the purposes given.
@@ -53,7 +73,8 @@ missing_packages()
 		for purpose in "$@"; do
 			case ,$purposes, in
 			*,"$purpose",*)
-				is_present "$check" || printf '%s\t%s\n' "$package" "$why"
+				is_present "$check" ||
+					printf '%s\t%s\n' "$(package_here "$package")" "$why"
 				break
 				;;
 			esac
