@@ -7,6 +7,7 @@
 #include "harness/control_probe/probe.h"
 #include "harness/test.h"
 #include "sim/devices/fb1111_piccolo.h"
+#include "sim/harness/rt_guard.h"
 #include "sim/harness/virtual_master.h"
 #include "wire/al.h"
 
@@ -40,7 +41,8 @@ static int light_up(const struct ecdaq_cycle *cy, void *state)
 	return ECDAQ_GO_ON;
 }
 
-static void open_all(int (*cycle)(const struct ecdaq_cycle *cy, void *state))
+static void open_with(const char *const *wanted,
+		      int (*cycle)(const struct ecdaq_cycle *cy, void *state))
 {
 	struct probe *probe = probe_use();
 
@@ -49,12 +51,17 @@ static void open_all(int (*cycle)(const struct ecdaq_cycle *cy, void *state))
 	crash_at = UINT64_MAX;
 	calls = firsts = 0;
 	virtual_bench_init(&b, &(struct virtual_spec){ .ppm = { 40, -60 }, .seed = 5 });
-	virtual_master_init(&vm, &b, settings);
+	virtual_master_init(&vm, &b, wanted);
 	if (virtual_master_bring_up(&vm) < 0) {
 		test_fail(__FILE__, __LINE__, "%s", vm.failure.text);
 	}
 	virtual_master_run(&vm, 100);
 	CHECK_EQ(fb1111_piccolo_led(segment_device(b.segment, 0)), 1);
+}
+
+static void open_all(int (*cycle)(const struct ecdaq_cycle *cy, void *state))
+{
+	open_with(settings, cycle);
 }
 
 static void close_all(void)
@@ -222,5 +229,89 @@ TEST(sim_control, a_program_that_asks_for_safety_gets_it_in_the_next_frame)
 	CHECK_EQ(session_page(vm.session)->control.safe_cycles, 50);
 	CHECK_EQ(session_page(vm.session)->control.state, CONTROL_SAFE);
 	virtual_master_stop(&vm);
+	close_all();
+}
+
+static uint64_t slow_at;
+
+/* In that cycle it takes 300 us of virtual time. */
+static int be_slow_once(const struct ecdaq_cycle *cy, void *state)
+{
+	(void)state;
+	calls++;
+	ecdaq_set(cy, led, 1);
+	if (cy->number == slow_at) {
+		struct platform pf = in_process_platform(b.host);
+
+		rt_guard_disarm(); /* the simulated world, not the cycle */
+		pf.sleep_until(pf.ctx, mono_add(pf.now(pf.ctx), (span_t){ 300 * NS_PER_US }));
+		rt_guard_arm();
+	}
+	return ECDAQ_GO_ON;
+}
+
+/* Run until the slow cycle and @cycles more; what virtual_master_run() said. */
+static int run_slowly(const char *policy, uint64_t cycles)
+{
+	static char overrun[64];
+	const char *wanted[8] = { NULL };
+	size_t n = 0;
+
+	for (; settings[n] != NULL; n++) {
+		wanted[n] = settings[n];
+	}
+	snprintf(overrun, sizeof(overrun), "control.overrun=%s", policy);
+	wanted[n] = overrun;
+	slow_at = UINT64_MAX;
+	open_with(wanted, be_slow_once);
+	slow_at = virtual_master_sample(&vm)->cycle + 20;
+	return virtual_master_run(&vm, 20 + cycles);
+}
+
+static const struct control_status *seen(void)
+{
+	return &session_page(vm.session)->control;
+}
+
+TEST(sim_control, a_call_beyond_its_budget_is_counted_with_an_event)
+{
+	char text[256] = "";
+
+	CHECK_EQ(run_slowly("count", 100), SESSION_GOES_ON);
+	CHECK_EQ(seen()->overruns, 1);
+	CHECK(seen()->time.max_ns >= 300 * NS_PER_US && seen()->time.max_ns < 400 * NS_PER_US);
+	CHECK_EQ(seen()->state, CONTROL_RUNNING);
+	CHECK_EQ(virtual_master_value(&vm, "a.led"), 1);
+	CHECK_EQ(events(EVENT_CONTROL_OVERRUN, text, sizeof(text)), 1);
+	CHECK(strstr(text, "of 200000 ns") != NULL);
+	CHECK_EQ(session_page(vm.session)->cycle.overruns, 0);
+	close_all();
+}
+
+TEST(sim_control, a_call_beyond_its_budget_can_make_its_outputs_safe)
+{
+	uint64_t before;
+
+	CHECK_EQ(run_slowly("fail_safe", 100), SESSION_GOES_ON);
+	before = calls;
+	CHECK_EQ(seen()->state, CONTROL_PARKED);
+	CHECK_EQ(virtual_master_value(&vm, "a.led"), 0);
+	CHECK((virtual_master_sample(&vm)->flags & SAMPLE_FAIL_SAFE) != 0);
+	virtual_master_run(&vm, 100);
+	CHECK_EQ(calls, before);
+	CHECK_EQ(session_page(vm.session)->bus_state, BUS_OP);
+	close_all();
+}
+
+TEST(sim_control, a_call_beyond_its_budget_can_end_it_all_in_order)
+{
+	CHECK_EQ(run_slowly("stop", 100), -ETIMEDOUT);
+	CHECK_EQ(vm.failure.code, EXIT_CODE_CONTROL);
+	CHECK(strstr(vm.failure.text, "us of 200 us (control.budget) in cycle") != NULL);
+	CHECK_EQ(seen()->state, CONTROL_STOPPED);
+	CHECK_EQ(virtual_master_sample(&vm)->cycle, slow_at + 4);
+	CHECK_EQ(virtual_master_value(&vm, "a.led"), 0);
+	CHECK_EQ(virtual_master_stop(&vm), 0);
+	CHECK_EQ(fb1111_piccolo_led(segment_device(b.segment, 0)), 0);
 	close_all();
 }
