@@ -12,7 +12,7 @@
 #include "sim/catalogue.h"
 #include "sim/devices/fb1111_piccolo.h"
 #include "sim/devices/plant.h"
-#include "sim/devices/wago_750_354.h"
+#include "sim/devices/wago_node.h"
 #include "sim/devices/wago_text.h"
 #include "wire/sii.h"
 
