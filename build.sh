@@ -172,6 +172,9 @@ do_build()
 do_test()
 {
 	prepare_build test run dds
+	case " ${1:--} $* " in
+	" -"* | *" dds "*) want_packages foreign "subscribers on Fast DDS and RustDDS" ;;
+	esac
 	exec "$PYTHON" "$root/app/tools/run_tests.py" "$@"
 }
 
