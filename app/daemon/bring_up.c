@@ -121,6 +121,7 @@ static int prepare_slaves(struct session *s, struct failure *failure)
 	if (r < 0) {
 		return r;
 	}
+	session_judge_doubled(s, line_answered(s->line), line_thrown_away(s->line));
 	show_slaves(s);
 	r = session_step(s, bus_compare(s->bus, error), EXIT_CODE_SLAVES, error, failure);
 	if (r < 0) {
@@ -276,6 +277,8 @@ static void arrive(struct session *s)
 	s->lost_since = (mono_t){ 0 };
 	s->wkc_low_seen = 0;
 	s->silent_cycles = 0;
+	s->doubled_since = 0;
+	s->doubled_seen = 0;
 	s->cycles_seen = atomic_load_explicit(&s->home.page->cycle.cycles, memory_order_relaxed);
 	s->lost_seen = atomic_load_explicit(&s->home.page->cycle.frames_lost, memory_order_relaxed);
 	s->next_watch = session_now(s);

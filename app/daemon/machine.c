@@ -143,6 +143,12 @@ static void alive(void *ctx)
 	notify_alive(&pg->notify, machine_now());
 }
 
+static void warn(void *ctx, const char *text)
+{
+	(void)ctx;
+	fprintf(stderr, "ecdaqd: warning: %s\n", text);
+}
+
 static void degraded(void *ctx, enum event_rt which, int err, const char *text)
 {
 	struct program *pg = ctx;
@@ -170,6 +176,7 @@ int machine_session_create(struct program *pg, struct failure *failure)
 			.cycle_has_ended = has_cycle_ended,
 			.wait = wait_shortly,
 			.alive = alive,
+			.warn = warn,
 			.ctx = pg,
 		},
 		.segment = pg->options.is_simulated ? HOME_SIMULATED : HOME_REAL,

@@ -37,6 +37,8 @@ struct session_hooks {
 	void (*wait)(void *ctx, mono_t until);
 	/** Called often, also in the middle of a long bring-up: a sign of life. May be NULL. */
 	void (*alive)(void *ctx);
+	/** One line for whoever started the program; the session goes on. May be NULL. */
+	void (*warn)(void *ctx, const char *text);
 	void *ctx;
 };
 

@@ -40,6 +40,9 @@ struct session {
 	uint64_t lost_seen;
 	mono_t lost_since; /* all slaves, from then on; 0: not so */
 	uint64_t wkc_low_seen;
+	uint64_t doubled_seen;  /* with doubled_since: where the window began */
+	uint64_t doubled_since; /* cycles */
+	int has_doubled_said;
 };
 
 /** @ev goes to the event ring, stamped with the time now. */
@@ -70,6 +73,8 @@ int session_report_ended(struct session *s, struct failure *failure);
 /** Does anything come back at all? The cycle's counters say so, also while the bus is being asked.
  */
 void session_listen(struct session *s);
+/** Of @frames sent, @twice came back a second time: say it if that is nearly each of them. */
+void session_judge_doubled(struct session *s, uint64_t frames, uint64_t twice);
 /** Look after the bus; an enum session_news. */
 enum session_news session_watch(struct session *s);
 

@@ -14,6 +14,8 @@
 /* All slaves gone for so long: their clocks cannot be trusted to go on, start anew. */
 #define LOST_LIMIT_NS (5 * NS_PER_S)
 
+enum { DOUBLED_WINDOW_CYCLES = 500, DOUBLED_FRAMES_MIN = 50 };
+
 static void emit_event(void *ctx, const struct event *ev)
 {
 	session_emit(ctx, ev);
@@ -181,6 +183,43 @@ enum session_news session_watch(struct session *s)
 	return SESSION_GOES_ON;
 }
 
+void session_judge_doubled(struct session *s, uint64_t frames, uint64_t twice)
+{
+	static const char text[] = "every frame comes back twice: a second ecdaq-sim, or a switch "
+				   "that copies, at this interface?";
+
+	/* A flood of frames that are not ours is more than that. */
+	int is_so = frames >= DOUBLED_FRAMES_MIN && twice >= frames - frames / 10 &&
+		    twice <= frames + frames / 10;
+
+	if (is_so && s->state != BUS_RECOVERING) {
+		session_say(s, text);
+	} else if (!is_so && s->has_doubled_said && s->state == BUS_OP) {
+		session_say(s, "");
+	}
+	if (is_so && !s->has_doubled_said && s->spec.hooks.warn != NULL) {
+		s->spec.hooks.warn(s->spec.hooks.ctx, text);
+	}
+	s->has_doubled_said = is_so;
+}
+
+static void watch_doubled(struct session *s)
+{
+	const struct cycle_stats *st = &s->home.page->cycle;
+	uint64_t cycles = atomic_load_explicit(&st->cycles, memory_order_relaxed);
+	uint64_t doubled = atomic_load_explicit(&st->frames_doubled, memory_order_relaxed);
+	uint64_t window = cycles - s->doubled_since;
+
+	if (window < DOUBLED_WINDOW_CYCLES) {
+		return;
+	}
+	if (doubled >= s->doubled_seen) { /* else cleared */
+		session_judge_doubled(s, window, doubled - s->doubled_seen);
+	}
+	s->doubled_seen = doubled;
+	s->doubled_since = cycles;
+}
+
 /* Has the working counter been low for longer than is waited for? Then look at once. */
 static int is_wkc_alarming(struct session *s)
 {
@@ -238,6 +277,7 @@ int session_service(struct session *session, struct failure *failure)
 		atomic_fetch_add_explicit(&s->home.page->heartbeat, 1, memory_order_relaxed);
 		if (s->is_riding) {
 			watch_link(s);
+			watch_doubled(s);
 			news = session_watch(s);
 		}
 		s->next_watch =

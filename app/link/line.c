@@ -42,6 +42,7 @@ struct line {
 	void *attend_ctx;            /* [service] */
 	int is_riding;               /* [service] */
 	uint64_t thrown_away;        /* [service] */
+	uint64_t answered;           /* [service] direct mode */
 	struct frame_buffer in;      /* [service] direct mode */
 	_Atomic int state;           /* enum ride_state */
 	struct frame_buffer request; /* as the state says */
@@ -119,6 +120,11 @@ static void get_on(const struct line *line)
 	}
 }
 
+uint64_t line_answered(const struct line *line)
+{
+	return line->answered;
+}
+
 void line_bind(struct line *line)
 {
 	bound = line;
@@ -153,8 +159,7 @@ static int transact_direct(struct line *line, const uint8_t *frame, size_t frame
 	/* Callers repeat in loops: a NIC that is down costs the same time as a lost frame. */
 	while (error >= 0) {
 		mono_t at = { 0 };
-		int r = tp->receive(tp->ctx, line->in.bytes, sizeof(line->in.bytes), deadline,
-				    &at);
+		int r = tp->receive(tp->ctx, line->in.bytes, sizeof(line->in.bytes), deadline, &at);
 
 		if (r == -EAGAIN) {
 			return -ETIMEDOUT;
@@ -165,6 +170,7 @@ static int transact_direct(struct line *line, const uint8_t *frame, size_t frame
 		}
 		line->in.len = (size_t)r;
 		if (echo_matches(frame, line->in.bytes, line->in.len, ECHO_INDEX_SAME)) {
+			line->answered++;
 			return give(&line->in, ret_answer, capacity);
 		}
 		line->thrown_away++;

@@ -67,6 +67,8 @@ void line_attend(struct line *line, void (*attend)(void *ctx), void *ctx);
 
 /** Frames that line_transact() met and threw away in direct mode. */
 uint64_t line_thrown_away(const struct line *line);
+/** Transactions of direct mode that were answered. */
+uint64_t line_answered(const struct line *line);
 
 /** Let @span pass; while riding the cycle goes on. */
 void line_sleep(struct line *line, span_t span);

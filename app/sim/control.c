@@ -13,13 +13,15 @@
 
 enum { ANSWER_BYTES = 1024 };
 
-/* A socket that a run before left there goes; anything else of that name stays. */
-static void remove_socket(const char *path)
+/* A socket that a run before left there goes; one that is served, and anything else, stays. */
+static void remove_socket(int fd, const struct sockaddr_un *address)
 {
 	struct stat st;
 
-	if (lstat(path, &st) == 0 && S_ISSOCK(st.st_mode)) {
-		unlink(path);
+	if (lstat(address->sun_path, &st) == 0 && S_ISSOCK(st.st_mode) &&
+	    connect(fd, (const struct sockaddr *)address, sizeof(*address)) < 0 &&
+	    errno == ECONNREFUSED) {
+		unlink(address->sun_path);
 	}
 }
 
@@ -35,7 +37,9 @@ int control_open(const char *path, char *error, size_t error_bytes)
 	}
 	snprintf(address.sun_path, sizeof(address.sun_path), "%s", path);
 	fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-	remove_socket(path);
+	if (fd >= 0) {
+		remove_socket(fd, &address);
+	}
 	if (fd < 0 || bind(fd, (struct sockaddr *)&address, sizeof(address)) < 0) {
 		r = -errno;
 		snprintf(error, error_bytes, "--control %s: %s", path, strerror(errno));

@@ -89,6 +89,10 @@ static int open_all(struct simulation *sim)
 		}
 		segment_sync0_to(sim->segment, write_edge, sim);
 	}
+	/* Held to the end. Before the control socket: that of the one which is there stays. */
+	if (wire_socket_claim(sim->opt.interface, error, sizeof(error)) < 0) {
+		return sim_complain(error);
+	}
 	sim->control_fd = -1;
 	if (sim->opt.control != NULL) {
 		sim->control_fd = control_open(sim->opt.control, error, sizeof(error));

@@ -5,9 +5,12 @@
 #include <net/if.h>
 #include <netinet/in.h>
 #include <poll.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
+#include <sys/un.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -51,6 +54,32 @@ int wire_socket_open(const char *interface, char *error, size_t error_bytes)
 		    0 ||
 	    bind(fd, (struct sockaddr *)&address, sizeof(address)) < 0) {
 		return fail(fd, error, error_bytes, interface, strerror(errno));
+	}
+	return fd;
+}
+
+/* An abstract name: it lives in the network namespace, as the interface does, and goes with us. */
+int wire_socket_claim(const char *interface, char *error, size_t error_bytes)
+{
+	struct sockaddr_un name = { .sun_family = AF_UNIX };
+	struct ifreq ifr = { 0 };
+	size_t len;
+	int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+
+	if (fd < 0) {
+		return fail(-1, error, error_bytes, interface, strerror(errno));
+	}
+	snprintf(ifr.ifr_name, sizeof(ifr.ifr_name), "%s", interface);
+	if (ioctl(fd, SIOCGIFFLAGS, &ifr) < 0 || (ifr.ifr_flags & IFF_LOOPBACK) != 0) {
+		return fd; /* opening it says what is wrong; no master can be at a loopback's end */
+	}
+	len = (size_t)snprintf(name.sun_path + 1, sizeof(name.sun_path) - 1, "ecdaq-sim/%s",
+			       interface);
+	if (bind(fd, (struct sockaddr *)&name,
+		 (socklen_t)(offsetof(struct sockaddr_un, sun_path) + 1 + len)) < 0) {
+		return fail(fd, error, error_bytes, interface,
+			    errno == EADDRINUSE ? "another ecdaq-sim is at it already"
+						: strerror(errno));
 	}
 	return fd;
 }

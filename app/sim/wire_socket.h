@@ -17,6 +17,13 @@ int wire_socket_open(const char *interface, char *error, size_t error_bytes);
 int wire_socket_receive(int fd, uint8_t *frame, size_t capacity, int64_t timeout_ns,
 			int64_t *ret_t_ns);
 
+/**
+ * Be the only segment at @interface of this network namespace, until the descriptor is closed or
+ * the process ends: two of them would answer every frame twice. The descriptor, or -errno with one
+ * line in @error (-EADDRINUSE: there is one).
+ */
+int wire_socket_claim(const char *interface, char *error, size_t error_bytes);
+
 int64_t wire_socket_now_ns(void);
 
 #endif

@@ -158,6 +158,22 @@ def test_io_lines_reach_the_terminals_while_it_runs(run_dir: Path) -> None:
     assert gone.stderr == f"tell-segment: {control}: No such file or directory\n"
 
 
+@pytest.mark.skipif(os.geteuid() != 0, reason="a packet socket needs CAP_NET_RAW")
+def test_a_control_socket_in_use_is_left_alone(run_dir: Path) -> None:
+    control = run_dir / "control"
+    with subprocess.Popen(
+        [SEGMENT, *NIC, "--control", control], stderr=subprocess.PIPE, text=True
+    ) as running:
+        wait_for(control)
+        second = segment(*NIC, "--control", str(control))
+        assert second.returncode == FAILED
+        assert f"--control {control}: Address already in use" in one_line(second.stderr)
+        assert ask(control, run_dir / "me", "at=1s cut slave=1") == "ok"
+        running.send_signal(signal.SIGTERM)
+        running.communicate(timeout=10)
+    assert running.returncode == 0
+
+
 def wait_for(path: Path) -> None:
     until = time.monotonic() + 10
     while not path.exists():

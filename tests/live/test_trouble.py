@@ -103,6 +103,17 @@ def test_a_second_instance_is_refused_and_the_first_goes_on(
     assert segment.wait_for_cycles(1000, 30)["state"] == "OP"
 
 
+def test_a_second_segment_at_one_interface_is_refused_and_the_first_goes_on(
+    make_segment: Callable[..., Segment],
+) -> None:
+    segment = make_segment()
+    segment.start_all()
+    got = segment.space.run(str(BIN / "ecdaq-sim"), "--interface", "ecsim0", check=False)
+    assert got.returncode == 1
+    assert got.stderr == "ecdaq-sim: interface ecsim0: another ecdaq-sim is at it already\n"
+    assert segment.wait_for_cycles(1000, 30)["state"] == "OP"
+
+
 def test_an_sdo_the_slave_refuses_is_an_error_with_its_abort_code(
     make_segment: Callable[..., Segment],
 ) -> None:

@@ -303,6 +303,7 @@ struct exchange_result exchange_run(struct exchange *ex, uint8_t *image, mono_t 
 		.dc_diff_ns = 5,
 		.sent = { fake_bus.mono_ns },
 		.round_trip = { ROUND_TRIP_NS },
+		.doubled = fake_bus.is_doubled ? 1 : 0,
 	};
 
 	(void)ex;

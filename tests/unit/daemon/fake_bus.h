@@ -29,6 +29,7 @@ struct fake_bus {
 	enum fake_step fails_at;
 	int result;             /* of the step that fails */
 	unsigned lost_every;    /* every n-th frame is lost; 0: none */
+	int is_doubled;         /* every frame comes back twice */
 	int is_dc_running_away; /* the reference is 5 % fast */
 	struct bus_watch_report report;
 	uint8_t led;         /* as it was on the wire last */

@@ -20,6 +20,8 @@ struct bench {
 	int ends_after;      /* steps; the cycle ends by itself then; 0: never */
 	int result;
 	int open_fails;
+	unsigned warnings;
+	char warning[256];
 };
 
 static int open_transport(void *ctx, struct transport *ret_transport, struct failure *failure)
@@ -70,6 +72,14 @@ static void let_pass(void *ctx, mono_t until)
 	b->ends_after -= b->ends_after > 1;
 }
 
+static void warn(void *ctx, const char *text)
+{
+	struct bench *b = ctx;
+
+	b->warnings++;
+	snprintf(b->warning, sizeof(b->warning), "%s", text);
+}
+
 static void bench_open(struct bench *b)
 {
 	struct failure failure;
@@ -81,6 +91,7 @@ static void bench_open(struct bench *b)
 			   .cycle_end = end_cycle,
 			   .cycle_has_ended = has_cycle_ended,
 			   .wait = let_pass,
+			   .warn = warn,
 			   .ctx = b },
 		.segment = HOME_SIMULATED,
 	};
@@ -213,6 +224,27 @@ TEST(session, a_failed_one_can_be_brought_up_again)
 	fake_bus.fails_at = FAKE_NOTHING;
 	CHECK_EQ(session_bring_up(b.session, &failure), 0);
 	CHECK_EQ(state_of(&b), BUS_OP);
+	CHECK_STR(message_of(&b), "");
+	bench_close(&b);
+}
+
+TEST(session, frames_that_all_come_back_twice_are_said_once)
+{
+	static struct bench b;
+	struct failure failure;
+
+	bench_open(&b);
+	CHECK_EQ(session_bring_up(b.session, &failure), 0);
+	CHECK_EQ(run(&b, 3000, &failure), SESSION_GOES_ON);
+	CHECK_EQ(b.warnings, 0);
+	fake_bus.is_doubled = 1;
+	CHECK_EQ(run(&b, 5000, &failure), SESSION_GOES_ON);
+	CHECK_EQ(b.warnings, 1);
+	CHECK(strstr(b.warning, "every frame comes back twice") == b.warning);
+	CHECK_STR(message_of(&b), b.warning);
+	fake_bus.is_doubled = 0;
+	CHECK_EQ(run(&b, 3000, &failure), SESSION_GOES_ON);
+	CHECK_EQ(b.warnings, 1);
 	CHECK_STR(message_of(&b), "");
 	bench_close(&b);
 }
