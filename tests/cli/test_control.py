@@ -67,6 +67,20 @@ def test_settings_that_do_not_fit_are_said(tmp_path: Path, settings: list[str], 
     assert said in last_line(daemon(tmp_path, program, *settings))
 
 
+@pytest.mark.parametrize("example", ["blink", "pi_loop", "loopback"])
+def test_the_configuration_of_an_example_is_good(example: str) -> None:
+    config = STAGE / "share" / "ecdaq" / "examples" / example / "ecdaq.yaml"
+    result = subprocess.run(
+        [BIN / "ecdaqd", "--check", "--config", config],
+        env=environment(None),
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert result.returncode == 0, result.stderr
+
+
 def test_options_without_a_program_are_said(tmp_path: Path) -> None:
     line = last_line(daemon(tmp_path, "control.options=kp=1"))
     assert "control.options: there is no control.program" in line
