@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import csv
 import signal
 import time
@@ -75,7 +74,6 @@ def main() -> None:
     parser.add_argument("--blocks", action="store_true")
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     with (
         ecdaq.connect(options.interface, domain=options.domain) as link,
         options.out.open("w", newline="") as file,
@@ -85,8 +83,8 @@ def main() -> None:
         writer = csv.writer(file)
         writer.writerow(FIELDS)
         source = of_blocks if options.blocks else of_samples
-        with contextlib.suppress(KeyboardInterrupt):  # told to end earlier
-            writer.writerows(source(link, options.seconds))
+        signal.signal(signal.SIGTERM, lambda *_: link.stop())
+        writer.writerows(source(link, options.seconds))
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import re
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,7 +14,7 @@ from typing import Any
 import ecdaq
 import pandas
 import pytest
-from bench import KIT, ROOT, Bench, live
+from bench import KIT, ROOT, Bench, live, wait_for
 from ecdaq import idl_types, keys
 from ecdaq.link import domain_config
 
@@ -126,19 +127,26 @@ def test_remote_tool_watches_records_sets_and_tells_status(
         ("watch", ["watch", "--seconds", "2"], "piccolo1 cycle"),
         ("set", ["set", "piccolo0.led=on"], "piccolo0.led=on from cycle"),
         ("csv", ["record", "--csv", "--seconds", "2", "--dir", str(bench.folder)], "0 gaps, 0 "),
-        ("mcap", ["record", "--seconds", "3", "--dir", str(bench.folder / "mcap")], "0 gaps, 0 "),
     ):
         assert bench.module(name, "ecdaq", *tool, *words).wait(40) == 0, bench.logs()
         assert expected in bench.log(name)
     assert bench.module("refused", "ecdaq", *tool, "set", "piccolo1.led=on").wait(40) == 1
     assert "owned by local" in bench.log("refused")
+    # Without an end: it is ended as by Ctrl-C, and finishes its file.
+    folder = bench.folder / "mcap"
+    recorder = bench.module("mcap", "ecdaq", *tool, "record", "--dir", str(folder))
+    wait_for("its file", lambda: folder.exists() and list(folder.iterdir()), 60)
+    bench.segment.wait_for_cycles(4000, 60)
+    recorder.send_signal(signal.SIGINT)
+    assert recorder.wait(40) == 0, bench.logs()
+    assert "0 gaps, 0 samples missing" in bench.log("mcap")
     frame = pandas.read_csv(bench.folder / "piccolo0.csv")
     assert list(frame.columns)[:6] == ["cycle", "dc_time_ns", "utc_ns", "flags", "is_good", "led"]
     assert len(frame) > 1000
     assert (frame["cycle"].diff().dropna() == 1).all()
     bench.segment.stop("daemon")
     assert bench.segment.stop("recorder") == 0
-    equals_the_appliances(bench, bench.folder / "mcap")
+    equals_the_appliances(bench, folder)
 
 
 def equals_the_appliances(bench: Bench, folder: Path) -> None:

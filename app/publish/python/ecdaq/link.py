@@ -166,6 +166,7 @@ class Link:
         self._writer: DataWriter | None = None
         self._channels: Channels | None = None
         self._newest_cycle = 0
+        self._is_stopped = False
 
     def __enter__(self) -> Link:
         return self
@@ -184,6 +185,10 @@ class Link:
         self._writer = None
         del self.participant
         del self.domain
+
+    def stop(self) -> None:
+        """End subscribe() and blocks() soon; for signal handlers, which must not raise into DDS."""
+        self._is_stopped = True
 
     def reader(self, topic: str, kind: type, *, is_state: bool = False) -> DataReader:
         """The reader of @topic: RELIABLE, KEEP_ALL; of a state: TRANSIENT_LOCAL, KEEP_LAST 1."""
@@ -251,19 +256,21 @@ class Link:
         """Samples as they come, gaps counted in .gaps; for @seconds, or for ever."""
         reader = self.reader("ecdaq/sample", SampleV1)
         end = None if seconds is None else time.monotonic() + seconds
-        while end is None or time.monotonic() < end:
+        while not self._is_stopped and (end is None or time.monotonic() < end):
             left = 1.0 if end is None else min(1.0, max(0.001, end - time.monotonic()))
             for sample in self._take(reader, left):
                 self.gaps.take(sample)
                 self._newest_cycle = sample.cycle
                 if slave is None or sample.slave == slave:
                     yield sample
+                if self._is_stopped:
+                    return
 
     def blocks(self, seconds: float | None = None) -> Iterator[BlockV1]:
         """Blocks as they come; gaps are not counted."""
         reader = self.reader("ecdaq/block", BlockV1)
         end = None if seconds is None else time.monotonic() + seconds
-        while end is None or time.monotonic() < end:
+        while not self._is_stopped and (end is None or time.monotonic() < end):
             left = 1.0 if end is None else min(1.0, max(0.001, end - time.monotonic()))
             yield from self._take(reader, left)
 

@@ -8,6 +8,7 @@ import csv
 import dataclasses
 import json
 import os
+import signal
 import sys
 import time
 from collections.abc import Sequence
@@ -88,7 +89,6 @@ def record_mcap(link: Link, options: argparse.Namespace) -> int:
     from ecdaq.mcap_file import McapFile
 
     file = McapFile(options.dir, link.channels(), f"ecdaq-remote {__version__}")
-    reason = "stopped"
     look_at = 0.0
     map_told = -1
     try:
@@ -106,11 +106,8 @@ def record_mcap(link: Link, options: argparse.Namespace) -> int:
             if timemap.session == file.session and timemap.utc_ns != map_told:
                 map_told = timemap.utc_ns
                 file.add_timemap(timemap)
-    except BaseException:
-        reason = "interrupted"
-        raise
     finally:
-        print(file.close(reason), flush=True)
+        print(file.close("stopped"), flush=True)
     return report_gaps(link)
 
 
@@ -201,12 +198,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             tag=options.tag,
             security=options.security,
         ) as link:
+            for number in (signal.SIGINT, signal.SIGTERM):
+                signal.signal(number, lambda *_: link.stop())
             return options.function(link, options)
     except LinkError as why:
         print(f"ecdaq-remote: {why}", file=sys.stderr)
         return 1
-    except KeyboardInterrupt:
-        return 0
     except BrokenPipeError:  # who read us has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: MIT
+"""ecdaq security: keys, and what is said when they cannot be made. (How they work: tests/dds.)"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+from ecdaq import ECDAQ
+
+
+def security(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [ECDAQ, "security", *words], cwd=folder, capture_output=True, text=True, check=False
+    )
+
+
+def test_a_store_is_made_filled_and_looked_at(tmp_path: Path) -> None:
+    made = security(tmp_path, "init")
+    assert made.returncode == 0, made.stderr
+    assert "security/appliance: for the appliance" in made.stdout
+    assert security(tmp_path, "add-subscriber", "alice").returncode == 0
+    assert security(tmp_path, "add-commander", "bob", "--days", "5").returncode == 0
+    for name in ("appliance", "alice", "bob"):
+        looked = security(tmp_path, "check", f"security/{name}")
+        assert looked.returncode == 0, looked.stderr
+        assert looked.stdout.startswith(f"security/{name}: CN={name}, until 20")
+    files = [p for p in (tmp_path / "security").rglob("*") if p.is_file()]
+    assert len(files) == 4 + 3 * 6
+    assert {p.stat().st_mode & 0o777 for p in files} == {0o600}
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        ([], 2, "wants"),
+        (["open"], 2, "open: wants init, add-subscriber, add-commander or check"),
+        (["init", "twice"], 2, "init: wants no word"),
+        (["add-commander"], 2, "add-commander: wants NAME"),
+        (["add-commander", "../x"], 2, "../x: a name is 1 to 40 letters"),
+        (["add-subscriber", "alice"], 1, "ecdaq security init makes one"),
+        (["init", "--days", "40000"], 2, "--days: at most 36500"),
+        (["init", "--dir", "no/where"], 1, "no/where: No such file or directory"),
+        (["check", "nobody"], 1, "nobody/key.pem: No such file or directory"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else None,
+)
+def test_what_is_wrong_is_one_line(tmp_path: Path, words: list[str], code: int, said: str) -> None:
+    ended = security(tmp_path, *words)
+    assert ended.returncode == code, ended.stderr
+    assert ended.stderr.count("\n") == 1
+    assert ended.stderr.startswith("ecdaq: security: ")
+    assert said in ended.stderr
+
+
+def test_a_store_stays_as_it_is(tmp_path: Path) -> None:
+    assert security(tmp_path, "init").returncode == 0
+    before = (tmp_path / "security/ca/identity_ca.key.pem").read_text()
+    again = security(tmp_path, "init")
+    assert again.returncode == 1
+    assert "security: holds a store already" in again.stderr
+    assert (tmp_path / "security/ca/identity_ca.key.pem").read_text() == before
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_folder_that_is_not_ours_is_a_matter_of_permission(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    assert security(tmp_path, "init").returncode == 5
