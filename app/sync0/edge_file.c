@@ -10,8 +10,8 @@
 
 enum { BUFFER_BYTES = 65536, LINE_BYTES = 256, FIELDS_MAX = 7 };
 
-/* No sum of such times overflows: 73 years. */
-#define TIME_LIMIT (INT64_MAX / 4)
+/* No sum of such times leaves what base/timemap.h can map: 54 years. */
+#define TIME_LIMIT (INT64_MAX / 16 * 3)
 
 struct edge_file {
 	char *path;

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: MIT
+"""ecdaq-sync0 on recorded edges, and what it says when a line cannot be had."""
+
+from __future__ import annotations
+
+import json
+import random
+import re
+import signal
+import subprocess
+import time
+from collections.abc import Iterable
+from pathlib import Path
+
+import pytest
+from ecdaq import BIN, FAILED, NO_DAEMON, USAGE, ecdaq, environment, fails, works
+
+CHECK = BIN / "ecdaq-sync0"
+CONFIG, PERMISSION, BAD, BUSY = 3, 4, 5, 6
+PERIOD = 1_000_000
+START = 7_000_000_000_000
+
+Edge = tuple[int, int]  # slave, time
+
+
+def check(*words: str, run_dir: Path | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [CHECK, *words],
+        env=environment(run_dir),
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+
+
+def one_line(result: subprocess.CompletedProcess[str], code: int, *said: str) -> None:
+    assert result.returncode == code, (result.returncode, result.stderr)
+    assert result.stderr.startswith("ecdaq-sync0: ") and result.stderr.count("\n") == 1
+    for text in said:
+        assert text in result.stderr
+
+
+def edges(cycles: int, skew: int = 0) -> Iterable[Edge]:
+    noise = random.Random(3)
+    for cycle in range(cycles):
+        for slave in (0, 2):
+            late = skew if slave == 2 else 0
+            yield slave, START + cycle * PERIOD + late + noise.randrange(-60, 61)
+
+
+def write(path: Path, what: Iterable[Edge]) -> str:
+    path.write_text("# edges\n" + "".join(f"{slave} {at}\n" for slave, at in what))
+    return str(path)
+
+
+def windows(text: str) -> list[dict[str, object]]:
+    return [m for m in map(json.loads, text.splitlines()) if m.get("sync0") == "window"]
+
+
+def test_clean_edges_are_good_and_what_cannot_be_seen_is_unresolved(tmp_path: Path) -> None:
+    file = write(tmp_path / "e", edges(12000))
+    none = f"sync0.calibration={tmp_path / 'none'}"
+    got = check("--replay", file, "--json", "--set", none)
+    assert got.returncode == 0 and got.stderr == ""
+    found = windows(got.stdout)
+    assert [(m["slave"], m["edges"], m["missing"]) for m in found] == [(0, 10000, 0), (2, 10000, 0)]
+    assert found[0]["verdict"] == "OK"
+    assert found[1]["skew"] == "UNRESOLVED"  # nobody has measured this board
+    text = check("--replay", file, "--set", none).stdout
+    assert "skew < " in text and "(unresolved)" in text and "0 ns jitter" not in text
+
+
+def test_a_calibrated_skew_is_found_and_fails(tmp_path: Path) -> None:
+    saved = f"sync0.calibration={tmp_path / 'calibration'}"
+    same = write(tmp_path / "same", edges(4000, skew=200))
+    got = check("--replay", same, "--calibrate", "--set", saved)
+    assert got.returncode == 0, got.stderr
+    found = re.search(r"second line behind the first: (\d+) ns, \+-(\d+) ns", got.stdout)
+    assert found and abs(int(found[1]) - 200) <= int(found[2]) < 20
+    late = write(tmp_path / "late", edges(12000, skew=15000))
+    got = check("--replay", late, "--json", "--set", saved)
+    assert got.returncode == BAD
+    (skewed,) = [m for m in windows(got.stdout) if m["slave"] == 2]
+    assert skewed["skew"] == "FAIL"
+    assert abs(int(str(skewed["skew_ns"])) - 15000) <= int(str(skewed["skew_error_ns"]))
+    assert any('"event":"sync0_skew","slave":2' in line for line in got.stdout.splitlines())
+
+
+def test_a_missing_pulse_is_named_by_slave_and_cycle(tmp_path: Path) -> None:
+    gap = (2, START + 5000 * PERIOD)
+    kept = [e for e in edges(12000) if not (e[0] == 2 and abs(e[1] - gap[1]) < PERIOD / 2)]
+    got = check("--replay", write(tmp_path / "e", kept))
+    assert got.returncode == BAD
+    assert "! slave 2, line 2: cycle 5000: SYNC0 missing, 1 in a row" in got.stdout
+
+
+def test_an_empty_or_foreign_file_is_refused_in_one_line(tmp_path: Path) -> None:
+    one_line(check("--replay", str(tmp_path / "none")), FAILED, "No such file")
+    (tmp_path / "empty").write_text("# nothing\n")
+    one_line(check("--replay", str(tmp_path / "empty")), FAILED, "holds no edge")
+    (tmp_path / "text").write_text("0 5\nSYNC0 was fine\n")
+    one_line(check("--replay", str(tmp_path / "text")), FAILED, "text:2:", "SLAVE MONO_NS")
+    short = write(tmp_path / "short", edges(100))
+    one_line(check("--replay", short), FAILED, "too short", "sync0.window")
+    one_line(check("--replay", short, "--calibrate"), FAILED, "too few")
+
+
+def test_mistakes_on_the_command_line_are_one_line(tmp_path: Path) -> None:
+    one_line(check("--nonsense"), USAGE, "--nonsense")
+    one_line(check("word"), USAGE, "takes no operand")
+    one_line(check("--replay"), USAGE, "needs a value")
+    one_line(check("--set", "sync0.windw=1s"), CONFIG, "sync0.window")
+    one_line(check("--set", "sync0.window=1h"), CONFIG, "sync0.window")
+    one_line(check("--set", "sync0.enable=on"), CONFIG, "slaves[].sync0_line")
+    off = check()
+    assert off.returncode == 0 and "sync0.enable is off" in off.stderr
+    assert "usage: ecdaq-sync0" in check("--help").stdout
+
+
+def test_a_line_that_cannot_be_had_is_said_once_and_waited_for(run_dir: Path) -> None:
+    options = ["--set", "sync0.enable=on", "--set", "slaves[0].sync0_line=pinctrl-none:17"]
+    dev = run_dir / "dev"
+    dev.mkdir()
+    process = subprocess.Popen(
+        [CHECK, "--run-dir", str(run_dir), "--dev-dir", str(dev), *options],
+        env=environment(None),
+        stdin=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        end = time.monotonic() + 60
+        while not (run_dir / "sync0-status").exists() and time.monotonic() < end:
+            time.sleep(0.02)
+        report = json.loads(works(ecdaq(run_dir, "sync0", "--json")))
+        while report["message"] == "" and time.monotonic() < end:
+            report = json.loads(works(ecdaq(run_dir, "sync0", "--json")))
+        assert "line 'pinctrl-none:17' of slave 0: this machine has no GPIO" in report["message"]
+        assert report["lines"][0]["open"] is False
+        assert "NOT OPEN" in works(ecdaq(run_dir, "sync0"))
+        assert process.poll() is None
+    finally:
+        process.send_signal(signal.SIGTERM)
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert said.count("this machine has no GPIO chip") == 1
+    assert "(gone)" in works(ecdaq(run_dir, "sync0"))
+    dev.rmdir()
+
+
+def test_without_ecdaq_sync0_the_verb_says_so(run_dir: Path) -> None:
+    fails(ecdaq(run_dir, "sync0"), NO_DAEMON, "is ecdaq-sync0 running?")
+    fails(ecdaq(run_dir, "sync0", "measure"), USAGE, "calibrate")
+
+
+def test_a_calibration_needs_two_lines(tmp_path: Path) -> None:
+    config = tmp_path / "ecdaq.yaml"
+    config.write_text("slaves:\n  - sync0_line: pinctrl-none:1\n")
+    got = ecdaq(None, "--config", str(config), "sync0", "calibrate")
+    assert got.returncode != 0 and "the same signal on two lines" in got.stderr
+    config.write_text("slaves:\n  - sync0_line: x-none:1\n  - sync0_line: x-none:2\n")
+    got = ecdaq(None, "--config", str(config), "sync0", "calibrate")
+    assert got.returncode != 0 and got.stderr.count("\n") == 1
+    assert "line 'x-none:" in got.stderr
+
+
+@pytest.mark.parametrize("content", [b"", b"cdq", b"\0" * 5000])
+def test_a_damaged_status_page_is_refused(run_dir: Path, content: bytes) -> None:
+    (run_dir / "sync0-status").write_bytes(content)
+    fails(ecdaq(run_dir, "sync0"), FAILED, "another version of ecdaq, or damaged")
