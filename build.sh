@@ -69,7 +69,6 @@ Without GROUP all groups run, the fast ones first:
 Only when named:
   boot     the image in QEMU; needs root and ./build.sh image
   control  of unit, sim, cli and live what is about control programs
-To come: sync0.
 
   --keep-going      run all groups even if one fails (default)
   --fail-fast       stop behind the first suite with a failure
