@@ -14,6 +14,7 @@ def command(link: ecdaq.Link, asked: dict) -> dict:
     """Send as asked, with all that is wrong in it; the first answer to it."""
     before = max((s.cycle for s in link.subscribe(0.005)), default=0)
     started = time.monotonic()
+    sent_ns = time.monotonic_ns()
     number = link.send(
         asked["values"],
         raw=asked.get("raw", False),
@@ -29,6 +30,7 @@ def command(link: ecdaq.Link, asked: dict) -> dict:
                     "cycle": reply.cycle,
                     "reason": reply.reason,
                     "cycles_later": reply.cycle - before,
+                    "sent_ns": sent_ns,
                     "ms": (time.monotonic() - started) * 1e3,
                 }
     return {"accepted": False, "reason": "no answer", "cycle": 0, "cycles_later": 0, "ms": 0}

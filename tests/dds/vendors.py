@@ -72,3 +72,15 @@ def start_vendors(bench: Bench, seconds: float, what: str = "sample") -> dict[st
 def wait_for_ends(bench: Bench, seconds: float) -> None:
     for process in bench.started:
         assert process.wait(seconds) == 0, bench.logs()
+
+
+JOINING_CYCLES = 1000
+
+
+def joined(
+    values: dict[tuple[int, int], tuple[int, ...]],
+) -> dict[tuple[int, int], tuple[int, ...]]:
+    """Without a subscriber's first second: where others read already, it hears of samples before
+    the writer knows of it, and of those the writer repeats none."""
+    first = min(cycle for _, cycle in values) + JOINING_CYCLES
+    return {key: value for key, value in values.items() if key[1] >= first}
