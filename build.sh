@@ -69,6 +69,7 @@ Without GROUP all groups run, the fast ones first:
 Only when named:
   boot     the image in QEMU; needs root and ./build.sh image
   control  of unit, sim, cli and live what is about control programs
+  sync0    of unit, cli and live what is about the SYNC0 check
 
   --keep-going      run all groups even if one fails (default)
   --fail-fast       stop behind the first suite with a failure

@@ -29,6 +29,7 @@ BOOT_SECONDS = 9000
 # What two threads share, and how they hand it over: these run under ThreadSanitizer.
 SHARED_STATE_TESTS = r"^(ring|line|board|handover|status|histogram)[._]"
 CONTROL_TESTS = r"^(control|sim_control|sim_loopback)[.]"
+SYNC0_TESTS = r"^sync0(_gpio)?\."
 
 
 @dataclass
@@ -295,10 +296,16 @@ GROUPS: dict[str, list[Suite]] = {
             ("tests/live", "-k", "control or loopback"),
         ),
     ],
+    # What unit, cli and live have of the SYNC0 check, together.
+    "sync0": [
+        Suite("sync0 release", "release", run_ctest, ("-R", SYNC0_TESTS)),
+        Suite("sync0 cli python", "release", run_pytest, ("tests/cli", "-k", "test_sync0")),
+        Suite("sync0 live python", "release", run_pytest, ("tests/live", "-k", "test_sync0")),
+    ],
     "boot": [replace(pytest("boot", "release", "-s"), seconds=BOOT_SECONDS)],
 }
 # Too long for every run, or part of other groups: only when named.
-ON_REQUEST = ("boot", "control")
+ON_REQUEST = ("boot", "control", "sync0")
 LATER: tuple[str, ...] = ()
 
 
