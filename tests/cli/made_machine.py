@@ -72,7 +72,9 @@ GOOD: Files = {
     " 39:          0          0          0          0     GICv2 190 Level     ecat0\n"
     " 40:         12          0          0    6100200     GICv2 189 Level     ecat0\n"
     "IPI0:        10         11         12         13       Rescheduling interrupts\n",
-    "/proc/irq/11/smp_affinity_list": "0-2\n",
+    # A timer that each core has of its own.
+    "/proc/irq/11/effective_affinity_list": "\n",
+    "/proc/irq/11/smp_affinity_list": "0-3\n",
     "/proc/irq/34/effective_affinity_list": "0\n",
     "/proc/irq/39/effective_affinity_list": "0\n",
     "/proc/irq/40/effective_affinity_list": "3\n",
@@ -115,6 +117,7 @@ def running_threads(pid: int, priority: int = 80, cores: str = "3", policy: int 
     return {
         **thread(pid, "ecdaqd"),
         **thread(4194000, "ecdaqd-cycle", cores, (policy, priority), pid=pid),
+        f"/proc/{pid}/comm": "ecdaqd\n",
         f"/proc/{pid}/status": "Name:\tecdaqd\nVmLck:\t  131072 kB\n",
     }
 

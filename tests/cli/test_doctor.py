@@ -158,6 +158,47 @@ def test_an_ecdaqd_without_a_cycle_or_gone_is_skipped(
     assert check["level"] == "SKIP" and "not running" in check["value"]
 
 
+def test_a_copy_with_an_ecdaqd_in_it_is_judged_without_a_status_page(machine: Machine) -> None:
+    machine.change(running_threads(500))
+    found = checks(machine)
+    assert found["cycle_thread"]["value"] == "SCHED_FIFO 80 on core 3"
+    assert found["memory_lock"]["value"] == "131072 KiB of ecdaqd are locked"
+    assert found["page_faults"]["value"] == "ecdaqd's status page: not there"
+    machine.change({"/proc/500/status": "VmLck:\t  0 kB\n"})
+    assert checks(machine)["memory_lock"]["level"] == "FAIL"
+
+
+def test_a_status_page_of_another_version_says_so(machine: Machine, run_dir: Path) -> None:
+    (run_dir / "status").write_bytes(b"cdqstat1" + bytes(64))
+    machine.change(running_threads(500))
+    found = checks(machine, run_dir)
+    assert found["cycle_thread"]["level"] == "OK"
+    assert found["page_faults"]["value"] == "ecdaqd's status page: of another version of ecdaq"
+
+
+# What ecdaqd was started with, and port, core and priority by it.
+COMMAND_LINES = [
+    (["--config", "/etc/e.yaml"], ("ecat0", 3, 77)),
+    (["--config=/etc/e.yaml", "--set", "cycle.cpu=2", "--set=cycle.priority=60"], ("ecat0", 2, 60)),
+    (["--config", "/etc/e.yaml", "--interface", "ecat9"], ("ecat9", 3, 77)),
+    (["--interface=ecat9", "--simulated"], ("ecat9", -1, 80)),
+    (["--config", "/absent.yaml", "--set", "cycle.cpu=2"], ("", 2, 80)),
+    (["--config"], ("", -1, 80)),
+]
+
+
+@pytest.mark.parametrize(("words", "wanted"), COMMAND_LINES)
+def test_the_command_line_of_the_ecdaqd_that_runs_is_what_counts(
+    machine: Machine, words: list[str], wanted: tuple[str, int, int]
+) -> None:
+    yaml = "bus:\n  interface: ecat0\ncycle:\n  cpu: 3\n  priority: 77\n"
+    machine.change(running_threads(500) | {"/etc/e.yaml": yaml})
+    machine.change({"/proc/500/cmdline": "\0".join(["/usr/bin/ecdaqd", *words]) + "\0"})
+    found = report(ecdaq(None, "doctor", "--root", str(machine.root), "--json"))
+    assert (found["interface"], found["cycle_cpu"], found["cycle_priority"]) == wanted
+    assert ("/absent.yaml" in found["config"]) == ("/absent.yaml" in words)
+
+
 # --- this machine ---
 
 
@@ -197,5 +238,10 @@ def test_mistakes_are_named(machine: Machine, tmp_path: Path) -> None:
 def test_the_appliance_s_own_configuration_is_found(machine: Machine) -> None:
     machine.change({"/run/ecdaq-boot/ecdaq.yaml": "bus:\n  interface: ecat7\n"})
     found = report(ecdaq(None, "doctor", "--root", str(machine.root), "--json"))
-    assert found["interface"] == "ecat7"
-    assert found["config"].endswith("/run/ecdaq-boot/ecdaq.yaml")
+    assert found["interface"] == "ecat7" and found["cycle_cpu"] == -1
+    assert found["config"] == "/run/ecdaq-boot/ecdaq.yaml"
+    options = "ECDAQ_OPTIONS= --set bus.interface=ecat0 --set cycle.cpu=3\n"
+    machine.change({"/run/ecdaq-boot/environment": options})
+    found = report(ecdaq(None, "doctor", "--root", str(machine.root), "--json"))
+    assert found["interface"] == "ecat0" and found["cycle_cpu"] == 3
+    assert found["config"] == "/run/ecdaq-boot/ecdaq.yaml and its command line"

@@ -145,9 +145,9 @@ void check_idle_states(const struct patient *p, struct finding *f)
 	int r;
 
 	/* Without an ecdaqd the limit of now says nothing of when it runs. */
-	if (read_limit(p, &limit_us) < 0 || (p->page == NULL && daemon_us < limit_us)) {
+	if (read_limit(p, &limit_us) < 0 || (p->pid == 0 && daemon_us < limit_us)) {
 		limit_us = daemon_us;
-		when = p->page == NULL && daemon_us < INT32_MAX ? ", while ecdaqd runs" : "";
+		when = p->pid == 0 && daemon_us < INT32_MAX ? ", while ecdaqd runs" : "";
 	}
 	r = deepest(p, cpu, limit_us, &idle);
 	if (r == -ENOENT) {

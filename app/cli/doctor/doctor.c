@@ -9,12 +9,10 @@
 
 #include "cli/args.h"
 #include "cli/doctor/patient.h"
+#include "cli/doctor/target.h"
 #include "cli/json.h"
 #include "cli/source.h"
 #include "cli/text.h"
-
-/* Where the appliance's boot leaves the configuration that its services use. */
-#define APPLIANCE_CONFIG "/run/ecdaq-boot/ecdaq.yaml"
 
 #define CYCLE_THREAD "ecdaqd-cycle"
 
@@ -64,44 +62,23 @@ struct doctor {
 	int is_strict;
 	struct config cfg;
 	char config_name[SIGHT_PATH_BYTES];
-	const struct status_page *page;
 	struct patient patient;
 	struct finding finding[CHECK_COUNT];
 	unsigned count[FINDING_LEVELS];
 };
 
-/* What --config names, else what the appliance has, else the defaults. */
-static enum cli_exit load_config(struct doctor *d)
-{
-	const char *path = d->cli->config;
-	char error[512];
-
-	config_defaults(&d->cfg);
-	snprintf(d->config_name, sizeof(d->config_name), "defaults");
-	if (path == NULL && sight_exists(&d->patient.sight, APPLIANCE_CONFIG) &&
-	    sight_path(&d->patient.sight, d->config_name, APPLIANCE_CONFIG) == 0) {
-		path = d->config_name;
-	}
-	if (path == NULL) {
-		return CLI_OK;
-	}
-	if (config_load(path, &d->cfg, error, sizeof(error)) < 0) {
-		return cli_fail(d->cli, CLI_USAGE, "--config: %s", error);
-	}
-	if (path != d->config_name) {
-		snprintf(d->config_name, sizeof(d->config_name), "%s", path);
-	}
-	return CLI_OK;
-}
-
 /* An ecdaqd that runs; one that has ended is none. One of here has no part in another machine. */
 static enum cli_exit find_daemon(struct doctor *d)
 {
+	struct patient *p = &d->patient;
+	int is_copy = d->root[0] != '\0';
 	const struct status_page *page;
 	char path[CONFIG_PATH_BYTES];
 	enum cli_exit result;
 
-	if (d->root[0] != '\0' && d->cli->run_dir == NULL) {
+	if (is_copy && d->cli->run_dir == NULL) {
+		p->pid = target_find_daemon(&p->sight);
+		p->page_err = p->pid == 0 ? 0 : -ENOENT;
 		return CLI_OK;
 	}
 	result = cli_path(d->cli, CONFIG_RUN_STATUS, path);
@@ -109,13 +86,33 @@ static enum cli_exit find_daemon(struct doctor *d)
 		return result;
 	}
 	page = status_open(path, STATUS_MAGIC, sizeof(*page));
-	if (page == NULL) {
-		d->patient.page_err = errno == ENOENT ? 0 : -errno;
-	} else if (source_is_alive(page->pid)) {
-		d->page = page;
-	} else {
+	if (page == NULL && errno != ENOENT) {
+		p->page_err = -errno;
+		p->pid = target_find_daemon(&p->sight);
+	} else if (page != NULL && source_is_alive(page->pid)) {
+		p->page = page;
+		p->pid = page->pid;
+	} else if (page != NULL) {
 		source_status_close(page);
 	}
+	return CLI_OK;
+}
+
+/* What --config names, else that of ecdaqd itself. */
+static enum cli_exit load_config(struct doctor *d)
+{
+	const char *path = d->cli->config;
+	char error[512];
+
+	if (path == NULL) {
+		target_load(&d->patient.sight, d->patient.pid, &d->cfg, d->config_name);
+		return CLI_OK;
+	}
+	config_defaults(&d->cfg);
+	if (config_load(path, &d->cfg, error, sizeof(error)) < 0) {
+		return cli_fail(d->cli, CLI_USAGE, "--config: %s", error);
+	}
+	snprintf(d->config_name, sizeof(d->config_name), "%s", path);
 	return CLI_OK;
 }
 
@@ -135,25 +132,24 @@ static int has_own_network(const struct doctor *d)
 	char ours[SIGHT_TEXT_BYTES];
 
 	return d->root[0] == '\0' &&
-	       sight_link(&d->patient.sight, its, "/proc/%" PRId64 "/ns/net", d->page->pid) >= 0 &&
+	       sight_link(&d->patient.sight, its, "/proc/%" PRId64 "/ns/net", d->patient.pid) >=
+		       0 &&
 	       sight_link(&d->patient.sight, ours, "/proc/self/ns/net") >= 0 &&
 	       strcmp(its, ours) != 0;
 }
 
-/* What the configuration leaves open, the ecdaqd that runs was told on its command line. */
-static void adopt(struct doctor *d)
+/* What the configuration leaves open, the status page tells. */
+static void adopt(struct doctor *d, const struct status_page *page)
 {
-	uint32_t cpu = atomic_load_explicit(&d->page->cycle_cpu, memory_order_relaxed);
+	uint32_t cpu = atomic_load_explicit(&page->cycle_cpu, memory_order_relaxed);
 
 	if (d->cli->config == NULL || d->cfg.interface[0] == '\0') {
 		snprintf(d->cfg.interface, sizeof(d->cfg.interface), "%.*s",
-			 (int)sizeof(d->page->interface) - 1, d->page->interface);
+			 (int)sizeof(page->interface) - 1, page->interface);
 	}
 	if (d->patient.cpu < 0 && cpu < INT32_MAX) {
 		d->patient.cpu = (int)cpu;
 	}
-	thread_each(&d->patient.sight, d->page->pid, keep_cycle, &d->patient);
-	d->patient.is_nic_elsewhere = d->nic == NULL && has_own_network(d);
 }
 
 static void prepare(struct doctor *d)
@@ -162,9 +158,12 @@ static void prepare(struct doctor *d)
 
 	p->cfg = &d->cfg;
 	p->cpu = d->cfg.cycle_cpu;
-	p->page = d->page;
-	if (d->page != NULL) {
-		adopt(d);
+	if (p->page != NULL) {
+		adopt(d, p->page);
+	}
+	if (p->pid != 0) {
+		thread_each(&p->sight, p->pid, keep_cycle, p);
+		p->is_nic_elsewhere = d->nic == NULL && has_own_network(d);
 	}
 	p->nic = d->nic != NULL ? d->nic : d->cfg.interface;
 }
@@ -222,7 +221,7 @@ static void say_json(const struct doctor *d)
 	json_i64(&js, "cycle_cpu", d->patient.cpu);
 	json_u64(&js, "cycle_priority", d->cfg.cycle_priority);
 	json_text(&js, "config", d->config_name);
-	json_truth(&js, "running", d->page != NULL);
+	json_truth(&js, "running", d->patient.pid != 0);
 	json_u64(&js, "ok", d->count[FINDING_OK]);
 	json_u64(&js, "warn", d->count[FINDING_WARN]);
 	json_u64(&js, "fail", d->count[FINDING_FAIL]);
@@ -279,9 +278,9 @@ static enum cli_exit run(struct doctor *d)
 	if (d->root[0] != '\0' && access(d->root, X_OK) < 0) {
 		return cli_fail(d->cli, CLI_USAGE, "--root: %s cannot be entered", d->root);
 	}
-	result = load_config(d);
+	result = find_daemon(d);
 	if (result == CLI_OK) {
-		result = find_daemon(d);
+		result = load_config(d);
 	}
 	if (result != CLI_OK) {
 		return result;
@@ -293,8 +292,8 @@ static enum cli_exit run(struct doctor *d)
 	} else {
 		say_text(d);
 	}
-	if (d->page != NULL) {
-		source_status_close(d->page);
+	if (d->patient.page != NULL) {
+		source_status_close(d->patient.page);
 	}
 	return verdict(d);
 }

@@ -38,6 +38,9 @@ void finding_unread(struct finding *f, const char *what, int err)
 	case ENOTDIR:
 		finding_set(f, FINDING_SKIP, "%s: not there", what);
 		return;
+	case EPROTO:
+		finding_set(f, FINDING_SKIP, "%s: of another version of ecdaq", what);
+		return;
 	case EBADMSG:
 		finding_set(f, FINDING_SKIP, "%s: not understood", what);
 		return;

@@ -80,8 +80,11 @@ int irq_cores(const struct sight *s, int number, char ret_list[SIGHT_TEXT_BYTES]
 {
 	int r = sight_text(s, ret_list, "/proc/irq/%d/effective_affinity_list", number);
 
-	/* Empty where the controller does not tell, or before the first use. */
-	if (r <= 0) {
+	/* Empty for one that each core has of its own (its timer), or that nobody uses. */
+	if (r == 0) {
+		ret_list[0] = '\0';
+	} else if (r < 0) {
+		/* Not there: the kernel does not tell where an interrupt really fires. */
 		r = sight_text(s, ret_list, "/proc/irq/%d/smp_affinity_list", number);
 	}
 	return r < 0 ? r : 0;

@@ -17,8 +17,9 @@
 struct patient {
 	struct sight sight;
 	const struct config *cfg;
-	const struct status_page *page; /* of an ecdaqd that runs; NULL: none is seen */
-	int page_err;                   /* why: 0 it does not run, else -errno */
+	int64_t pid;                    /* of an ecdaqd that runs; 0: none is seen */
+	const struct status_page *page; /* its page; NULL: none, or it cannot be read */
+	int page_err;                   /* why: 0 there is none, else -errno */
 	const char *nic;
 	int is_nic_elsewhere; /* in a network namespace of ecdaqd's own */
 	int cpu;              /* the cycle's core; -1: not pinned */
@@ -69,8 +70,8 @@ check_fn check_power;
 int patient_is_isolated(const struct patient *p, int cpu);
 /** SKIP in @f, and 0, if no core is set for the cycle. */
 int patient_has_core(const struct patient *p, struct finding *f);
-/** SKIP in @f, and 0, if no running ecdaqd is seen. */
-int patient_has_daemon(const struct patient *p, struct finding *f);
+/** SKIP in @f, and 0, if no running ecdaqd shows its status page. */
+int patient_has_page(const struct patient *p, struct finding *f);
 /** SKIP in @f, and 0, if the EtherCAT port is not there, or cannot be seen from here. */
 int patient_has_nic(const struct patient *p, struct finding *f);
 /** No hardware behind the EtherCAT port: veth, tap. */

@@ -11,11 +11,12 @@
 #include "base/event.h"
 #include "cli/doctor/patient.h"
 
+#define MEND_LOCK "LimitMEMLOCK=infinity in ecdaqd's unit, or CAP_IPC_LOCK"
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
 
 enum { NAMES_SHOWN = 3 };
 
-int patient_has_daemon(const struct patient *p, struct finding *f)
+int patient_has_page(const struct patient *p, struct finding *f)
 {
 	if (p->page != NULL) {
 		return 1;
@@ -42,12 +43,11 @@ void check_cycle_thread(const struct patient *p, struct finding *f)
 {
 	char policy[32];
 
-	if (!patient_has_daemon(p, f)) {
-		return;
-	}
 	if (p->cycle.tid == 0) {
-		finding_set(f, FINDING_SKIP, "ecdaqd has no cycle now (%s)",
-			    bus_state_to_str(GET(p->page->bus_state)));
+		if (patient_has_page(p, f)) {
+			finding_set(f, FINDING_SKIP, "ecdaqd has no cycle now (%s)",
+				    bus_state_to_str(GET(p->page->bus_state)));
+		}
 		return;
 	}
 	thread_policy(&p->cycle, policy);
@@ -139,7 +139,7 @@ void check_page_faults(const struct patient *p, struct finding *f)
 {
 	uint64_t faults;
 
-	if (!patient_has_daemon(p, f)) {
+	if (!patient_has_page(p, f)) {
 		return;
 	}
 	faults = GET(p->page->cycle.page_faults);
@@ -188,7 +188,7 @@ static int read_behind(FILE *file, const char *key, int64_t *ret)
 
 static void judge_locked(const struct patient *p, struct finding *f)
 {
-	FILE *file = sight_open(&p->sight, "/proc/%" PRId64 "/status", p->page->pid);
+	FILE *file = sight_open(&p->sight, "/proc/%" PRId64 "/status", p->pid);
 	int64_t locked_kib = 0;
 	int r = read_behind(file, "VmLck:", &locked_kib);
 
@@ -197,8 +197,8 @@ static void judge_locked(const struct patient *p, struct finding *f)
 	} else if (locked_kib > 0) {
 		finding_set(f, FINDING_OK, "%" PRId64 " KiB of ecdaqd are locked", locked_kib);
 	} else {
-		finding_set(f, FINDING_SKIP, "ecdaqd has locked nothing yet (%s)",
-			    bus_state_to_str(GET(p->page->bus_state)));
+		finding_set(f, FINDING_FAIL, "ecdaqd has a cycle, but has locked nothing");
+		finding_mend(f, MEND_LOCK);
 	}
 }
 
@@ -225,16 +225,14 @@ void check_memory_lock(const struct patient *p, struct finding *f)
 	if (!p->cfg->cycle_lock_memory) {
 		finding_set(f, FINDING_WARN, "cycle.lock_memory is off: memory may be paged out");
 		finding_mend(f, "cycle.lock_memory: on");
-	} else if (p->page == NULL && p->page_err == 0) {
-		judge_limit(p, f);
-	} else if (!patient_has_daemon(p, f)) {
-		return;
-	} else if ((GET(p->page->rt_degraded) >> EVENT_RT_MEMORY & 1) != 0) {
+	} else if (p->page != NULL && (GET(p->page->rt_degraded) >> EVENT_RT_MEMORY & 1) != 0) {
 		finding_set(f, FINDING_FAIL, "ecdaqd was refused to lock its memory");
-		finding_mend(f, "LimitMEMLOCK=infinity in ecdaqd's unit, or CAP_IPC_LOCK");
-	} else if (p->cycle.tid == 0) {
-		finding_set(f, FINDING_SKIP, "ecdaqd locks its memory with its first cycle");
-	} else {
+		finding_mend(f, MEND_LOCK);
+	} else if (p->pid == 0 && p->page_err == 0) {
+		judge_limit(p, f);
+	} else if (p->cycle.tid != 0) {
 		judge_locked(p, f);
+	} else if (patient_has_page(p, f)) {
+		finding_set(f, FINDING_SKIP, "ecdaqd locks its memory with its first cycle");
 	}
 }
