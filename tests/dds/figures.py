@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import bisect
 import os
+import socket
 import statistics
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -61,9 +62,25 @@ class Edges:
         return self.mono_ns[near] + dc_ns - self.dc_ns[near]
 
 
+def control_socket(bench: Bench) -> Path:
+    return bench.segment.run_dir / "segment"
+
+
+def lamp(bench: Bench) -> str:
+    """What the first slave's LED is: its firmware has taken it out of the ESC's memory."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as asking:
+        asking.bind(str(bench.segment.run_dir / "asking"))
+        try:
+            asking.settimeout(10)
+            asking.sendto(b"io slave=0", str(control_socket(bench)))
+            return asking.recv(4096).decode()
+        finally:
+            (bench.segment.run_dir / "asking").unlink()
+
+
 def start_with_edges(bench: Bench) -> Path:
     edges = bench.folder / "edges.txt"
-    bench.segment.start_sim("--edges", str(edges))
+    bench.segment.start_sim("--edges", str(edges), "--control", str(control_socket(bench)))
     bench.segment.start_daemon()
     bench.segment.start_recorder()
     bench.segment.wait_for_op()
@@ -163,8 +180,12 @@ def round_trips(bench: Bench, count: int) -> list[RoundTrip]:
     """LED on and off, each command after the answer to the last."""
     edges_path = start_with_edges(bench)
     commander = bench.commander()
-    answers = [(k % 2, commander.command({LED: k % 2})) for k in range(1, count + 1)]
-    assert all(answer["accepted"] for _, answer in answers), answers
+    answers = []
+    for value in (k % 2 for k in range(1, count + 1)):
+        answers.append((value, commander.command({LED: value})))
+        assert answers[-1][1]["accepted"], answers[-1]
+        expected = f"led={value}"
+        wait_for(f"LED with {expected}", lambda e=expected: lamp(bench) == e, 10)
     bench.segment.wait_for_cycles(50, 30)
     stop(bench)
     edges = Edges(edges_path)
