@@ -78,27 +78,37 @@ int files_write(const char *dir, const char *name, const void *data, size_t byte
 	return r < 0 ? files_fail(error, r, "%s: %s", path, strerror(-r)) : 0;
 }
 
-int files_read(const char *dir, const char *name, char **ret_data, size_t *ret_bytes, char *error)
+/* The first @bytes of the file at @path at most. Bytes read, or -errno. */
+static ssize_t read_start(const char *path, char *data, size_t bytes)
 {
-	char path[FILES_PATH_BYTES];
-	char *data = malloc(FILES_TEXT_BYTES);
-	int r = data == NULL ? -ENOMEM : files_path(dir, name, path, error);
-	ssize_t n = 0;
-	int fd;
+	int fd = open(path, O_RDONLY | O_CLOEXEC);
+	ssize_t n = fd < 0 ? -1 : read(fd, data, bytes);
+	int err = errno;
 
-	if (r < 0) {
-		free(data);
-		return r == -ENOMEM ? files_fail(error, r, "%s", strerror(ENOMEM)) : r;
-	}
-	fd = open(path, O_RDONLY | O_CLOEXEC);
-	n = fd < 0 ? -1 : read(fd, data, FILES_TEXT_BYTES - 1);
-	r = n < 0 ? -errno : n == FILES_TEXT_BYTES - 1 ? -EFBIG : 0;
 	if (fd >= 0) {
 		close(fd);
 	}
+	return n < 0 ? -err : n;
+}
+
+int files_read(const char *dir, const char *name, char **ret_data, size_t *ret_bytes, char *error)
+{
+	char path[FILES_PATH_BYTES];
+	char *data;
+	ssize_t n;
+	int r = files_path(dir, name, path, error);
+
 	if (r < 0) {
+		return r;
+	}
+	data = malloc(FILES_TEXT_BYTES);
+	n = data == NULL ? -ENOMEM : read_start(path, data, FILES_TEXT_BYTES - 1);
+	if (n == FILES_TEXT_BYTES - 1) {
+		n = -EFBIG;
+	}
+	if (n < 0) {
 		free(data);
-		return files_fail(error, r, "%s: %s", path, strerror(-r));
+		return files_fail(error, (int)n, "%s: %s", path, strerror((int)-n));
 	}
 	data[n] = '\0';
 	*ret_data = data;

@@ -169,6 +169,7 @@ int pki_write_key(EVP_PKEY *key, const char *dir, const char *name, char *error)
 }
 
 /* Nobody is asked for a pass phrase: a key that wants one is refused. */
+/* NOLINTNEXTLINE(readability-non-const-parameter): libcrypto's type of it */
 static int no_passphrase(char *buf, int size, int is_writing, void *arg)
 {
 	(void)buf;

@@ -61,10 +61,14 @@ static int receive(struct remote_board *rb)
 				  .msg_iovlen = 1,
 				  .msg_control = &control,
 				  .msg_controllen = sizeof(control.bytes) };
-	ssize_t len = recvmsg(rb->socket, &message, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
+	ssize_t len;
 	int fd;
 	int r;
 
+	if (rb->socket < 0) {
+		return 0;
+	}
+	len = recvmsg(rb->socket, &message, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
 	if (len < 0 && (errno == EAGAIN || errno == EINTR)) {
 		return 0;
 	}
