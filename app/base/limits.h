@@ -8,6 +8,7 @@ enum limits {
 	LIMIT_CHANNELS = 2048,
 	LIMIT_IMAGE_BYTES = 8192, /* outputs and inputs together */
 	LIMIT_FRAMES = 8,         /* cyclic frames in one exchange */
+	LIMIT_CHUNKS = 160,       /* process data datagrams in one exchange */
 	LIMIT_FRAME_BYTES = 1514, /* Ethernet header and payload, without FCS */
 	LIMIT_NAME_BYTES = 64,    /* with the closing zero */
 };

@@ -66,6 +66,8 @@ int bus_stop(struct bus *bus, char *error);
 struct bus_watch_report {
 	unsigned slaves_op;
 	unsigned slaves_lost;
+	uint64_t op_mask;    /* a bit for each slave in OP */
+	int is_reference_op; /* or there is none */
 	int is_all_op;
 };
 

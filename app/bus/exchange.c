@@ -38,15 +38,19 @@ struct exchange {
 static int plan_is_sound(const struct exchange_plan *plan)
 {
 	uint64_t sum = 0;
+	unsigned last = 0;
 
-	if (plan->chunk_count > LIMIT_FRAMES || plan->image_bytes > LIMIT_IMAGE_BYTES ||
-	    plan->output_bytes > plan->image_bytes) {
+	if (plan->chunk_count > LIMIT_CHUNKS || exchange_frame_count(plan) > LIMIT_FRAMES ||
+	    plan->image_bytes > LIMIT_IMAGE_BYTES || plan->output_bytes > plan->image_bytes) {
 		return 0;
 	}
 	for (unsigned i = 0; i < plan->chunk_count; i++) {
-		if (plan->chunk_bytes[i] == 0) {
+		/* Frames are filled in order, none is left out. */
+		if (plan->chunk_bytes[i] == 0 || plan->chunk_frame[i] < last ||
+		    plan->chunk_frame[i] > last + (i > 0)) {
 			return 0;
 		}
+		last = plan->chunk_frame[i];
 		sum += plan->chunk_bytes[i];
 	}
 	return sum == plan->image_bytes;
@@ -68,7 +72,7 @@ int exchange_create(const struct exchange_plan *plan, struct line *line,
 	ex->line = line;
 	ex->transport = *line_transport(line);
 	ex->platform = *line_platform(line);
-	ex->frame_count = plan->chunk_count > 0 ? plan->chunk_count : 1;
+	ex->frame_count = exchange_frame_count(plan);
 	for (unsigned i = 0; i < ex->frame_count; i++) {
 		int r = exchange_frame_build(plan, i, &ex->frame[i]);
 
@@ -95,11 +99,14 @@ static mono_t now(const struct exchange *ex)
 
 static void load_outputs(struct exchange *ex, struct exchange_frame *ef, const uint8_t *image)
 {
-	if (ef->image_offset < ex->plan.output_bytes) {
-		uint32_t left = ex->plan.output_bytes - ef->image_offset;
+	for (unsigned i = 0; i < ef->part_count; i++) {
+		const struct exchange_part *part = &ef->part[i];
+		uint32_t left = ex->plan.output_bytes - part->offset;
 
-		memcpy(exchange_data(ef->bytes, ef->image), image + ef->image_offset,
-		       left < ef->image_len ? left : ef->image_len);
+		if (part->offset < ex->plan.output_bytes) {
+			memcpy(exchange_data(ef->bytes, part->at), image + part->offset,
+			       left < part->len ? left : part->len);
+		}
 	}
 }
 
@@ -122,9 +129,7 @@ static unsigned send_frames(struct exchange *ex, const uint8_t *image)
 		int r;
 
 		exchange_frame_number(ef, ex->sequence);
-		if (ef->image != 0) {
-			load_outputs(ex, ef, image);
-		}
+		load_outputs(ex, ef, image);
 		if (i == 0) {
 			ex->result.sent = now(ex);
 		}
@@ -144,17 +149,23 @@ static unsigned send_frames(struct exchange *ex, const uint8_t *image)
 
 /* --- back --- */
 
-static void keep_inputs(struct exchange *ex, const struct exchange_frame *ef)
+static void keep_inputs(struct exchange *ex, const struct exchange_part *part)
 {
+	uint16_t wkc = exchange_wkc(ex->received, part->at);
 	uint32_t skip = 0;
 
-	ex->result.wkc = (uint16_t)(ex->result.wkc + exchange_wkc(ex->received, ef->image));
-	if (ef->image_offset < ex->plan.output_bytes) {
-		skip = ex->plan.output_bytes - ef->image_offset;
+	ex->result.wkc = (uint16_t)(ex->result.wkc + wkc);
+	if (wkc != ex->plan.chunk_wkc[part->chunk]) {
+		ex->result.status = EXCHANGE_WKC_LOW;
+		ex->result.slaves_low |= ex->plan.chunk_slaves[part->chunk];
+		return;
 	}
-	if (skip < ef->image_len) {
-		memcpy(ex->inputs + ef->image_offset + skip,
-		       exchange_data(ex->received, ef->image) + skip, ef->image_len - skip);
+	if (part->offset < ex->plan.output_bytes) {
+		skip = ex->plan.output_bytes - part->offset;
+	}
+	if (skip < part->len) {
+		memcpy(ex->inputs + part->offset + skip,
+		       exchange_data(ex->received, part->at) + skip, part->len - skip);
 	}
 }
 
@@ -174,11 +185,8 @@ static void keep_frame(struct exchange *ex, unsigned number)
 {
 	const struct exchange_frame *ef = &ex->frame[number];
 
-	if (ef->image != 0) {
-		keep_inputs(ex, ef);
-		if (exchange_wkc(ex->received, ef->image) != ex->plan.chunk_wkc[number]) {
-			ex->result.status = EXCHANGE_WKC_LOW;
-		}
+	for (unsigned i = 0; i < ef->part_count; i++) {
+		keep_inputs(ex, &ef->part[i]);
 	}
 	if (ef->dc != 0) {
 		ex->result.dc_time_ns = dc_track_answer(
@@ -305,7 +313,9 @@ struct exchange_result exchange_run(struct exchange *ex, uint8_t *image, mono_t 
 			break;
 		}
 	}
-	if (ex->result.status == EXCHANGE_OK) {
+	/* A chunk that is not good leaves in ex->inputs what it had last. */
+	if (ex->result.status == EXCHANGE_OK ||
+	    (ex->result.status == EXCHANGE_WKC_LOW && ex->plan.is_split)) {
 		memcpy(image + output_bytes, ex->inputs + output_bytes,
 		       ex->plan.image_bytes - output_bytes);
 	}

@@ -20,26 +20,38 @@
 enum exchange_status {
 	EXCHANGE_OK,
 	EXCHANGE_NO_FRAME, /* one or more frames were not back before the deadline */
-	EXCHANGE_WKC_LOW,  /* all back, but a WKC is not as expected: the image is not touched */
+	EXCHANGE_WKC_LOW,  /* all back, but a WKC is not as expected: the image is not touched, or,
+			      of a split one, what is not slaves_low's */
 };
 
 struct exchange_plan {
 	uint32_t image_bytes;
 	uint32_t output_bytes; /* the first of them */
 	uint32_t logical_start;
-	uint32_t chunk_bytes[LIMIT_FRAMES]; /* how the image is cut into LRW datagrams */
+	uint32_t chunk_bytes[LIMIT_CHUNKS]; /* how the image is cut into LRW datagrams */
 	unsigned chunk_count;
-	uint16_t chunk_wkc[LIMIT_FRAMES]; /* expected of each */
-	uint16_t wkc_expected;            /* sum, with every slave in SAFE-OP or OP */
-	uint16_t dc_reference;            /* station address of the reference clock; 0: no DC */
+	uint16_t chunk_wkc[LIMIT_CHUNKS];    /* expected of each */
+	uint8_t chunk_frame[LIMIT_CHUNKS];   /* which frame carries it, ascending */
+	uint64_t chunk_slaves[LIMIT_CHUNKS]; /* whose data it has, a bit a slave */
+	uint16_t wkc_expected;               /* sum, with every slave in SAFE-OP or OP */
+	uint16_t dc_reference;               /* station address of the reference clock; 0: no DC */
 	uint16_t slave_count;
-	int monitor; /* 1: BRD of AL status and DC difference */
+	int is_split; /* 1: a chunk a slave; those with a good WKC are taken though others have not
+		       */
+	int monitor;  /* 1: BRD of AL status and DC difference */
 };
+
+/** How many frames an exchange has. */
+static inline unsigned exchange_frame_count(const struct exchange_plan *plan)
+{
+	return plan->chunk_count > 0 ? plan->chunk_frame[plan->chunk_count - 1] + 1u : 1;
+}
 
 struct exchange_result {
 	enum exchange_status status;
 	uint16_t wkc;
 	uint16_t wkc_expected;
+	uint64_t slaves_low; /* whose data was in a chunk with another WKC, a bit a slave */
 	int64_t dc_time_ns; /* system time of the reference at this frame; 0: no (believable) answer
 			     */
 	uint16_t al_status; /* all slaves' AL status ORed: exactly AL_OP only if all are in OP */
@@ -63,8 +75,8 @@ void exchange_destroy(struct exchange *ex);
 
 /**
  * Send the outputs (first output_bytes of @image), take back the inputs (the rest of @image,
- * touched only with EXCHANGE_OK) until @deadline. Answers to service frames met on the way are
- * handed over. Context: cycle thread.
+ * touched only with EXCHANGE_OK, or the good chunks of a split image) until @deadline. Answers to
+ * service frames met on the way are handed over. Context: cycle thread.
  */
 struct exchange_result exchange_run(struct exchange *ex, uint8_t *image, mono_t deadline);
 

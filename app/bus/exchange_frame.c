@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "bus/exchange_frame.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <string.h>
 
@@ -11,9 +12,11 @@
 
 enum {
 	HEADERS = ECAT_ETHERNET_BYTES + ECAT_FRAME_HEADER_BYTES,
-	OVERHEAD = ECAT_DATAGRAM_HEADER_BYTES + ECAT_WKC_BYTES,
+	OVERHEAD = EXCHANGE_OVERHEAD,
 	LENGTH_MASK = 0x07ff,
 };
+
+static_assert(OVERHEAD == ECAT_DATAGRAM_HEADER_BYTES + ECAT_WKC_BYTES, "wire/datagram.h");
 
 /* As SOEM sends, so that captures look alike; bit 0x02 of the first octet must be clear. */
 static const uint8_t source[6] = { 0x10, 0x10, 0x10, 0x10, 0x10, 0x10 };
@@ -55,12 +58,17 @@ static size_t add(struct exchange_frame *ef, struct ecat_frame_builder *fb, enum
 {
 	uint8_t *data =
 		ecat_frame_add(fb, cmd, 0, (uint16_t)address, (uint16_t)(address >> 16), data_len);
+	size_t at;
 
 	if (data == NULL) {
 		return 0;
 	}
-	ef->datagram[ef->datagram_count] = (size_t)(data - ef->bytes) - ECAT_DATAGRAM_HEADER_BYTES;
-	return ef->datagram[ef->datagram_count++];
+	at = (size_t)(data - ef->bytes) - ECAT_DATAGRAM_HEADER_BYTES;
+	if (ef->datagram_count < EXCHANGE_NUMBERED) {
+		ef->datagram[ef->datagram_count] = at;
+	}
+	ef->datagram_count++;
+	return at;
 }
 
 static uint32_t register_address(uint16_t station, uint16_t reg)
@@ -68,24 +76,39 @@ static uint32_t register_address(uint16_t station, uint16_t reg)
 	return (uint32_t)reg << 16 | station;
 }
 
+/* The chunks that frame @number carries. The bytes they take of its capacity. */
+static uint32_t list_parts(const struct exchange_plan *plan, unsigned number,
+			   struct exchange_frame *ef)
+{
+	uint32_t offset = 0;
+	uint32_t taken = 0;
+
+	for (unsigned i = 0; i < plan->chunk_count; i++) {
+		if (plan->chunk_frame[i] == number) {
+			taken += (ef->part_count > 0 ? OVERHEAD : 0) + plan->chunk_bytes[i];
+			ef->part[ef->part_count++] = (struct exchange_part){
+				.offset = offset, .len = plan->chunk_bytes[i], .chunk = i
+			};
+		}
+		offset += plan->chunk_bytes[i];
+	}
+	return taken;
+}
+
 int exchange_frame_build(const struct exchange_plan *plan, unsigned number,
 			 struct exchange_frame *ret)
 {
 	struct ecat_frame_builder fb;
-	uint32_t image_len = number < plan->chunk_count ? plan->chunk_bytes[number] : 0;
-
-	if (image_len > exchange_frame_capacity(plan, number)) {
+	memset(ret, 0, sizeof(*ret));
+	if (list_parts(plan, number, ret) > exchange_frame_capacity(plan, number)) {
 		return -E2BIG;
 	}
-	memset(ret, 0, sizeof(*ret));
-	for (unsigned i = 0; i < number; i++) {
-		ret->image_offset += plan->chunk_bytes[i];
-	}
-	ret->image_len = image_len;
 	ecat_frame_begin(&fb, ret->bytes, source);
-	if (image_len > 0) {
-		ret->image = add(ret, &fb, ECAT_CMD_LRW, plan->logical_start + ret->image_offset,
-				 (uint16_t)image_len);
+	for (unsigned i = 0; i < ret->part_count; i++) {
+		struct exchange_part *part = &ret->part[i];
+
+		part->at = add(ret, &fb, ECAT_CMD_LRW, plan->logical_start + part->offset,
+			       (uint16_t)part->len);
 	}
 	if (has_dc(plan, number)) {
 		ret->dc = add(ret, &fb, ECAT_CMD_FRMW,

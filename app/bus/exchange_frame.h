@@ -14,11 +14,20 @@
 #include "bus/exchange.h"
 
 enum {
+	EXCHANGE_OVERHEAD = 12, /* header and WKC of a datagram */
 	EXCHANGE_DC_BYTES = 8,
 	EXCHANGE_AL_BYTES = 2,
 	EXCHANGE_DIFF_BYTES = 4,
 	EXCHANGE_NOP_BYTES = 2,
-	EXCHANGE_DATAGRAMS = 4, /* in one frame */
+	EXCHANGE_NUMBERED = 2, /* datagrams whose index bytes carry the sequence */
+};
+
+/* One LRW: a chunk of the process image. */
+struct exchange_part {
+	size_t at;       /* as below */
+	uint32_t offset; /* of its data in the process image */
+	uint32_t len;
+	unsigned chunk; /* in the plan */
 };
 
 /* Offsets in bytes of a datagram's header from the frame's first byte; 0: it has none of that kind.
@@ -26,17 +35,17 @@ enum {
 struct exchange_frame {
 	uint8_t bytes[LIMIT_FRAME_BYTES];
 	size_t len;
-	size_t datagram[EXCHANGE_DATAGRAMS];
+	size_t datagram[EXCHANGE_NUMBERED]; /* the first ones */
 	unsigned datagram_count;
-	size_t image;          /* LRW */
-	uint32_t image_offset; /* of its data in the process image */
-	uint32_t image_len;
+	struct exchange_part part[LIMIT_CHUNKS];
+	unsigned part_count;
 	size_t dc;   /* FRMW or FPRD of 0x0910 */
 	size_t al;   /* BRD of 0x0130 */
 	size_t diff; /* BRD of 0x092C */
 };
 
-/** How many process data bytes fit into frame @number of @plan. */
+/** How many process data bytes fit into frame @number of @plan, in one datagram; each further one
+ * takes EXCHANGE_OVERHEAD of them. */
 uint32_t exchange_frame_capacity(const struct exchange_plan *plan, unsigned number);
 
 /** Build frame @number. 0, or -E2BIG if the plan's chunk does not fit. */

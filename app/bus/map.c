@@ -181,6 +181,7 @@ static int build_plan(struct bus *bus, const struct plan_area *area, size_t area
 		.output_bytes = bus->group[0].Obytes,
 		.logical_start = bus->group[0].logstartaddr,
 		.slave_count = (uint16_t)bus->slave_count,
+		.is_split = bus->cfg->bus_datagrams == CONFIG_DATAGRAMS_PER_SLAVE,
 		.monitor = (int)bus->cfg->bus_monitor,
 		/* room for FRMW is left in any case; bus_dc_setup() says whose time it is */
 		.dc_reference = UINT16_MAX,
@@ -189,8 +190,9 @@ static int build_plan(struct bus *bus, const struct plan_area *area, size_t area
 		if (blocked < 0) {
 			return bus_fail(
 				bus, -E2BIG,
-				"%u bytes of process data need more than LIMIT_FRAMES (%d) frames",
-				bus->plan.image_bytes, LIMIT_FRAMES);
+				"%u bytes of process data need more than LIMIT_FRAMES (%d) frames "
+				"or LIMIT_CHUNKS (%d) datagrams",
+				bus->plan.image_bytes, LIMIT_FRAMES, LIMIT_CHUNKS);
 		}
 		return bus_fail_slave(
 			bus, area[blocked].slave_pos, -E2BIG,

@@ -31,11 +31,13 @@ static uint32_t find_cut(const struct plan_area *area, size_t count, uint32_t fr
 
 /* LRW adds once for each slave that reads and twice for each that is written, whatever it maps
  * there. */
-static uint16_t expected_wkc(const struct plan_area *area, size_t count, uint32_t from, uint32_t to)
+static uint16_t expected_wkc(const struct plan_area *area, size_t count, uint32_t from, uint32_t to,
+			     uint64_t *ret_slaves)
 {
 	uint8_t adds[LIMIT_SLAVES] = { 0 };
 	uint16_t wkc = 0;
 
+	*ret_slaves = 0;
 	for (size_t i = 0; i < count; i++) {
 		if (area[i].start < to && area[i].end > from) {
 			adds[area[i].slave_pos] |= area[i].is_output ? WKC_WRITE : WKC_READ;
@@ -43,38 +45,93 @@ static uint16_t expected_wkc(const struct plan_area *area, size_t count, uint32_
 	}
 	for (size_t i = 0; i < LIMIT_SLAVES; i++) {
 		wkc = (uint16_t)(wkc + adds[i]);
+		*ret_slaves |= adds[i] != 0 ? UINT64_C(1) << i : 0;
 	}
 	return wkc;
+}
+
+/*
+ * The end of what begins at @from and should be in one chunk: the areas of one slave that lie
+ * together, and whatever shares a byte with them.
+ */
+static uint32_t group_end(const struct plan_area *area, size_t count, uint32_t from, uint32_t bytes)
+{
+	uint32_t end = from;
+	uint32_t next = bytes;
+	size_t i = 0;
+	int owner = -1;
+
+	while (i < count) {
+		int is_first = owner < 0 && area[i].start <= from && area[i].end > from;
+		int is_next = area[i].start == end && (int)area[i].slave_pos == owner;
+		int is_shared = area[i].start < end && area[i].end > end;
+
+		if (is_first || ((is_next || is_shared) && area[i].end > end)) {
+			owner = is_first ? (int)area[i].slave_pos : owner;
+			end = area[i].end;
+			i = 0;
+		} else {
+			i++;
+		}
+	}
+	/* Bytes that are nobody's go with those before them. */
+	for (i = 0; i < count; i++) {
+		if (area[i].start >= end && area[i].start > from && area[i].start < next) {
+			next = area[i].start;
+		}
+	}
+	return next;
+}
+
+/* The frame that is being filled. */
+struct filling {
+	unsigned frame;
+	uint32_t used; /* of its capacity */
+};
+
+static void add_chunk(struct exchange_plan *plan, const struct plan_area *area, size_t count,
+		      uint32_t from, uint32_t to, struct filling *fill)
+{
+	unsigned n = plan->chunk_count++;
+
+	plan->chunk_bytes[n] = to - from;
+	plan->chunk_wkc[n] = expected_wkc(area, count, from, to, &plan->chunk_slaves[n]);
+	plan->chunk_frame[n] = (uint8_t)fill->frame;
+	plan->wkc_expected = (uint16_t)(plan->wkc_expected + plan->chunk_wkc[n]);
+	fill->used += to - from + EXCHANGE_OVERHEAD;
+	if (!plan->is_split || fill->used >= exchange_frame_capacity(plan, fill->frame)) {
+		*fill = (struct filling){ .frame = fill->frame + 1 };
+	}
 }
 
 int plan_chunks(struct exchange_plan *plan, const struct plan_area *area, size_t count,
 		int *ret_area)
 {
+	struct filling fill = { 0 };
 	uint32_t from = 0;
 
 	plan->chunk_count = 0;
 	plan->wkc_expected = 0;
 	while (from < plan->image_bytes) {
-		unsigned n = plan->chunk_count;
-		uint32_t to = from + exchange_frame_capacity(plan, n);
+		uint32_t end = plan->is_split ? group_end(area, count, from, plan->image_bytes)
+					      : plan->image_bytes;
+		uint32_t to = from + exchange_frame_capacity(plan, fill.frame) - fill.used;
 		int blocked = -1;
 
-		if (n == LIMIT_FRAMES) {
+		if (fill.frame == LIMIT_FRAMES || plan->chunk_count == LIMIT_CHUNKS) {
 			*ret_area = -1;
 			return -E2BIG;
 		}
-		if (to > plan->image_bytes) {
-			to = plan->image_bytes;
+		if (to < end && fill.used > 0) {
+			fill = (struct filling){ .frame = fill.frame + 1 };
+			continue;
 		}
-		to = find_cut(area, count, from, to, &blocked);
+		to = find_cut(area, count, from, to < end ? to : end, &blocked);
 		if (to == from) {
 			*ret_area = blocked;
 			return -E2BIG;
 		}
-		plan->chunk_bytes[n] = to - from;
-		plan->chunk_wkc[n] = expected_wkc(area, count, from, to);
-		plan->wkc_expected = (uint16_t)(plan->wkc_expected + plan->chunk_wkc[n]);
-		plan->chunk_count++;
+		add_chunk(plan, area, count, from, to, &fill);
 		from = to;
 	}
 	return 0;

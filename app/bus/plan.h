@@ -23,7 +23,8 @@ struct plan_area {
 enum { PLAN_AREAS = LIMIT_SLAVES * 8 };
 
 /**
- * Fill chunk_bytes, chunk_count, chunk_wkc and wkc_expected of @plan (the rest is set already). No
+ * Fill chunk_*, chunk_count and wkc_expected of @plan (the rest is set already): as few as can be,
+ * one a frame; or, if is_split, one for what each slave has in one place, many a frame. No
  * area is split (T41). 0; -E2BIG with *ret_area the index of an area that fits no frame, or -1 when
  * LIMIT_FRAMES are too few.
  */

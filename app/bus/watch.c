@@ -283,8 +283,11 @@ int bus_watch(struct bus *bus, struct status_page *page,
 	*ret_report = (struct bus_watch_report){ 0 };
 	for (size_t i = 0; i < bus->slave_count; i++) {
 		ret_report->slaves_op += is_in_op(&bus->slave[i]) ? 1 : 0;
+		ret_report->op_mask |= is_in_op(&bus->slave[i]) ? UINT64_C(1) << i : 0;
 		ret_report->slaves_lost += bus->slave[i].is_lost ? 1 : 0;
 	}
+	ret_report->is_reference_op =
+		bus->plan.dc_reference == 0 || is_in_op(&bus->slave[bus->reference]);
 	ret_report->is_all_op = ret_report->slaves_op == bus->slave_count;
 	return r < 0 ? r : 0;
 }

@@ -17,6 +17,7 @@ enum config_mode { CONFIG_MODE_UNSET, CONFIG_MODE_PERIODIC, CONFIG_MODE_ONESHOT 
 enum config_owner { CONFIG_OWNER_LOCAL, CONFIG_OWNER_PROGRAM, CONFIG_OWNER_REMOTE };
 enum config_edge_clock { CONFIG_EDGE_AUTO, CONFIG_EDGE_MONOTONIC, CONFIG_EDGE_HTE };
 enum config_presence { CONFIG_ANY_SLAVES, CONFIG_EXACT_SLAVES };
+enum config_datagrams { CONFIG_DATAGRAMS_ONE, CONFIG_DATAGRAMS_PER_SLAVE };
 
 enum { CONFIG_LIMIT_SDOS = 256, CONFIG_LIMIT_OUTPUTS = 512, CONFIG_PATH_BYTES = 256 };
 enum { CONFIG_OPTIONS_BYTES = 512 };
@@ -69,6 +70,7 @@ struct config {
 	uint32_t bus_wkc_miss_limit_cycles;
 	uint32_t bus_monitor; /* 1: BRD of AL status and 0x092C in every cycle */
 	enum config_presence bus_presence;
+	enum config_datagrams bus_datagrams;
 	/* cycle */
 	int64_t cycle_period_ns;
 	double cycle_phase_percent;   /* set point: frame after SYNC0, share of the period */

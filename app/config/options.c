@@ -130,6 +130,19 @@ const struct option option_table[] = {
 	  .otherwise = "`exact` in a file that lists slaves",
 	  .prose = "any: slaves behind those listed are welcome. exact: as many as listed, none "
 		   "more." },
+	{ .name = "bus.datagrams",
+	  .type = OPTION_WORD,
+	  FIELD(bus_datagrams),
+	  .standard = "one",
+	  .unit = "",
+	  .words = "one|per_slave",
+	  .prose = "one: a single LRW for all process data; when one slave is lost, no data is "
+		   "taken and "
+		   "all outputs go to fail-safe until it is back. per_slave: a datagram for what "
+		   "each "
+		   "slave has in one place; when one is lost, the others go on while the reference "
+		   "clock "
+		   "is among them. Costs 12 bytes a datagram." },
 	/* cycle */
 	{ .name = "cycle.period",
 	  .type = OPTION_DURATION,

@@ -18,11 +18,18 @@ void check_init(struct check *check, const struct config *cfg, const struct slav
 	}
 }
 
-void check_restart(struct check *check)
+void check_restart_some(struct check *check, uint64_t slaves)
 {
 	for (size_t i = 0; i < check->slave_count; i++) {
-		check->slave[i].has_last = 0;
+		if (slaves >> i & 1) {
+			check->slave[i].has_last = 0;
+		}
 	}
+}
+
+void check_restart(struct check *check)
+{
+	check_restart_some(check, UINT64_MAX);
 }
 
 static int counter_is_right(const struct check_slave *s, uint64_t seen, uint64_t cycle,
@@ -36,7 +43,7 @@ static int counter_is_right(const struct check_slave *s, uint64_t seen, uint64_t
 	return !s->has_last || seen == *ret_expected || (s->is_oneshot && seen == s->last);
 }
 
-uint64_t check_image(struct check *check, const uint8_t *image, uint64_t cycle,
+uint64_t check_image(struct check *check, const uint8_t *image, uint64_t cycle, uint64_t stale,
 		     struct check_fault *ret_fault)
 {
 	uint64_t bad = 0;
@@ -46,7 +53,7 @@ uint64_t check_image(struct check *check, const uint8_t *image, uint64_t cycle,
 		uint64_t expected;
 		uint64_t seen;
 
-		if (s->counter == NULL) {
+		if (s->counter == NULL || (stale >> i & 1) != 0) {
 			continue;
 		}
 		seen = image_get_raw(image, s->counter);

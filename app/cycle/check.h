@@ -37,12 +37,14 @@ void check_init(struct check *check, const struct config *cfg, const struct slav
 		size_t slave_count, const struct channel *channels);
 /** Take the next fresh sample as it is: entering OP, or after one that was wrong. */
 void check_restart(struct check *check);
+/** The same for the slaves of @slaves, a bit each. */
+void check_restart_some(struct check *check, uint64_t slaves);
 /**
- * Judge a fresh image of @cycle. Returns a bit for each bad slave; the first of them is described
- * in
+ * Judge a fresh image of @cycle, but for the slaves of @stale, whose part of it is not. Returns a
+ * bit for each bad slave; the first of them is described in
  * @ret_fault.
  */
-uint64_t check_image(struct check *check, const uint8_t *image, uint64_t cycle,
+uint64_t check_image(struct check *check, const uint8_t *image, uint64_t cycle, uint64_t stale,
 		     struct check_fault *ret_fault);
 
 #endif

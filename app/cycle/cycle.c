@@ -54,6 +54,8 @@ int cycle_create(const struct cycle_spec *spec, struct cycle **ret_cycle, char *
 	}
 	outputs_choose(&cy->outputs, cy->image, 0);
 	cy->was_fail_safe = 1;
+	cy->slaves = UINT64_MAX;
+	atomic_init(&cy->wanted_slaves, UINT64_MAX);
 	*ret_cycle = cy;
 	return 0;
 }
@@ -100,7 +102,10 @@ static void change_phase(struct cycle *cy)
 {
 	enum cycle_phase wanted =
 		(enum cycle_phase)atomic_load_explicit(&cy->wanted_phase, memory_order_acquire);
+	uint64_t slaves = atomic_load_explicit(&cy->wanted_slaves, memory_order_acquire);
 
+	check_restart_some(&cy->check, slaves & ~cy->slaves); /* they are back */
+	cy->slaves = slaves;
 	if (wanted == cy->phase) {
 		return;
 	}
@@ -163,7 +168,7 @@ static mono_t receive_deadline(const struct cycle *cy, mono_t now)
 static void choose_outputs(struct cycle *cy, uint8_t *image)
 {
 	int is_live = cy->phase == CYCLE_OP && !cy->is_latched_safe;
-	unsigned timed_out = outputs_choose(&cy->outputs, image, is_live);
+	unsigned timed_out = outputs_choose(&cy->outputs, image, is_live ? cy->slaves : 0);
 	int is_fail_safe = !is_live || timed_out > 0 || cycle_is_control_safe(cy);
 
 	if (is_fail_safe && !cy->was_fail_safe) {
@@ -273,6 +278,11 @@ int cycle_has_stopped(const struct cycle *cycle, int *ret_result)
 void cycle_stop(struct cycle *cycle)
 {
 	atomic_store_explicit(&cycle->stop, 1, memory_order_release);
+}
+
+void cycle_slaves_set(struct cycle *cycle, uint64_t slaves)
+{
+	atomic_store_explicit(&cycle->wanted_slaves, slaves, memory_order_release);
 }
 
 void cycle_phase_set(struct cycle *cycle, enum cycle_phase phase)

@@ -68,6 +68,12 @@ enum cycle_phase {
 };
 /** Context: service thread; takes effect at the next cycle boundary. */
 void cycle_phase_set(struct cycle *cycle, enum cycle_phase phase);
+/**
+ * In CYCLE_OP, the slaves that are in OP, a bit each; all at first. The others' outputs are at
+ * fail-safe, and their samples are bad and not counted. With a plan that is split only. Context:
+ * service thread; takes effect at the next cycle boundary.
+ */
+void cycle_slaves_set(struct cycle *cycle, uint64_t slaves);
 
 /** Push an event from the cycle's own thread only. RT-safe. */
 struct event;

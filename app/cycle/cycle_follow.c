@@ -24,7 +24,7 @@ void cycle_count_frames(struct cycle *cy, const struct exchange_result *res)
 	struct cycle_stats *st = cy->spec.stats;
 
 	ADD(st->cycles, 1);
-	ADD(st->frames_sent, cy->spec.plan->chunk_count);
+	ADD(st->frames_sent, exchange_frame_count(cy->spec.plan));
 	if (res->status == EXCHANGE_NO_FRAME) {
 		ADD(st->frames_lost, 1);
 		cy->sample.flags |= SAMPLE_LOST;

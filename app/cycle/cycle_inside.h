@@ -37,6 +37,7 @@ struct cycle {
 	struct sample_header sample; /* of the cycle being made */
 	uint8_t image[LIMIT_IMAGE_BYTES];
 	enum cycle_phase phase;
+	uint64_t slaves; /* in OP */
 	int has_started;
 	int was_fail_safe;
 	int has_overrun;     /* this step has passed edges */
@@ -48,11 +49,12 @@ struct cycle {
 	long faults_at_start;
 	struct event_gate gate[EVENT_COUNT];
 	int result;
-	_Atomic int stop;             /* [any] */
-	_Atomic int wanted_phase;     /* [service] */
-	_Atomic uint64_t dc_sequence; /* [cycle] odd: the pair below is being written */
-	_Atomic int64_t dc_ns;        /* [cycle] */
-	_Atomic int64_t dc_mono_ns;   /* [cycle] */
+	_Atomic int stop;               /* [any] */
+	_Atomic int wanted_phase;       /* [service] */
+	_Atomic uint64_t wanted_slaves; /* [service] */
+	_Atomic uint64_t dc_sequence;   /* [cycle] odd: the pair below is being written */
+	_Atomic int64_t dc_ns;          /* [cycle] */
+	_Atomic int64_t dc_mono_ns;     /* [cycle] */
 };
 
 /* Push an event of this cycle without a slave; arguments are clamped to int32. */

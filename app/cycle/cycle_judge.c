@@ -105,21 +105,27 @@ int cycle_place(struct cycle *cy, const struct exchange_result *res)
 	return place.is_in_window;
 }
 
+/* A slave that is known to be out of OP is not counted, as nobody is while the bus is. */
 static void count_bad(struct cycle *cy, uint64_t bad, int is_explained)
 {
 	struct cycle_stats *st = cy->spec.stats;
 	uint64_t bad_count = 0;
+	uint64_t good_count = 0;
 
 	for (size_t i = 0; i < cy->spec.slave_count; i++) {
+		if (!(cy->slaves >> i & 1)) {
+			continue;
+		}
 		if (bad >> i & 1) {
 			bad_count++;
 			ADD(st->slave_bad[i], 1);
 		} else {
+			good_count++;
 			ADD(st->slave_good[i], 1);
 		}
 	}
 	ADD(st->samples_bad, bad_count);
-	ADD(st->samples_good, cy->spec.slave_count - bad_count);
+	ADD(st->samples_good, good_count);
 	if (!is_explained) {
 		ADD(st->samples_bad_unexplained, bad_count);
 	}
@@ -128,6 +134,10 @@ static void count_bad(struct cycle *cy, uint64_t bad, int is_explained)
 void cycle_judge(struct cycle *cy, const struct exchange_result *res, int is_in_window)
 {
 	uint64_t all = cycle_all_slaves(cy);
+	int is_fresh = res->status == EXCHANGE_OK ||
+		       (res->status == EXCHANGE_WKC_LOW && cy->spec.plan->is_split);
+	uint64_t stale = (~cy->slaves | res->slaves_low) & all;
+	uint64_t wrong;
 	struct check_fault fault;
 
 	if (cy->phase != CYCLE_OP) {
@@ -135,13 +145,14 @@ void cycle_judge(struct cycle *cy, const struct exchange_result *res, int is_in_
 		cy->sample.slaves_bad = all;
 		return;
 	}
-	if (res->status != EXCHANGE_OK || !is_in_window) {
+	if (!is_fresh || !is_in_window) {
 		cy->sample.slaves_bad = all;
 		count_bad(cy, all, res->status != EXCHANGE_WKC_LOW);
 		return;
 	}
-	cy->sample.slaves_bad = check_image(&cy->check, cy->image, cy->sample.cycle, &fault);
-	if (cy->sample.slaves_bad != 0) {
+	wrong = check_image(&cy->check, cy->image, cy->sample.cycle, stale, &fault);
+	cy->sample.slaves_bad = wrong | stale;
+	if (wrong != 0) {
 		struct event ev = { .id = EVENT_COUNTER_BAD,
 				    .slave_pos = fault.slave_pos,
 				    .value = (int64_t)cy->sample.cycle,

@@ -119,7 +119,7 @@ static uint64_t limited(const struct output *out, uint64_t raw)
 	return physical > out->max ? out->max_raw : raw;
 }
 
-unsigned outputs_choose(struct outputs *outputs, uint8_t *image, int is_live)
+unsigned outputs_choose(struct outputs *outputs, uint8_t *image, uint64_t live_slaves)
 {
 	unsigned timed_out = 0;
 
@@ -129,6 +129,7 @@ unsigned outputs_choose(struct outputs *outputs, uint8_t *image, int is_live)
 		const struct board_set *set = &outputs->set[out->owner];
 		int is_silent = out->timeout_cycles > 0 &&
 				outputs->silent_cycles[out->owner] > out->timeout_cycles;
+		int is_live = (live_slaves >> out->channel->slave_pos & 1) != 0;
 		uint64_t raw = out->fail_safe_raw;
 
 		if (is_live && set->is_set[i] && !is_silent) {

@@ -44,7 +44,7 @@ int outputs_init(struct outputs *outputs, const struct cycle_spec *spec, char *e
  * Write all outputs into @image. With @is_live 0 they are fail-safe. Returns how many are fail-safe
  * although they should be live (their owner is silent).
  */
-unsigned outputs_choose(struct outputs *outputs, uint8_t *image, int is_live);
+unsigned outputs_choose(struct outputs *outputs, uint8_t *image, uint64_t live_slaves);
 
 /** The image last written went on the wire in @cycle: answer the boards. */
 void outputs_sent(struct outputs *outputs, uint64_t cycle);

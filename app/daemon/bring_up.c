@@ -277,6 +277,7 @@ static void arrive(struct session *s)
 	s->lost_since = (mono_t){ 0 };
 	s->wkc_low_seen = 0;
 	s->silent_cycles = 0;
+	s->is_partial = 0;
 	s->doubled_since = 0;
 	s->doubled_seen = 0;
 	s->cycles_seen = atomic_load_explicit(&s->home.page->cycle.cycles, memory_order_relaxed);

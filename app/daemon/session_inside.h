@@ -34,6 +34,7 @@ struct session {
 	int is_riding; /* the cycle owns the transport and the event ring */
 	int is_link_up;
 	enum bus_state state;
+	int is_partial; /* RECOVERING, and the cycle goes on with the slaves that are in OP */
 	mono_t next_watch;
 	uint64_t silent_cycles; /* in a row without a frame */
 	uint64_t cycles_seen;

@@ -65,7 +65,7 @@ static void serve_admin(struct session *s)
 {
 	struct admin_target target = {
 		.cfg = s->spec.cfg,
-		.is_op = s->state == BUS_OP,
+		.is_op = s->state == BUS_OP || s->is_partial,
 		.dc_now = admin_dc_now,
 		.stop = admin_stop,
 		.clear = admin_clear,
@@ -102,18 +102,35 @@ static void watch_link(struct session *s)
 	}
 }
 
+/* Others than the lost ones have data of their own, and their clocks still follow the reference. */
+static int can_go_on(const struct session *s, const struct bus_watch_report *report)
+{
+	return s->spec.cfg->bus_datagrams == CONFIG_DATAGRAMS_PER_SLAVE && report->slaves_op > 0 &&
+	       report->is_reference_op && (s->state == BUS_OP || s->state == BUS_RECOVERING);
+}
+
+/* The cycle goes on with the slaves of @op_mask; 0: outputs safe, no sample is judged. */
+static void go_on_with(struct session *s, uint64_t op_mask)
+{
+	s->is_partial = op_mask != 0 && op_mask != UINT64_MAX;
+	if (op_mask != 0) {
+		cycle_slaves_set(s->cycle, op_mask); /* before the phase, which it is for */
+	}
+	cycle_phase_set(s->cycle, op_mask != 0 ? CYCLE_OP : CYCLE_SYNCED);
+}
+
 static void follow_bus(struct session *s, const struct bus_watch_report *report)
 {
 	uint32_t count = atomic_load_explicit(&s->home.page->slave_count, memory_order_relaxed);
 	char text[BUS_ERROR_BYTES];
 
 	if (report->is_all_op && s->state == BUS_RECOVERING) {
-		cycle_phase_set(s->cycle, CYCLE_OP);
+		go_on_with(s, UINT64_MAX);
 		session_state_set(s, BUS_OP);
 		session_say(s, "");
 	} else if (!report->is_all_op) {
+		go_on_with(s, can_go_on(s, report) ? report->op_mask : 0);
 		if (s->state == BUS_OP) {
-			cycle_phase_set(s->cycle, CYCLE_SYNCED);
 			session_state_set(s, BUS_RECOVERING);
 		}
 		snprintf(text, sizeof(text), "bus: %u of %u slaves in OP, %u lost",

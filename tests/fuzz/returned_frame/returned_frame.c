@@ -155,6 +155,7 @@ static void meet_exchange(struct wire *w, struct line *line)
 		.chunk_bytes = { 40, 24 },
 		.chunk_count = 2,
 		.chunk_wkc = { 3, 1 },
+		.chunk_frame = { 0, 1 },
 		.wkc_expected = 4,
 		.dc_reference = 0x1001,
 		.slave_count = 2,

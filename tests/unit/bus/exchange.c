@@ -252,6 +252,7 @@ TEST(exchange, image_of_several_frames_is_taken_only_whole)
 		.chunk_bytes = { 1400, 1400, 200 },
 		.chunk_count = 3,
 		.chunk_wkc = { 3, 3, 3 },
+		.chunk_frame = { 0, 1, 2 },
 		.wkc_expected = 9,
 		.dc_reference = DC_REF,
 		.slave_count = 3,

@@ -3,6 +3,7 @@
 
 #include <errno.h>
 
+#include "bus/exchange_frame.h"
 #include "harness/test.h"
 
 static struct exchange_plan plan_of(uint32_t bytes)
@@ -116,4 +117,73 @@ TEST(plan, nothing_mapped_needs_no_datagram)
 	CHECK_EQ(plan_chunks(&plan, NULL, 0, &blocked), 0);
 	CHECK_EQ(plan.chunk_count, 0);
 	CHECK_EQ(plan.wkc_expected, 0);
+}
+
+TEST(plan, split_gives_each_slave_its_own_datagrams_in_one_frame)
+{
+	struct exchange_plan plan = plan_of(44);
+	const struct plan_area area[] = { area_of(0, 9, 0, 1), area_of(9, 18, 1, 1),
+					  area_of(18, 31, 0, 0), area_of(31, 44, 1, 0) };
+	int blocked;
+
+	plan.is_split = 1;
+	CHECK_EQ(plan_chunks(&plan, area, 4, &blocked), 0);
+	CHECK_EQ(plan.chunk_count, 4);
+	CHECK_EQ(plan.wkc_expected, 6);
+	for (unsigned i = 0; i < 4; i++) {
+		CHECK_EQ(plan.chunk_bytes[i], area[i].end - area[i].start);
+		CHECK_EQ(plan.chunk_wkc[i], i < 2 ? 2 : 1);
+		CHECK_EQ(plan.chunk_slaves[i], 1u << (i % 2));
+		CHECK_EQ(plan.chunk_frame[i], 0);
+	}
+}
+
+TEST(plan, split_keeps_together_what_shares_a_byte_or_is_one_slave_s)
+{
+	struct exchange_plan plan = plan_of(12);
+	/* Two slaves with four bits each in byte 0; a third with two SMs; a byte of nobody. */
+	const struct plan_area area[] = { area_of(0, 1, 0, 1), area_of(0, 1, 1, 1),
+					  area_of(1, 5, 2, 1), area_of(5, 8, 2, 0),
+					  area_of(9, 12, 3, 0) };
+	int blocked;
+
+	plan.is_split = 1;
+	CHECK_EQ(plan_chunks(&plan, area, 5, &blocked), 0);
+	CHECK_EQ(plan.chunk_count, 3);
+	CHECK_EQ(plan.chunk_bytes[0], 1);
+	CHECK_EQ(plan.chunk_slaves[0], 3);
+	CHECK_EQ(plan.chunk_wkc[0], 4);
+	CHECK_EQ(plan.chunk_bytes[1], 8);
+	CHECK_EQ(plan.chunk_slaves[1], 4);
+	CHECK_EQ(plan.chunk_wkc[1], 3);
+	CHECK_EQ(plan.chunk_bytes[2], 3);
+	CHECK_EQ(plan.chunk_slaves[2], 8);
+}
+
+TEST(plan, split_fills_frames_in_order_up_to_sixty_four_slaves)
+{
+	struct exchange_plan plan = plan_of(64 * 22);
+	struct plan_area area[128];
+	struct exchange_frame frame;
+	uint32_t bytes = 0;
+	int blocked;
+
+	for (unsigned i = 0; i < 64; i++) {
+		area[i] = area_of(i * 9, i * 9 + 9, (uint16_t)i, 1);
+		area[64 + i] = area_of(64 * 9 + i * 13, 64 * 9 + i * 13 + 13, (uint16_t)i, 0);
+	}
+	plan.is_split = 1;
+	CHECK_EQ(plan_chunks(&plan, area, 128, &blocked), 0);
+	CHECK_EQ(plan.chunk_count, 128);
+	CHECK_EQ(plan.wkc_expected, 3 * 64);
+	CHECK_EQ(exchange_frame_count(&plan), 3);
+	for (unsigned n = 0; n < exchange_frame_count(&plan); n++) {
+		CHECK_EQ(exchange_frame_build(&plan, n, &frame), 0);
+		CHECK(frame.len <= LIMIT_FRAME_BYTES);
+		for (unsigned i = 0; i < frame.part_count; i++) {
+			CHECK_EQ(frame.part[i].offset, bytes);
+			bytes += frame.part[i].len;
+		}
+	}
+	CHECK_EQ(bytes, plan.image_bytes);
 }

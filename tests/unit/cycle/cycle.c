@@ -20,6 +20,7 @@ static struct {
 	int64_t dc_offset_ns; /* DC time minus host time */
 	int64_t transit_ns;
 	int is_timeless; /* the reference's time in the frame is not to be believed */
+	uint64_t slaves_low;
 	unsigned late;
 	unsigned doubled;
 	uint8_t seen_output;
@@ -35,6 +36,7 @@ struct exchange_result exchange_run(struct exchange *ex, uint8_t *image, mono_t 
 	struct exchange_result res = {
 		.status = world.status,
 		.wkc = world.status == EXCHANGE_OK ? 4 : 0,
+		.slaves_low = world.slaves_low,
 		.wkc_expected = 4,
 		.sent = world.now,
 		.round_trip = { world.status == EXCHANGE_NO_FRAME ? -1 : world.transit_ns },
@@ -56,9 +58,11 @@ struct exchange_result exchange_run(struct exchange *ex, uint8_t *image, mono_t 
 		world.counter[0] = (uint16_t)((world.now.ns + world.dc_offset_ns) / PERIOD_NS);
 		world.counter[1] = (uint16_t)(world.counter[0] + 100);
 	}
-	if (world.status == EXCHANGE_OK) {
+	if (world.status == EXCHANGE_OK || (world.slaves_low & 1) == 0) {
 		image[1] = (uint8_t)world.counter[0];
 		image[2] = (uint8_t)(world.counter[0] >> 8);
+	}
+	if (world.status == EXCHANGE_OK || (world.slaves_low & 2) == 0) {
 		image[3] = (uint8_t)world.counter[1];
 		image[4] = (uint8_t)(world.counter[1] >> 8);
 	}
@@ -568,4 +572,56 @@ TEST(cycle, a_frame_without_a_time_is_late_and_never_taken_for_the_current_one)
 	CHECK_EQ(stats.frames_late, 1);
 	CHECK(stats.samples_bad > 0);
 	CHECK_EQ(stats.samples_good, 2 * (10 + 10 + 20));
+}
+
+TEST(cycle, of_a_split_image_only_the_slave_that_is_not_there_is_bad)
+{
+	struct got s;
+
+	start_in_op();
+	plan.is_split = 1;
+	board_begin(&board);
+	board_put(&board, 0, 1);
+	board_commit(&board);
+	world.status = EXCHANGE_WKC_LOW;
+	world.slaves_low = 2;
+	steps(10);
+	CHECK_EQ(stats.slave_bad[0], 0);
+	CHECK_EQ(stats.slave_bad[1], 10);
+	CHECK_EQ(stats.samples_bad, 10);
+	s = next_sample();
+	CHECK_EQ(s.h.slaves_bad, 2);
+	CHECK_EQ(s.h.flags & SAMPLE_WKC_LOW, SAMPLE_WKC_LOW);
+	cycle_slaves_set(cy, 1); /* the service thread knows now */
+	steps(100);
+	CHECK_EQ(stats.slave_bad[0], 0);
+	CHECK_EQ(stats.slave_bad[1], 10);
+	CHECK_EQ(stats.slave_good[0], stats.slave_good[1] + 110);
+	CHECK_EQ(world.seen_output & 1, 1);
+	CHECK_EQ(stats.is_fail_safe, 0);
+	world.status = EXCHANGE_OK;
+	world.slaves_low = 0;
+	cycle_slaves_set(cy, 3); /* and it is back, its counter anywhere */
+	steps(100);
+	CHECK_EQ(stats.samples_bad, 10);
+	ring_seek(reader, ring_newest(reader));
+	steps(1);
+	CHECK_EQ(next_sample().h.slaves_bad, 0);
+}
+
+TEST(cycle, outputs_of_a_slave_that_is_not_in_op_are_at_fail_safe)
+{
+	start_in_op();
+	plan.is_split = 1;
+	board_begin(&board);
+	board_put(&board, 0, 1);
+	board_commit(&board);
+	steps(3);
+	CHECK_EQ(world.seen_output & 1, 1);
+	cycle_slaves_set(cy, 2);
+	steps(2);
+	CHECK_EQ(world.seen_output & 1, 0);
+	cycle_slaves_set(cy, 3);
+	steps(2);
+	CHECK_EQ(world.seen_output & 1, 1);
 }
