@@ -20,7 +20,7 @@ IMAGE = Path(os.environ.get("ECDAQ_IMAGE_DIR", TOP / "build" / "image" / "qemuar
 NAME = "ecdaq-image-ecdaq-qemuarm64"
 TOOLS = TOP / "app" / "tools" / "image"
 # An emulator on a busy machine: limits that only a hang exceeds.
-BOOT_S = float(os.environ.get("ECDAQ_BOOT_SECONDS", "900"))
+BOOT_S = float(os.environ.get("ECDAQ_BOOT_SECONDS", "1800"))
 COMMAND_S = 600.0
 POLL_S = 0.2
 ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]|\r")
