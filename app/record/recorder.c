@@ -11,10 +11,9 @@
 
 #include "base/clock.h"
 #include "base/ring.h"
-#include "record/event_feed.h"
+#include "record/feed.h"
 #include "record/sample_feed.h"
 #include "record/sink.h"
-#include "record/sync0_feed.h"
 
 #define LOOK_NS (NS_PER_S / 10) /* for a ring, and between two looks at the status page */
 enum { EVENTS_A_STEP = 256, SAMPLES_A_STEP = 2048 };
@@ -22,9 +21,7 @@ enum { EVENTS_A_STEP = 256, SAMPLES_A_STEP = 2048 };
 struct recorder {
 	struct recorder_options opt;
 	struct sink *sink;
-	struct event_feed *events;
-	struct event_feed *sync0_events;
-	struct sync0_feed *sync0;
+	struct feed *feed[SINK_RINGS];
 	struct ring_reader *ring;    /* NULL: waiting for one */
 	struct sample_feed *samples; /* NULL: the ring is done with (or waiting) */
 	struct record_status *page;  /* shared, or own while there is no run directory */
@@ -60,14 +57,15 @@ int recorder_create(const struct recorder_options *opt, struct recorder **ret_re
 	rec->page = &rec->own;
 	rec->looked_ns = INT64_MIN / 2;
 	rec->told_ns = INT64_MIN / 2;
-	rec->events = event_feed_create(opt->events_path);
-	rec->sync0_events =
-		event_feed_create(opt->sync0_events_path == NULL ? "" : opt->sync0_events_path);
-	rec->sync0 = sync0_feed_create(opt->sync0_path == NULL ? "" : opt->sync0_path);
-	if (rec->events == NULL || rec->sync0_events == NULL || rec->sync0 == NULL) {
-		recorder_destroy(rec);
-		snprintf(error, error_bytes, "%s", strerror(ENOMEM));
-		return -ENOMEM;
+	rec->feed[SINK_EVENTS] = feed_create(FEED_EVENTS, opt->events_path);
+	rec->feed[SINK_SYNC0_EVENTS] = feed_create(FEED_EVENTS, opt->sync0_events_path);
+	rec->feed[SINK_SYNC0] = feed_create(FEED_SYNC0, opt->sync0_path);
+	for (int i = 0; i < SINK_RINGS; i++) {
+		if (rec->feed[i] == NULL) {
+			recorder_destroy(rec);
+			snprintf(error, error_bytes, "%s", strerror(ENOMEM));
+			return -ENOMEM;
+		}
 	}
 	r = sink_create(opt, &rec->sink, error, error_bytes);
 	if (r < 0) {
@@ -85,9 +83,9 @@ void recorder_destroy(struct recorder *rec)
 	}
 	sample_feed_destroy(rec->samples);
 	ring_reader_destroy(rec->ring);
-	event_feed_destroy(rec->events);
-	event_feed_destroy(rec->sync0_events);
-	sync0_feed_destroy(rec->sync0);
+	for (int i = 0; i < SINK_RINGS; i++) {
+		feed_destroy(rec->feed[i]);
+	}
 	sink_destroy(rec->sink);
 	if (rec->page != &rec->own) {
 		status_unmap(rec->page, sizeof(*rec->page));
@@ -153,11 +151,12 @@ const struct record_status *recorder_status(const struct recorder *rec)
 	return rec->page;
 }
 
-static struct event_mark event_mark(const struct recorder *rec)
+static struct feed *open_feed(struct recorder *rec, enum sink_ring which)
 {
-	const struct store_state *resume = sink_resume_point(rec->sink);
+	struct feed_mark mark = sink_mark(rec->sink, which);
 
-	return (struct event_mark){ .next = resume->event_next, .mono_ns = resume->event_mono_ns };
+	feed_open(rec->feed[which], &mark);
+	return rec->feed[which];
 }
 
 static void note_ring_error(struct recorder *rec, int error)
@@ -222,7 +221,7 @@ enum events_until {
 /* Events go where samples go. Returns how many were taken. */
 static int take_events(struct recorder *rec, enum events_until until)
 {
-	struct event_mark mark = event_mark(rec);
+	struct feed *feed;
 	struct event ev;
 	uint64_t sequence;
 	uint64_t lost;
@@ -231,9 +230,9 @@ static int take_events(struct recorder *rec, enum events_until until)
 	if (sink_state(rec->sink) != SINK_READY) {
 		return 0;
 	}
-	event_feed_open(rec->events, &mark);
+	feed = open_feed(rec, SINK_EVENTS);
 	while (taken < EVENTS_A_STEP) {
-		int got = event_feed_read(rec->events, &ev, &sequence, &lost);
+		int got = feed_read(feed, &ev, &sequence, &lost);
 
 		if (lost > 0) {
 			sink_count_lost_events(rec->sink, lost);
@@ -243,7 +242,7 @@ static int take_events(struct recorder *rec, enum events_until until)
 		}
 		if ((until == EVENTS_UNTIL_SAMPLE && sample_feed_is_behind(rec->samples, &ev)) ||
 		    sample_feed_event(rec->samples, &ev, sequence) < 0) {
-			event_feed_unread(rec->events);
+			feed_unread(feed);
 			break;
 		}
 		taken++;
@@ -251,33 +250,17 @@ static int take_events(struct recorder *rec, enum events_until until)
 	return taken;
 }
 
-static struct event_mark sync0_mark(const struct recorder *rec)
-{
-	const struct store_state *resume = sink_resume_point(rec->sink);
-
-	return (struct event_mark){ .next = resume->sync0_next, .mono_ns = resume->sync0_mono_ns };
-}
-
-static struct event_mark sync0_event_mark(const struct recorder *rec)
-{
-	const struct store_state *resume = sink_resume_point(rec->sink);
-
-	return (struct event_mark){ .next = resume->sync0_event_next,
-				    .mono_ns = resume->sync0_event_mono_ns };
-}
-
 /* Alarms of ecdaq-sync0 are events, too; they carry no sequence of ecdaqd's ring. */
 static void take_sync0_events(struct recorder *rec)
 {
-	struct event_mark mark = sync0_event_mark(rec);
+	struct feed *feed = open_feed(rec, SINK_SYNC0_EVENTS);
 	struct event ev;
 	uint64_t sequence;
 	uint64_t lost;
 
-	event_feed_open(rec->sync0_events, &mark);
-	while (event_feed_read(rec->sync0_events, &ev, &sequence, &lost)) {
+	while (feed_read(feed, &ev, &sequence, &lost)) {
 		if (sample_feed_event(rec->samples, &ev, UINT64_MAX) < 0) {
-			event_feed_unread(rec->sync0_events);
+			feed_unread(feed);
 			break;
 		}
 		sink_mark_sync0_event(rec->sink, &ev, sequence);
@@ -287,19 +270,20 @@ static void take_sync0_events(struct recorder *rec)
 /* What ecdaq-sync0 said of this session. */
 static void take_sync0(struct recorder *rec)
 {
-	struct event_mark mark = sync0_mark(rec);
 	struct sync0_result result;
+	struct feed *feed;
 	uint64_t sequence;
+	uint64_t lost;
 
 	if (sink_state(rec->sink) != SINK_READY) {
 		return;
 	}
 	take_sync0_events(rec);
-	sync0_feed_open(rec->sync0, &mark);
-	while (sync0_feed_read(rec->sync0, &result, &sequence)) {
+	feed = open_feed(rec, SINK_SYNC0);
+	while (feed_read(feed, &result, &sequence, &lost)) {
 		if (result.session == sample_feed_number(rec->samples) &&
 		    sample_feed_sync0(rec->samples, &result, sequence) < 0) {
-			sync0_feed_unread(rec->sync0);
+			feed_unread(feed);
 			break;
 		}
 	}
@@ -360,14 +344,12 @@ enum recorder_result recorder_step(struct recorder *rec)
 		look_for_ring(rec);
 	}
 	if (rec->samples != NULL && sink_take_rewind(rec->sink)) {
-		struct event_mark mark = event_mark(rec);
-
 		sample_feed_rewind(rec->samples);
-		event_feed_seek(rec->events, &mark);
-		mark = sync0_event_mark(rec);
-		event_feed_seek(rec->sync0_events, &mark);
-		mark = sync0_mark(rec);
-		sync0_feed_seek(rec->sync0, &mark);
+		for (int i = 0; i < SINK_RINGS; i++) {
+			struct feed_mark mark = sink_mark(rec->sink, (enum sink_ring)i);
+
+			feed_seek(rec->feed[i], &mark);
+		}
 	}
 	if (rec->samples != NULL && sink_state(rec->sink) == SINK_READY) {
 		result = follow(rec);

@@ -91,6 +91,22 @@ const struct store_state *sink_resume_point(const struct sink *s)
 	return &s->resume;
 }
 
+struct feed_mark sink_mark(const struct sink *s, enum sink_ring which)
+{
+	const struct store_state *resume = &s->resume;
+
+	switch (which) {
+	case SINK_EVENTS:
+		return (struct feed_mark){ resume->event_next, resume->event_mono_ns };
+	case SINK_SYNC0_EVENTS:
+		return (struct feed_mark){ resume->sync0_event_next, resume->sync0_event_mono_ns };
+	case SINK_SYNC0:
+	case SINK_RINGS:
+		break;
+	}
+	return (struct feed_mark){ resume->sync0_next, resume->sync0_mono_ns };
+}
+
 enum sink_state sink_state(const struct sink *s)
 {
 	return s->state;

@@ -8,6 +8,7 @@
 #define RECORD_SINK_H
 
 #include "base/event.h"
+#include "record/feed.h"
 #include "record/record_file.h"
 #include "record/recorder.h"
 #include "record/recover_file.h"
@@ -29,6 +30,12 @@ void sink_destroy(struct sink *s);
 
 /** Where recording is to go on, as the store knows it. */
 const struct store_state *sink_resume_point(const struct sink *s);
+
+/* The rings whose records are kept beside the samples. */
+enum sink_ring { SINK_EVENTS, SINK_SYNC0_EVENTS, SINK_SYNC0, SINK_RINGS };
+
+/** The same in one of those rings. */
+struct feed_mark sink_mark(const struct sink *s, enum sink_ring which);
 
 enum sink_news {
 	SINK_NEW_SESSION,   /* nothing of it was recorded yet */
