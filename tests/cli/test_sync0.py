@@ -11,6 +11,7 @@ import subprocess
 import time
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from ecdaq import BIN, FAILED, NO_DAEMON, USAGE, ecdaq, environment, fails, works
@@ -119,6 +120,17 @@ def test_mistakes_on_the_command_line_are_one_line(tmp_path: Path) -> None:
     assert "usage: ecdaq-sync0" in check("--help").stdout
 
 
+def wait_for_message(run_dir: Path) -> dict[str, Any]:
+    end = time.monotonic() + 60
+    while time.monotonic() < end:
+        got = ecdaq(run_dir, "sync0", "--json")
+        report: dict[str, Any] = json.loads(got.stdout) if got.returncode == 0 else {}
+        if report.get("message"):
+            return report
+        time.sleep(0.02)
+    raise AssertionError("ecdaq-sync0 said nothing")
+
+
 def test_a_line_that_cannot_be_had_is_said_once_and_waited_for(run_dir: Path) -> None:
     options = ["--set", "sync0.enable=on", "--set", "slaves[0].sync0_line=pinctrl-none:17"]
     dev = run_dir / "dev"
@@ -131,12 +143,7 @@ def test_a_line_that_cannot_be_had_is_said_once_and_waited_for(run_dir: Path) ->
         text=True,
     )
     try:
-        end = time.monotonic() + 60
-        while not (run_dir / "sync0-status").exists() and time.monotonic() < end:
-            time.sleep(0.02)
-        report = json.loads(works(ecdaq(run_dir, "sync0", "--json")))
-        while report["message"] == "" and time.monotonic() < end:
-            report = json.loads(works(ecdaq(run_dir, "sync0", "--json")))
+        report = wait_for_message(run_dir)
         assert "line 'pinctrl-none:17' of slave 0: this machine has no GPIO" in report["message"]
         assert report["lines"][0]["open"] is False
         assert "NOT OPEN" in works(ecdaq(run_dir, "sync0"))
