@@ -16,7 +16,8 @@ from test_samples import finish, gaps_of, of_recording, of_subscriber
 from vendors import JOINING_CYCLES, SECONDS, have_foreign, joined, start_vendors, wait_for_ends
 
 Values = dict[tuple[int, int], tuple[int, ...]]
-MATCH_CYCLES = 15000  # until peers of another vendor have found a new publisher
+RESUME_S = 14.0
+MATCH_CYCLES = 10000  # until peers of another vendor have found a new publisher
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -64,7 +65,7 @@ def test_four_vendors_resume_after_a_killed_publisher_and_the_gap_is_its_down_ti
 ) -> None:
     bench = make_bench()
     bench.start_all()
-    files = start_vendors(bench, SECONDS)
+    files = start_vendors(bench, RESUME_S)
     bench.segment.wait_for_cycles(3 * JOINING_CYCLES, 30)
     before = bench.segment.status()["cycle_number"]
     bench.segment.stop("dds", signal.SIGKILL)
@@ -73,7 +74,7 @@ def test_four_vendors_resume_after_a_killed_publisher_and_the_gap_is_its_down_ti
     up = bench.segment.status()["cycle_number"]
     bench.start_dds(sessions=2)
     back = bench.segment.status()["cycle_number"]
-    finish(bench, SECONDS + 60)
+    finish(bench, RESUME_S + 60)
     recorded = of_recording(bench)
     assert not gaps_of(recorded, 0)
     print(f"ecdaq-dds killed in cycles {before} to {down}, started at {up}, published by {back}")
