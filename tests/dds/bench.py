@@ -42,6 +42,10 @@ DDS_SETTINGS = {
 }
 
 
+# Of a refusal, where the machine does not run the master or the commander for a while.
+PASSING_REASONS = ("did not take it in time", "the commander is gone", "not in OP", "no answer")
+
+
 class Commander:
     """command_python.py, spoken to in JSON."""
 
@@ -62,9 +66,13 @@ class Commander:
         return self._answer()
 
     def accepted(self, values: dict[str, float]) -> int:
-        answer = self.command(values)
-        assert answer["accepted"], answer
-        return answer["cycle"]
+        """The cycle of a command that has to pass; what only a busy machine refuses is repeated."""
+        for _ in range(20):
+            answer = self.command(values)
+            if answer["accepted"]:
+                return answer["cycle"]
+            assert any(why in answer["reason"] for why in PASSING_REASONS), answer
+        raise AssertionError(answer)
 
     def kill(self) -> None:
         self.process.kill()
