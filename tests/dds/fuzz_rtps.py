@@ -93,6 +93,10 @@ def change(rng: random.Random, packet: bytes, other: bytes) -> bytes:
     return bytes(data[:60000])
 
 
+def wait_for_the_next_ten() -> None:
+    time.sleep(0.003)  # a pace, not a synchronisation
+
+
 def send(options: argparse.Namespace, learned: list[tuple[int, bytes]]) -> int:
     rng = random.Random(options.seed)
     out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -107,7 +111,7 @@ def send(options: argparse.Namespace, learned: list[tuple[int, bytes]]) -> int:
                     packet = packet.ljust(24, b"\0")
             out.sendto(packet, (options.host, port))
             sent += 1
-        time.sleep(0.003)  # a pace, not a synchronisation
+        wait_for_the_next_ten()
     return sent
 
 
