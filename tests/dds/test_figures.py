@@ -185,7 +185,8 @@ def test_command_is_in_the_slave_in_the_cycle_that_the_answer_names(
     print(f"{len(trips)} commands, {len(there)} of whose frames came back in their cycle")
     print("DDS write to the frame at the slave:", spread(took, "cycles"))
     print("DDS write to the answer:", spread([t.answer_cycles for t in trips], "cycles"))
-    assert all(trip.led_cycles > 0 for trip in trips), "in the slave before it was sent"
+    assert len(there) > len(trips) / 2
+    assert min(took) > 0, "in the slave before it was sent"
 
 
 def test_latency_from_sync0_to_the_take_is_printed_and_no_sample_comes_before_its_edge(
