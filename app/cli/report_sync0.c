@@ -8,7 +8,7 @@
 
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
 
-static enum sync0_verdict worst(const struct sync0_status *page)
+static uint32_t worst(const struct sync0_status *page)
 {
 	uint32_t v = SYNC0_NONE;
 
@@ -18,7 +18,7 @@ static enum sync0_verdict worst(const struct sync0_status *page)
 
 		v = own > v ? own : v;
 	}
-	return (enum sync0_verdict)v;
+	return v;
 }
 
 void report_sync0_line(const struct report *report, FILE *out)

@@ -18,6 +18,9 @@
 
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
 
+/* Results that are looked through for the newest of each line. */
+#define NEWEST (UINT64_C(4) * LIMIT_SLAVES)
+
 enum { PROGRAM_PATH_BYTES = 4096, PROGRAM_ARGUMENTS = 8 };
 
 struct view {
@@ -44,8 +47,7 @@ static void read_results(struct cli *cli, struct view *view)
 	if (strcmp(ring_kind(ring), "sync0") == 0 && ring_payload_bytes(ring) == sizeof(r)) {
 		newest = ring_newest(ring);
 		oldest = ring_oldest(ring);
-		ring_seek(ring,
-			  newest - oldest > 4 * LIMIT_SLAVES ? newest - 4 * LIMIT_SLAVES : oldest);
+		ring_seek(ring, newest - oldest > NEWEST ? newest - NEWEST : oldest);
 		while (ring_read(ring, &r, &lost) == RING_OK) {
 			if (r.line < view->lines) {
 				view->result[r.line] = r;

@@ -174,8 +174,11 @@ static void take_line(char *line, struct calibration *c, unsigned *seen)
 		{ "bias: ", &c->noise.bias_ns },
 		{ "bias_error: ", &c->noise.bias_error_ns },
 	};
+	char *newline = strchr(line, '\n');
 
-	line[strcspn(line, "\n")] = '\0';
+	if (newline != NULL) {
+		*newline = '\0';
+	}
 	if (strncmp(line, "first: ", 7) == 0) {
 		snprintf(c->first, sizeof(c->first), "%.95s", line + 7);
 	} else if (strncmp(line, "second: ", 8) == 0) {

@@ -12,6 +12,7 @@ enum {
 	MASTER_BEHIND = 16,
 	WINDOW_CYCLES_MIN = 16,
 	WINDOWS_AT_ONCE = 16,
+	FAR_WINDOWS = 4,
 };
 
 #define MASTER_GONE_NS NS_PER_S /* do not wait longer for its samples */
@@ -100,7 +101,7 @@ struct window *checker_window(struct checker *ck, int64_t cycle)
 	}
 	number = (cycle - ck->base) / ck->window_cycles;
 	/* So far ahead that nothing can be known of what lies between: only the newest matter. */
-	if (number - ck->window_number > 2 * OPEN_WINDOWS) {
+	if (number - ck->window_number > FAR_WINDOWS) {
 		checker_close_window(ck);
 		checker_close_window(ck);
 		checker_begin_at(ck, cycle);

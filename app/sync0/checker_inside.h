@@ -57,7 +57,7 @@ void checker_begin_at(struct checker *ck, int64_t cycle);
 /** The host's clock went ahead of DC time by @step_ns in about @cycle. */
 void checker_clock_stepped(struct checker *ck, int64_t cycle, int64_t step_ns);
 /** Take what has become clear of @line. */
-void checker_take(struct checker *ck, size_t line, const struct track_out *out);
+void checker_take(struct checker *ck, size_t number, const struct track_out *out);
 /** The open window that holds @cycle, closing older ones if it must; NULL if it is not judged. */
 struct window *checker_window(struct checker *ck, int64_t cycle);
 /** Compute, judge and tell the oldest open window, and open the next. */

@@ -8,7 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/clock.h"
 #include "config/config.h"
 #include "sync0/listen.h"
 #include "sync0/replay.h"

@@ -216,11 +216,12 @@ static void collect(void *ctx, const struct edge_item *item)
 	if (item->kind != EDGE_ITEM_EDGE) {
 		return;
 	}
-	while (n < c->lines && c->slave[n] != item->edge.line) {
+	while (n < 2 && n < c->lines && c->slave[n] != item->edge.line) {
 		n++;
 	}
 	if (n == c->lines && n < 2) {
-		c->slave[c->lines++] = item->edge.line;
+		c->slave[n] = item->edge.line;
+		c->lines = n + 1;
 	}
 	if (n < 2 && c->count[n] < c->room) {
 		c->at_ns[n][c->count[n]++] = item->edge.mono_ns;

@@ -122,15 +122,17 @@ static void hold(struct track *track, const struct grid *grid, const struct edge
 static int run_is_step(const struct track *track, double *ret_middle_ns)
 {
 	int64_t off[TRACK_HELD];
+	int64_t median;
 	double middle;
 
 	for (int i = 0; i < TRACK_HELD; i++) {
 		off[i] = (int64_t)track->run_off_ns[i];
 	}
 	stat_sort(off, TRACK_HELD);
-	middle = (double)off[TRACK_HELD / 2];
+	median = off[TRACK_HELD / 2];
+	middle = (double)median;
 	*ret_middle_ns = middle;
-	return (double)(off[TRACK_HELD - 1] - off[0]) < fabs(middle) / 2 &&
+	return (double)off[TRACK_HELD - 1] - (double)off[0] < fabs(middle) / 2 &&
 	       fabs(track->run_jump_ns - middle) < fabs(middle) / 2;
 }
 

@@ -4,7 +4,6 @@
 
 #include <errno.h>
 #include <gpiod.h>
-#include <stdlib.h>
 #include <sys/stat.h>
 #include <unistd.h>
 

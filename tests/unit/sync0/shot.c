@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* One-shot mode: did the pulse come, when, and did one come that nobody had asked for? */
-#include "base/clock.h"
 #include "harness/test.h"
 #include "unit/sync0/bench.h"
 
