@@ -155,7 +155,7 @@ def equals_the_appliances(bench: Bench, folder: Path) -> None:
     checked = bench.segment.ecdaq("log", "check", "--json", str(file))
     told = json.loads(checked.stdout)
     assert told["clean"] is True
-    assert told["cycles"] > 2000
+    assert told["cycles"] > 300
     for slave in ("piccolo0", "piccolo1"):
         topic = f"/ecdaq/{slave}"
         local = {m.cycle: fields(m) for m in live.recorded(bench.segment.record_dir, topic)}
@@ -164,7 +164,7 @@ def equals_the_appliances(bench: Bench, folder: Path) -> None:
         assert {cycle: local[cycle] for cycle in remote} == remote
     assert list(live.recorded(folder, "/ecdaq/timemap"))
     exported = bench.segment.ecdaq("log", "export", str(file))
-    assert exported.stdout.count("\n") > 2000
+    assert exported.stdout.count("\n") > 300
 
 
 def fields(message: Any) -> dict[str, Any]:
