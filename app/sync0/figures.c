@@ -164,10 +164,11 @@ static void against_frames(const struct window *w, const struct stat_fit *edges,
 	}
 	ret->has |= SYNC0_HAS_RATE | SYNC0_HAS_PHASE;
 	ret->rate_ppb = (frames.slope - edges->slope) * to_ppb;
-	/* Wake-ups are late together, not each for itself: their spread counts once more. */
-	ret->rate_error_ppb =
-		(edges->slope_error + frames.slope_error + frames.sigma / (double)w->cycles) *
-		to_ppb;
+	/* Wake-ups and round trips change together, not each for itself: a change in mid-window
+	 * tilts the line by up to this. */
+	ret->rate_error_ppb = (edges->slope_error + frames.slope_error +
+			       (frames.sigma + (double)latency_ns) / (double)w->cycles) *
+			      to_ppb;
 	ret->phase_ns = llround(edges->offset - frames.offset -
 				frames.slope * (edges->centre - frames.centre));
 	ret->phase_error_ns = llround(edges->offset_error + frames.offset_error) + latency_ns;

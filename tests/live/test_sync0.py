@@ -85,7 +85,8 @@ def test_pulses_that_do_not_come_are_told_with_slave_and_cycle(
     report = checked.wait_for_windows(2)
     assert report["source"] == "simulated edges"
     assert [line["slave"] for line in report["lines"]] == [0, 1]
-    assert checked.events() == []
+    pulses = ("sync0_missing", "sync0_extra", "sync0_lost")
+    assert [e for e in checked.events() if e["event"] in pulses] == []
     checked.fault("at=0s sync0-lost slave=1 count=3")
 
     def told() -> list[dict[str, Any]]:

@@ -48,7 +48,7 @@ struct bench *bench_create(void)
 		.line_count = BENCH_LINES,
 		.line = { { .slave_pos = 0 }, { .slave_pos = 3 } },
 		.limits = { .drift_ppb = 200000,
-			    .rate_ppb = 10000,
+			    .rate_ppb = 20000,
 			    .jitter_ns = 20000,
 			    .phase_ns = 100000,
 			    .skew_ns = 2000 },
