@@ -144,3 +144,23 @@ def test_time_servers_are_addresses_and_nothing_else(place: Place) -> None:
     sources = (place.target / "chrony.d/boot.sources").read_text()
     assert sources == "server ntp1.example iburst\nserver 192.0.2.1 iburst\n"
     assert "is no address" in said
+
+
+@pytest.mark.parametrize(
+    ("text", "is_set_by_machine"),
+    [
+        ("dds:\n  enable: on\n  interface: eth1\n", True),
+        ("bus:\n  watchdog: 1s\ndds:\n  interface: eth1\n", True),
+        ("# bus:\n#   interface: eth1\ncycle:\n  period: 1ms\n", True),
+        ("bus:\n  # the port\n  interface : eth0\n", False),
+        ("dds:\n  interface: eth1\nbus:\n  interface: eth0\n", False),
+        ("bus: {interface: eth0}\n", False),
+        ("bus: {watchdog: 1s, interface: eth0}\n", False),
+    ],
+)
+def test_the_port_is_set_unless_the_file_has_that_of_the_bus(
+    place: Place, text: str, is_set_by_machine: bool
+) -> None:
+    (place.source / "ecdaq.yaml").write_text(text)
+    place.run()
+    assert ("bus.interface=ecat0" in place.options()) is is_set_by_machine
