@@ -153,8 +153,8 @@ def test_its_memory_is_locked(machine: Machine) -> None:
 
 
 def test_no_interrupt_but_the_timer_comes_to_that_core(machine: Machine) -> None:
-    """All interrupts that a device raises go to the housekeeping core; what the kernel manages itself
-    may name others, but goes nowhere else (isolcpus=managed_irq)."""
+    """All that devices raise goes to the housekeeping core; what the kernel manages itself may name
+    others, but goes nowhere else (isolcpus=managed_irq)."""
     lists = machine.run(
         "for i in /proc/irq/[0-9]*; do echo ${i##*/} $(cat $i/effective_affinity_list); done"
     )
