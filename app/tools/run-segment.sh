@@ -232,6 +232,8 @@ end_in_order()
 	stop recorder
 	stop_dds
 	stop segment
+	trap '' INT TERM
+	stop interrupt
 }
 
 clean_up()
@@ -241,11 +243,20 @@ clean_up()
 	[ -z "${run_dir_is_own:-}" ] || rm -rf "$ECDAQ_RUN_DIR"
 }
 
+# A signal that comes before "wait" is in it would be waited over: this child's end is waited for, too.
+start_interruptible()
+{
+	setpriv --pdeathsig TERM setsid sleep infinity <&3 &
+	pid[interrupt]=$!
+	trap 'interrupted=yes; kill "${pid[interrupt]}" 2> /dev/null || true' INT TERM
+}
+
 # Which of the children ended? Waits for the first.
 wait_for_end()
 {
 	local ended=
 
+	[ "$interrupted" = no ] || return 0
 	wait -n -p ended "${pid[@]}" || true
 	[ "$interrupted" = no ] || return 0
 	for name in "${!pid[@]}"; do
@@ -275,7 +286,7 @@ run_inside()
 	mkdir -p "$record"
 	exec 3<&0
 	trap clean_up EXIT
-	trap 'interrupted=yes' INT TERM
+	start_interruptible
 	make_wire
 	start segment "$bin/ecdaq-sim" "${segment_options[@]}"
 	start recorder "$bin/ecdaq-record" "${set_options[@]}"
