@@ -365,6 +365,8 @@ def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def main(arguments: Sequence[str]) -> int:
+    # A shell that starts us in the background has SIGINT ignored, and so would all tests' programs.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     options = parse_arguments(arguments)
     for group in options.groups:
         if group not in GROUPS and group not in LATER:
