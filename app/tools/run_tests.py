@@ -306,7 +306,6 @@ GROUPS: dict[str, list[Suite]] = {
 }
 # Too long for every run, or part of other groups: only when named.
 ON_REQUEST = ("boot", "control", "sync0")
-LATER: tuple[str, ...] = ()
 
 
 class Builder:
@@ -369,14 +368,11 @@ def main(arguments: Sequence[str]) -> int:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     options = parse_arguments(arguments)
     for group in options.groups:
-        if group not in GROUPS and group not in LATER:
-            known = " ".join([*GROUPS, *LATER])
+        if group not in GROUPS:
+            known = " ".join(GROUPS)
             print(f"build.sh: test: no group '{group}'; there are: {known}", file=sys.stderr)
             return 2
     total = Outcome()
-    for group in [g for g in options.groups if g in LATER]:
-        total.failures.append(f"{group}: not there yet")
-        print(f"FAILED {group}: not there yet")
     usual = [g for g in GROUPS if g not in ON_REQUEST]
     wanted = [g for g in GROUPS if g in (options.groups or usual)]
     builder = Builder()

@@ -6,14 +6,10 @@ from __future__ import annotations
 import os
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from project import ROOT
-
-sys.path.insert(0, str(ROOT / "app" / "tools"))
-from run_tests import LATER
 
 VERBS = ["run", "test", "build", "sim", "fuzz", "lint", "clean", "image", "boot", "help"]
 
@@ -102,14 +98,6 @@ def test_an_unknown_group_is_named() -> None:
     result = build_sh("test", "units")
     assert result.returncode == 2
     assert "no group 'units'" in result.stderr
-
-
-@pytest.mark.parametrize("group", LATER)
-def test_a_group_that_is_not_there_yet_fails_by_name(group: str) -> None:
-    result = build_sh("test", group)
-    assert result.returncode == 1
-    assert f"{group}: not there yet" in result.stdout
-    assert result.stdout.splitlines()[-1] == "0 passed, 1 failed, 0 skipped"
 
 
 def test_where_nothing_can_be_installed_what_is_missing_is_listed_with_its_reason(
