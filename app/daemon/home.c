@@ -17,7 +17,7 @@
 
 #include "base/event.h"
 
-enum { DIR_MODE = 0750, FILE_MODE = 0640, GROUP_BYTES = 4096 };
+enum { DIR_MODE = 0750, SHARED_MODE = 03770, FILE_MODE = 0640, GROUP_BYTES = 4096 };
 
 int home_path(const struct home *home, const char *file, char *ret_path, size_t path_bytes)
 {
@@ -72,14 +72,15 @@ static int find_group(struct home *home, const char *name, struct failure *failu
 	return 0;
 }
 
-/* With the set-group-ID bit on the directory, every file made in it belongs to the group. */
+/* The recorder and the publisher, other users of the group, lay pages of their own beside ours: the
+ * group may make files. Each belongs to the group (set-group-ID), and only its maker takes it away
+ * (sticky). */
 static int hand_to_group(const struct home *home, struct failure *failure)
 {
 	if (home->group == (gid_t)-1) {
 		return 0;
 	}
-	if (chown(home->dir, (uid_t)-1, home->group) < 0 ||
-	    chmod(home->dir, DIR_MODE | S_ISGID) < 0) {
+	if (chown(home->dir, (uid_t)-1, home->group) < 0 || chmod(home->dir, SHARED_MODE) < 0) {
 		return fail(failure, home->dir, errno);
 	}
 	return 0;

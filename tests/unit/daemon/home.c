@@ -4,6 +4,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <ftw.h>
+#include <grp.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -92,6 +93,25 @@ TEST(daemon_home, a_second_instance_is_refused_and_leaves_the_first_one_s_page_a
 	home_close(&first);
 	CHECK_EQ(open_home(&b, &second, &failure), 0); /* the lock went with the first */
 	home_close(&second);
+	bench_close(&b);
+}
+
+TEST(daemon_home, who_is_of_the_group_may_add_files_and_take_away_only_his_own)
+{
+	static struct bench b;
+	struct home home;
+	struct failure failure;
+	struct stat st;
+	struct group *group = getgrgid(getegid());
+
+	CHECK(group != NULL);
+	bench_open(&b, "/dev/shm");
+	snprintf(b.cfg.group, sizeof(b.cfg.group), "%s", group->gr_name);
+	CHECK_EQ(open_home(&b, &home, &failure), 0);
+	CHECK_EQ(stat(b.cfg.run_dir, &st), 0);
+	CHECK_EQ(st.st_mode & 07777, 03770);
+	CHECK_EQ(st.st_gid, getegid());
+	home_close(&home);
 	bench_close(&b);
 }
 
