@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: MIT
+"""The services start again what may end by accident, and leave alone what ended for a reason."""
+
+from __future__ import annotations
+
+import re
+
+from conftest import TOP
+
+UNITS = TOP / "recipes/recipes-core/ecdaq-config/files/root/usr/lib/systemd/system"
+
+
+def values(unit: str, key: str) -> list[str]:
+    """All words that a unit file gives a key."""
+    lines = re.findall(rf"^{key}=(.*)$", (UNITS / unit).read_text(), re.MULTILINE)
+    return [word for line in lines for word in line.split()]
+
+
+def exit_code(name: str) -> str:
+    text = (TOP / "app/daemon/exit_code.h").read_text()
+    return re.findall(rf"EXIT_CODE_{name} = (\d+),", text)[0]
+
+
+def test_the_master_is_not_started_again_after_it_was_told_to_stop_or_control_crashed() -> None:
+    assert values("ecdaqd.service", "Restart") == ["always"]
+    codes = [exit_code("OVERRUN"), exit_code("CONTROL")]
+    assert values("ecdaqd.service", "RestartPreventExitStatus") == codes
