@@ -62,8 +62,7 @@ void check_tai(const struct patient *p, struct finding *f)
 		finding_set(f, FINDING_WARN,
 			    "the kernel has TAI - UTC as %" PRId64 " s, it is %d s",
 			    clock.tai_offset_s, TAI_OFFSET_S);
-		finding_mend(f,
-			     "chrony.conf: leapseclist /usr/share/zoneinfo/leap-seconds.list, or "
-			     "leapsectz right/UTC");
+		finding_mend(f, "chrony sets it once a time server has answered, with leapseclist "
+				"/usr/share/zoneinfo/leap-seconds.list in chrony.conf");
 	}
 }
