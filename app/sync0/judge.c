@@ -52,6 +52,16 @@ static enum sync0_verdict judge_period(const struct judge_limits *limits,
 	return v;
 }
 
+/* Where the pulse is: the way from the pin to the time stamp has to be known. */
+static enum sync0_verdict grade_place(const struct judge_noise *noise, int64_t off_ns,
+				      int64_t error_ns, int64_t limit_ns)
+{
+	enum sync0_verdict v =
+		grade((double)llabs(off_ns), (double)(error_ns + noise->max_ns), (double)limit_ns);
+
+	return v == SYNC0_NONE || noise->is_known ? v : SYNC0_UNRESOLVED;
+}
+
 /* What is measured holds the noise, too: it is a bound from above. */
 static enum sync0_verdict judge_jitter(const struct judge_limits *limits,
 				       const struct judge_noise *noise,
@@ -73,18 +83,16 @@ static enum sync0_verdict judge_phase(const struct judge_limits *limits,
 				      const struct judge_noise *noise, int64_t shift_ns,
 				      const struct sync0_result *r)
 {
-	enum sync0_verdict v;
-
 	if (r->step_ns != 0 && !r->is_disturbed) {
-		return limits->phase_ns > 0 && llabs(r->step_ns) > limits->phase_ns ? SYNC0_FAIL
-										    : SYNC0_WARN;
+		return noise->is_known && limits->phase_ns > 0 &&
+				       llabs(r->step_ns) > limits->phase_ns
+			       ? SYNC0_FAIL
+			       : SYNC0_WARN;
 	}
 	if (!(r->has & SYNC0_HAS_PHASE)) {
 		return SYNC0_NONE;
 	}
-	v = grade((double)llabs(r->phase_ns - shift_ns),
-		  (double)(r->phase_error_ns + noise->max_ns), (double)limits->phase_ns);
-	return v == SYNC0_NONE || v == SYNC0_FAIL || noise->is_known ? v : SYNC0_UNRESOLVED;
+	return grade_place(noise, r->phase_ns - shift_ns, r->phase_error_ns, limits->phase_ns);
 }
 
 static enum sync0_verdict judge_skew(const struct judge_limits *limits,
@@ -135,14 +143,10 @@ static uint32_t resolved(const struct judge_noise *noise, int64_t shift_ns,
 static enum sync0_verdict judge_shot(const struct judge_limits *limits,
 				     const struct judge_noise *noise, const struct sync0_result *r)
 {
-	enum sync0_verdict v;
-
 	if (!r->has_come) {
 		return SYNC0_FAIL;
 	}
-	v = grade((double)llabs(r->shot_late_ns), (double)(r->phase_error_ns + noise->max_ns),
-		  (double)limits->phase_ns);
-	return v == SYNC0_NONE || v == SYNC0_FAIL || noise->is_known ? v : SYNC0_UNRESOLVED;
+	return grade_place(noise, r->shot_late_ns, r->phase_error_ns, limits->phase_ns);
 }
 
 void judge(const struct judge_limits *limits, const struct judge_noise *noise, int64_t shift_ns,

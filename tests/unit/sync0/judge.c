@@ -54,6 +54,23 @@ TEST(sync0, without_a_calibration_phase_and_skew_are_unresolved_and_counts_are_j
 	CHECK_EQ(r.is_resolved & (SYNC0_HAS_JITTER | SYNC0_HAS_SKEW | SYNC0_HAS_PHASE), 0);
 }
 
+TEST(sync0, without_a_calibration_not_even_a_phase_far_off_fails)
+{
+	struct sync0_result r = good();
+
+	r.phase_ns = 400000;
+	judge(&limits, &unknown, 0, &r);
+	CHECK_EQ(r.check[SYNC0_CHECK_PHASE], SYNC0_UNRESOLVED);
+	r.step_ns = 400000;
+	judge(&limits, &unknown, 0, &r);
+	CHECK_EQ(r.check[SYNC0_CHECK_PHASE], SYNC0_WARN);
+	judge(&limits, &pi, 0, &r);
+	CHECK_EQ(r.check[SYNC0_CHECK_PHASE], SYNC0_FAIL);
+	r = (struct sync0_result){ .kind = SYNC0_SHOT, .has_come = 1, .shot_late_ns = 400000 };
+	judge(&limits, &unknown, 0, &r);
+	CHECK_EQ(r.verdict, SYNC0_UNRESOLVED);
+}
+
 TEST(sync0, a_limit_below_the_noise_cannot_be_judged)
 {
 	struct judge_limits fine = limits;
