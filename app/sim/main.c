@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* ecdaq-sim: the simulated segment on a network interface, in real time. */
 #include <errno.h>
+#include <fcntl.h>
 #include <sched.h>
 #include <signal.h>
 #include <stdatomic.h>
@@ -8,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "sim/control.h"
@@ -42,6 +44,7 @@ struct simulation {
 	struct fault_plan *faults;
 	struct held held[HELD_MAX];
 	FILE *edges;
+	int edges_pipe; /* -1: edges is a file */
 	int fd;
 	int control_fd;
 	int64_t control_ns; /* when it was looked at last */
@@ -62,15 +65,40 @@ static void on_signal(int number)
 
 static void write_edge(void *ctx, unsigned slave, int64_t t_ns, uint64_t system_time_ns)
 {
+	static const char form[] = "%u %lld %llu\n";
 	struct simulation *sim = ctx;
+	long long at_ns = t_ns;
+	unsigned long long dc_ns = system_time_ns;
 
-	fprintf(sim->edges, "%u %lld %llu\n", slave, (long long)t_ns,
-		(unsigned long long)system_time_ns);
+	if (sim->edges_pipe < 0) {
+		fprintf(sim->edges, form, slave, at_ns, dc_ns);
+		return;
+	}
+	/* Now or never: a reader that is gone, or too slow, must not hold the segment. */
+	(void)!dprintf(sim->edges_pipe, form, slave, at_ns, dc_ns);
+}
+
+/* Who reads a pipe wants each edge at once. */
+static int open_edges(struct simulation *sim, const char *path)
+{
+	struct stat st;
+
+	sim->edges = fopen(path, "w");
+	if (sim->edges == NULL || fstat(fileno(sim->edges), &st) < 0) {
+		return -errno;
+	}
+	if (S_ISFIFO(st.st_mode)) {
+		sim->edges_pipe = fileno(sim->edges);
+		signal(SIGPIPE, SIG_IGN);
+		return fcntl(sim->edges_pipe, F_SETFL, O_WRONLY | O_NONBLOCK) < 0 ? -errno : 0;
+	}
+	return 0;
 }
 
 static int open_all(struct simulation *sim)
 {
 	char error[256];
+	int r;
 
 	sim->faults = fault_plan_create(sim->opt.seed, wire_socket_now_ns());
 	if (sim->faults == NULL) {
@@ -82,9 +110,9 @@ static int open_all(struct simulation *sim)
 		return sim_complain(error);
 	}
 	if (sim->opt.edges != NULL) {
-		sim->edges = fopen(sim->opt.edges, "w");
-		if (sim->edges == NULL) {
-			snprintf(error, sizeof(error), "%s: %s", sim->opt.edges, strerror(errno));
+		r = open_edges(sim, sim->opt.edges);
+		if (r < 0) {
+			snprintf(error, sizeof(error), "%s: %s", sim->opt.edges, strerror(-r));
 			return sim_complain(error);
 		}
 		segment_sync0_to(sim->segment, write_edge, sim);
@@ -275,6 +303,7 @@ int main(int argc, char **argv)
 	static struct simulation sim = {
 		.opt = { .slaves = "2", .seed = 1, .cpu = -1, .jitter_ns = 10, .wander_ppm = 0.5 },
 		.control_fd = -1,
+		.edges_pipe = -1,
 	};
 	struct sigaction action = { .sa_handler = on_signal };
 	int r;
