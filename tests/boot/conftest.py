@@ -50,7 +50,7 @@ def machine(
     failed_before = request.session.testsfailed
     try:
         vm.lay_boot_files(files)
-        vm.start()
+        vm.start(options=vm.wire_options() if getattr(module, "WIRE", False) else ())
         vm.wait_for_login()
         yield vm
     finally:

@@ -137,6 +137,14 @@ class Machine:
             *("-device", f"{nic},netdev=ecat,mac=52:54:00:ec:da:01"),
         ]
 
+    def wire_options(self) -> tuple[str, ...]:
+        """QEMU's options for app/tools/image/sync0-wire.py."""
+        at = f"unix:{self.folder}"
+        return (
+            *("-qtest", f"{at}/qtest,server=on,wait=off", "-qtest-log", "none"),
+            *("-qmp", f"{at}/qmp,server=on,wait=off"),
+        )
+
     def start(self, append: str = "", options: tuple[str, ...] = ()) -> None:
         """Power on. Each boot has a console log of its own."""
         assert self.process is None
