@@ -66,8 +66,8 @@ Without GROUP all groups run, the fast ones first:
   recipes  the image's recipes and layers, parsed by BitBake, held against their rules
   live     everything over a veth pair, in real time
   dds      samples and commands over DDS between two namespaces
+  boot     the images, built and looked at, and in QEMU; skipped, and said so, where one is not root
 Only when named:
-  boot     the image in QEMU; needs root and ./build.sh image
   control  of unit, sim, cli and live what is about control programs
   sync0    of unit, cli and live what is about the SYNC0 check
 

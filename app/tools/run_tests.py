@@ -18,40 +18,22 @@ import sys
 import time
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+from test_report import Outcome, read_junit, tail
 
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build"
 LOGS = BUILD / "test-logs"
 SUITE_SECONDS = 3000
 BOOT_SECONDS = 9000
+IMAGE_SECONDS = 5400
+IMAGES = ("qemuarm64", "raspberrypi4-64")
 # What two threads share, and how they hand it over: these run under ThreadSanitizer.
 SHARED_STATE_TESTS = r"^(ring|line|board|handover|status|histogram)[._]"
 CONTROL_TESTS = r"^(control|sim_control|sim_loopback)[.]"
 SYNC0_TESTS = r"^sync0(_gpio)?\."
-
-
-@dataclass
-class Outcome:
-    """What one suite, or all of them, reported."""
-
-    passed: int = 0
-    failures: list[str] = field(default_factory=list)
-    skips: list[str] = field(default_factory=list)
-    log: str = ""
-
-    @property
-    def ran(self) -> int:
-        return self.passed + len(self.failures)
-
-    def add(self, other: Outcome) -> None:
-        self.passed += other.passed
-        self.failures += other.failures
-        self.skips += other.skips
-
-    def totals(self) -> str:
-        return f"{self.passed} passed, {len(self.failures)} failed, {len(self.skips)} skipped"
 
 
 @dataclass(frozen=True)
@@ -63,6 +45,7 @@ class Suite:
     run: Callable[[Suite, argparse.Namespace], Outcome]
     arguments: tuple[str, ...] = ()
     seconds: int = SUITE_SECONDS
+    images: tuple[str, ...] = ()
 
     @property
     def build_dir(self) -> Path:
@@ -109,10 +92,6 @@ def end_group(process: subprocess.Popen[bytes]) -> None:
         process.wait()
 
 
-def tail(text: str, lines: int) -> str:
-    return "\n".join(text.rstrip().splitlines()[-lines:])
-
-
 def environment(suite: Suite) -> dict[str, str]:
     """What a test may rely on: where the programs, the build and the flavour are."""
     return os.environ | {
@@ -125,32 +104,6 @@ def environment(suite: Suite) -> dict[str, str]:
         "UBSAN_OPTIONS": "print_stacktrace=1",
         "TSAN_OPTIONS": "halt_on_error=1:second_deadlock_stack=1",
     }
-
-
-def read_junit(path: Path, label: str) -> Outcome:
-    """Count the test cases of a JUnit file, as written by ctest or by pytest."""
-    outcome = Outcome()
-    for case in ET.parse(path).getroot().iter("testcase"):
-        where = case.get("classname", "")
-        name = case.get("name", "?")
-        if where and where != name:
-            name = f"{where}.{name}"
-        output = case.findtext("system-out") or ""
-        bad = [e for e in case if e.tag in ("failure", "error")]
-        skipped = case.find("skipped")
-        if bad:
-            text = output or bad[0].text or bad[0].get("message") or ""
-            outcome.failures.append(f"{label}: {name}\n{tail(text, 30)}")
-        elif skipped is not None:
-            why = skipped.get("message") or ""
-            if case.get("status") == "notrun" and why != "SKIP_RETURN_CODE=77":
-                outcome.failures.append(f"{label}: {name}\ncould not be run: {why}")
-                continue
-            said = re.search(r"^skipped: (.*)$", output, re.MULTILINE)
-            outcome.skips.append(f"{label}: {name}: {said.group(1) if said else why}")
-        else:
-            outcome.passed += 1
-    return outcome
 
 
 def finish(suite: Suite, junit: Path, log: Path, status: int, good: tuple[int, ...]) -> Outcome:
@@ -302,14 +255,14 @@ GROUPS: dict[str, list[Suite]] = {
         Suite("sync0 cli python", "release", run_pytest, ("tests/cli", "-k", "test_sync0")),
         Suite("sync0 live python", "release", run_pytest, ("tests/live", "-k", "test_sync0")),
     ],
-    "boot": [replace(pytest("boot", "release", "-s"), seconds=BOOT_SECONDS)],
+    "boot": [replace(pytest("boot", "release", "-s"), seconds=BOOT_SECONDS, images=IMAGES)],
 }
-# Too long for every run, or part of other groups: only when named.
-ON_REQUEST = ("boot", "control", "sync0")
+# Part of other groups: only when named.
+ON_REQUEST = ("control", "sync0")
 
 
 class Builder:
-    """Builds each flavour when a suite first needs it, and remembers how that ended."""
+    """Builds each flavour or image when a suite first needs it, and remembers how that ended."""
 
     def __init__(self) -> None:
         self.failed: dict[str, str | None] = {}
@@ -317,20 +270,38 @@ class Builder:
     def build(self, flavour: str) -> str | None:
         """None, or the last lines of the failed build."""
         if flavour not in self.failed:
-            started = time.monotonic()
-            log = LOGS / f"build-{flavour}.log"
             script = ROOT / "app" / "tools" / "build-flavour.sh"
-            status = run_logged([script, flavour], log, dict(os.environ))
-            text = log.read_text(errors="replace")
-            self.failed[flavour] = None if status == 0 else tail(text, 40)
-            print(f"{'build ' + flavour:24} {time.monotonic() - started:7.1f} s", flush=True)
+            self.failed[flavour] = self.make(flavour, [script, flavour], SUITE_SECONDS)
         return self.failed[flavour]
+
+    def image(self, machine: str) -> str | None:
+        """The same for a machine's image."""
+        if machine not in self.failed:
+            command = [ROOT / "build.sh", "image", "--machine", machine]
+            self.failed[machine] = self.make(machine, command, IMAGE_SECONDS)
+        return self.failed[machine]
+
+    def make(self, name: str, command: Sequence[str | Path], seconds: int) -> str | None:
+        started = time.monotonic()
+        log = LOGS / f"build-{name}.log"
+        status = run_logged(command, log, dict(os.environ), seconds)
+        print(f"{'build ' + name:24} {time.monotonic() - started:7.1f} s", flush=True)
+        return None if status == 0 else tail(log.read_text(errors="replace"), 40)
+
+    def prepare(self, suite: Suite) -> str | None:
+        """All that a suite needs; the first problem ends it."""
+        problem = self.build(suite.flavour)
+        for machine in suite.images:
+            problem = problem or self.image(machine)
+        return problem
 
 
 def run_group(group: str, builder: Builder, options: argparse.Namespace) -> Outcome:
     total = Outcome()
+    if group == "boot" and os.geteuid() != 0 and group not in options.groups:
+        return Outcome(skips=["boot: making and booting an image needs root"])
     for suite in GROUPS[group]:
-        problem = builder.build(suite.flavour)
+        problem = builder.prepare(suite)
         started = time.monotonic()
         if problem is not None:
             outcome = Outcome(failures=[f"{suite.name}: the build failed\n{problem}"])

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -123,6 +124,28 @@ def test_a_failed_build_fails_its_suite(monkeypatch: pytest.MonkeyPatch) -> None
     outcome = run_tests.run_group("sim", BrokenBuilder(), OPTIONS)
     assert heads(outcome)[0] == "sim release: the build failed"
     assert "no such variable" in outcome.failures[0]
+
+
+def test_an_image_that_cannot_be_made_fails_its_suite(
+    monkeypatch: pytest.MonkeyPatch, own_build: Path
+) -> None:
+    script = own_build / "build.sh"
+    script.write_text('#!/bin/sh\necho "no kernel for $3"; exit 1\n')
+    script.chmod(0o755)
+    booting = Suite("boot", "release", lambda *_: Outcome(passed=1), images=("a", "b"))
+    monkeypatch.setitem(run_tests.GROUPS, "boot", [booting])
+    options = argparse.Namespace(only="", fail_fast=False, fuzz_seconds=1, groups=["boot"])
+    outcome = run_tests.run_group("boot", ReadyBuilder(), options)
+    assert heads(outcome)[0] == "boot: the build failed"
+    assert "no kernel for a" in outcome.failures[0]
+
+
+def test_without_root_no_image_is_made_and_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    options = argparse.Namespace(only="", fail_fast=False, fuzz_seconds=1, groups=[])
+    outcome = run_tests.run_group("boot", BrokenBuilder(), options)
+    assert outcome.skips == ["boot: making and booting an image needs root"]
+    assert not outcome.failures
 
 
 def test_fail_fast_leaves_the_next_suite_alone(monkeypatch: pytest.MonkeyPatch) -> None:
