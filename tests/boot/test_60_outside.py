@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from machine import TOP, Machine, profile, wait_for
+from machine import TOP, Machine, Space, profile, wait_for
 
 OUTSIDE = True
 TIMING = "host"
@@ -42,6 +42,7 @@ outputs:
     owner: remote
     timeout: 30s
 """,
+    "time-servers": f"{Space.HOST}\n",
     "network/50-lan.network": f"[Match]\nName={LAN}\n[Network]\nAddress=192.168.77.2/24\n",
 }
 
@@ -58,6 +59,21 @@ def segment(machine: Machine) -> Iterator[subprocess.Popen[bytes]]:
     )
     yield process
     process.terminate()
+    process.wait(10)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def time_server(machine: Machine) -> Iterator[None]:
+    """The one that the boot partition names, on the host."""
+    assert machine.space is not None
+    program = [sys.executable, Path(__file__).parent / "time_server.py", Space.HOST]
+    process = subprocess.Popen(
+        [*machine.space.enter, *program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdin is not None and process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    yield
+    process.stdin.close()
     process.wait(10)
 
 
@@ -135,3 +151,19 @@ def test_subscribers_on_the_host_miss_nothing_and_the_led_obeys(machine: Machine
     assert found["samples"] > 100 and samples > 100
     assert (found["gaps"], found["doubled"], gaps) == (0, 0, 0)
     assert [step["seen"] for step in found["led"]] == [1, 0, 1]
+
+
+def test_the_time_server_of_the_boot_partition_sets_the_clock_and_the_tai_offset(
+    machine: Machine,
+) -> None:
+    """TAI is the clock of samples; the kernel knows its offset only once a server has answered."""
+    machine.wait_until(
+        "a time server is followed", "sudo chronyc -n tracking | grep -q 'Stratum.*: 2'"
+    )
+
+    def offset() -> bool:
+        checks = machine.try_run("sudo ecdaq doctor --json").stdout
+        found = {c["name"]: c for c in json.loads(checks)["check"]}
+        return bool(found["tai"]["level"] == "OK")
+
+    wait_for("TAI - UTC", 600, offset)
