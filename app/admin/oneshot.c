@@ -8,23 +8,6 @@
 
 /* Of a slave with a one-shot mode: the DC time at which its SYNC0 shall fire (DESIGN 5). */
 #define ONESHOT_ENTRY "oneshot_time"
-enum { MODE_INDEX = 0x8000, MODE_SUBINDEX = 1 };
-
-static int is_oneshot(const struct config *cfg, uint16_t slave_pos)
-{
-	if (slave_pos < cfg->slave_count && cfg->slave[slave_pos].mode != CONFIG_MODE_UNSET) {
-		return cfg->slave[slave_pos].mode == CONFIG_MODE_ONESHOT;
-	}
-	for (size_t i = 0; i < cfg->sdo_count; i++) {
-		const struct config_sdo *sdo = &cfg->sdo[i];
-
-		if (sdo->slave_pos == slave_pos && sdo->index == MODE_INDEX &&
-		    sdo->subindex == MODE_SUBINDEX && sdo->value == 1) {
-			return 1;
-		}
-	}
-	return 0;
-}
 
 static int find_oneshot(const struct admin_target *t, uint16_t slave_pos)
 {
@@ -88,7 +71,7 @@ static int place_oneshot(const struct admin_target *t, uint16_t slave_pos, int64
 				   t->slaves[slave_pos].name);
 		return reply->result;
 	}
-	if (!is_oneshot(t->cfg, slave_pos)) {
+	if (!config_is_oneshot(t->cfg, slave_pos)) {
 		admin_reply_refuse(reply, -EOPNOTSUPP,
 				   "%s: is in periodic mode (slaves[%u].mode: oneshot)",
 				   t->slaves[slave_pos].name, slave_pos);

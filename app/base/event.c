@@ -3,6 +3,7 @@
 
 #include <inttypes.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "status.h"
@@ -215,6 +216,24 @@ static void format_sync0_pulses(const struct event *ev, char *buf, size_t buf_le
 	}
 }
 
+/* Within its error, all that is known of the distance is a bound. */
+static int format_shot(const struct event *ev, const char *where, char *buf, size_t buf_len)
+{
+	int32_t late_ns = ev->arg[0];
+	int32_t error_ns = ev->arg[1];
+
+	if (llabs(late_ns) <= error_ns) {
+		return snprintf(buf, buf_len,
+				"%sone-shot for DC time %" PRId64 " came; distance below %" PRId32
+				" ns (unresolved)",
+				where, ev->value, error_ns);
+	}
+	return snprintf(buf, buf_len,
+			"%sone-shot for DC time %" PRId64 " came %lld ns %s it, +-%" PRId32 " ns",
+			where, ev->value, llabs(late_ns), late_ns < 0 ? "before" : "after",
+			error_ns);
+}
+
 /* What ecdaq-sync0 saw; each begins with slave and line, where it has one. */
 static int format_sync0(const struct event *ev, char *buf, size_t buf_len)
 {
@@ -226,10 +245,7 @@ static int format_sync0(const struct event *ev, char *buf, size_t buf_len)
 			 ev->line);
 	}
 	if (ev->id == EVENT_SYNC0_SHOT) {
-		return snprintf(buf, buf_len,
-				"%sone-shot for DC time %" PRId64 " came %" PRId32
-				" ns after it, +-%" PRId32 " ns",
-				where, ev->value, ev->arg[0], ev->arg[1]);
+		return format_shot(ev, where, buf, buf_len);
 	}
 	if (ev->id == EVENT_SYNC0_SHOT_LOST) {
 		return snprintf(buf, buf_len, "%sone-shot for DC time %" PRId64 " did not come",

@@ -55,7 +55,7 @@ enum event_id {
 	EVENT_SYNC0_PHASE_STEP, /* value: cycle; arg: ns */
 	EVENT_SYNC0_CLOCK_STEP, /* value: cycle; arg: ns that the host's clock went ahead */
 	EVENT_SYNC0_CLEAR,      /* value: first cycle of the window; arg: enum sync0_check */
-	EVENT_SYNC0_SHOT,       /* value: commanded DC time; arg: ns late, ns it may be off by */
+	EVENT_SYNC0_SHOT,       /* value: commanded DC time; arg: ns late, bound of its error */
 	EVENT_SYNC0_SHOT_LOST,  /* value: commanded DC time that passed without an edge */
 	/* Of ecdaqd again. */
 	EVENT_EMERGENCY, /* slave; value: 5 data bytes, the first lowest; arg: error code, register

@@ -176,6 +176,9 @@ int config_assemble(const char *path, const char *const *set, size_t set_count, 
  * -EINVAL. */
 int config_check(const struct config *cfg, char *error, size_t error_bytes);
 
+/** Does the slave convert on command: by its mode, or else by its SDO 0x8000:01? Context: any. */
+int config_is_oneshot(const struct config *cfg, uint16_t slave_pos);
+
 enum { CONFIG_WHY_BYTES = 192 };
 
 /**

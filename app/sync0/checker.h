@@ -72,8 +72,8 @@ struct checker_cycle {
 };
 
 void checker_cycle(struct checker *ck, const struct checker_cycle *cy);
-/** A shot of @line was commanded for DC time @dc_ns. */
-void checker_shot(struct checker *ck, size_t line, int64_t dc_ns);
+/** At DC time @at_dc_ns the shot of @line was set to @due_dc_ns: see shot_command(). */
+void checker_shot(struct checker *ck, size_t line, int64_t at_dc_ns, int64_t due_dc_ns);
 /** In order of time for each line. */
 void checker_edge(struct checker *ck, const struct edge *edge);
 /** All edges before @mono_ns were given: close what is full, find what is lost. */

@@ -167,6 +167,15 @@ void checker_close_window(struct checker *ck)
 
 /* --- shots --- */
 
+/* What is not resolved lies within its bound, so that no reader takes it for a figure. */
+static int64_t shot_bound_ns(const struct checker *ck, const struct sync0_result *r)
+{
+	int64_t bound_ns = r->phase_error_ns + ck->spec.noise.max_ns;
+	int64_t late_ns = llabs(r->shot_late_ns);
+
+	return r->is_resolved & SYNC0_HAS_PHASE || late_ns < bound_ns ? bound_ns : late_ns;
+}
+
 static void tell_shot(struct checker *ck, size_t number, const struct shot_verdict *v)
 {
 	struct sync0_result r = begin_result(ck, number, v->mono_ns);
@@ -186,7 +195,7 @@ static void tell_shot(struct checker *ck, size_t number, const struct shot_verdi
 	ev = alarm_event(&r, r.has_come ? EVENT_SYNC0_SHOT : EVENT_SYNC0_SHOT_LOST);
 	ev.value = v->due_dc_ns;
 	ev.arg[0] = alarm_clamp((double)v->late_ns);
-	ev.arg[1] = alarm_clamp((double)(r.phase_error_ns + ck->spec.noise.max_ns));
+	ev.arg[1] = alarm_clamp((double)shot_bound_ns(ck, &r));
 	checker_emit(ck, &ev);
 	ck->alarms += r.has_come ? 0 : 1;
 	if (ck->spec.result != NULL) {
@@ -213,8 +222,13 @@ void checker_look_at_shots(struct checker *ck, size_t line, int64_t until_ns)
 		switch (v.news) {
 		case SHOT_NONE:
 			return;
-		case SHOT_CAME:
 		case SHOT_LOST:
+			if (v.mono_ns < ck->spec.since_ns) {
+				break; /* nobody listened */
+			}
+			tell_shot(ck, line, &v);
+			break;
+		case SHOT_CAME:
 			tell_shot(ck, line, &v);
 			break;
 		case SHOT_EXTRA:

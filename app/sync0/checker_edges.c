@@ -162,7 +162,9 @@ void checker_edge(struct checker *ck, const struct edge *edge)
 	checker_take(ck, edge->line, &out);
 }
 
-void checker_shot(struct checker *ck, size_t line, int64_t dc_ns)
+void checker_shot(struct checker *ck, size_t line, int64_t at_dc_ns, int64_t due_dc_ns)
 {
-	shot_command(&ck->line[line].shot, dc_ns);
+	if (line < ck->spec.line_count && ck->spec.line[line].mode == CHECKER_ONESHOT) {
+		shot_command(&ck->line[line].shot, at_dc_ns, due_dc_ns);
+	}
 }

@@ -24,7 +24,6 @@ struct master {
 	uint64_t slaves;
 	const struct channel *shot_channel[LIMIT_SLAVES];
 	uint64_t shot_ns[LIMIT_SLAVES];
-	int has_shot[LIMIT_SLAVES]; /* shot_ns was read */
 };
 
 struct master *master_create(const char *path)
@@ -124,7 +123,7 @@ void master_watch_shots(struct master *m, uint64_t slaves)
 
 	m->slaves = slaves;
 	memset(m->shot_channel, 0, sizeof(m->shot_channel));
-	memset(m->has_shot, 0, sizeof(m->has_shot));
+	memset(m->shot_ns, 0, sizeof(m->shot_ns));
 	for (uint32_t i = 0; i < m->meta->channel_count; i++) {
 		if (ch[i].index == SHOT_INDEX && ch[i].subindex == SHOT_SUBINDEX &&
 		    ch[i].bit_len == SHOT_BITS && ch[i].direction == CHANNEL_OUTPUT &&
@@ -135,9 +134,8 @@ void master_watch_shots(struct master *m, uint64_t slaves)
 	}
 }
 
-/* A changed time that is still to come arms the slave. */
-static void find_shots(struct master *m, const struct sample_header *h, const uint8_t *image,
-		       struct master_item *ret)
+/* A changed time arms the slave; one that stands there at the first look has armed it before. */
+static void find_shots(struct master *m, const uint8_t *image, struct master_item *ret)
 {
 	for (uint16_t pos = 0; pos < LIMIT_SLAVES; pos++) {
 		uint64_t value;
@@ -146,12 +144,12 @@ static void find_shots(struct master *m, const struct sample_header *h, const ui
 			continue;
 		}
 		value = image_get_raw(image, m->shot_channel[pos]);
-		if (m->has_shot[pos] && value != m->shot_ns[pos] && value <= INT64_MAX / 4 &&
-		    (int64_t)value > h->dc_time_ns) {
-			ret->shot[ret->shots++] =
-				(struct master_shot){ .slave_pos = pos, .dc_ns = (int64_t)value };
+		if (value != m->shot_ns[pos]) {
+			ret->shot[ret->shots++] = (struct master_shot){
+				.slave_pos = pos,
+				.dc_ns = value <= INT64_MAX / 4 ? (int64_t)value : 0,
+			};
 		}
-		m->has_shot[pos] = 1;
 		m->shot_ns[pos] = value;
 	}
 }
@@ -175,7 +173,7 @@ static void make_item(struct master *m, struct master_item *ret)
 		ret->cycle.frame_mono_ns = h.wake_mono_ns + h.round_trip_ns / 2;
 		ret->cycle.frame_latency_ns = h.round_trip_ns / 2;
 	}
-	find_shots(m, &h, m->payload + sizeof(h), ret);
+	find_shots(m, m->payload + sizeof(h), ret);
 }
 
 int master_next(struct master *m, struct master_item *ret)

@@ -26,6 +26,7 @@ const struct sample_meta *master_meta(const struct master *m);
 /* Slaves whose shots are looked for: bit n of the positions. */
 void master_watch_shots(struct master *m, uint64_t slaves);
 
+/* The time of the slave's shot was set to @dc_ns, which may have passed or be 0: then to none. */
 struct master_shot {
 	uint16_t slave_pos;
 	int64_t dc_ns;
@@ -34,7 +35,7 @@ struct master_shot {
 struct master_item {
 	struct checker_cycle cycle;
 	int has_dc;
-	struct master_shot shot[LIMIT_SLAVES]; /* commanded in this cycle */
+	struct master_shot shot[LIMIT_SLAVES]; /* set in this cycle */
 	size_t shots;
 };
 

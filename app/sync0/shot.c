@@ -12,78 +12,115 @@
  */
 #define EXTRA_AFTER_NS NS_PER_S
 
-static void remove_at(int64_t *v, int *count, int place)
+static void remove_due(struct shot_line *sl, int place)
 {
-	(*count)--;
-	memmove(v + place, v + place + 1, (size_t)(*count - place) * sizeof(v[0]));
+	sl->waiting--;
+	memmove(sl->due + place, sl->due + place + 1,
+		(size_t)(sl->waiting - place) * sizeof(sl->due[0]));
 }
 
-static void append(int64_t *v, int *count, int limit, int64_t value)
+static void remove_edge(struct shot_line *sl, int place)
 {
-	if (*count == limit) {
-		remove_at(v, count, 0);
+	sl->edges--;
+	memmove(sl->edge_mono_ns + place, sl->edge_mono_ns + place + 1,
+		(size_t)(sl->edges - place) * sizeof(sl->edge_mono_ns[0]));
+}
+
+void shot_command(struct shot_line *sl, int64_t at_dc_ns, int64_t due_dc_ns)
+{
+	for (int i = sl->waiting - 1; i >= 0; i--) {
+		if (sl->due[i].dc_ns == due_dc_ns) {
+			remove_due(sl, i); /* it is armed anew */
+		} else if (sl->due[i].dc_ns > at_dc_ns) {
+			sl->due[i].is_withdrawn = 1;
+		}
 	}
-	v[(*count)++] = value;
-}
-
-void shot_command(struct shot_line *sl, int64_t due_dc_ns)
-{
-	append(sl->due_dc_ns, &sl->waiting, SHOT_WAITING, due_dc_ns);
+	if (due_dc_ns <= at_dc_ns) {
+		return;
+	}
+	if (sl->waiting == SHOT_WAITING) {
+		remove_due(sl, 0);
+	}
+	sl->due[sl->waiting++] = (struct shot_due){ .dc_ns = due_dc_ns };
 }
 
 void shot_edge(struct shot_line *sl, int64_t mono_ns)
 {
-	append(sl->edge_mono_ns, &sl->edges, SHOT_EDGES, mono_ns);
+	if (sl->edges == SHOT_EDGES) {
+		remove_edge(sl, 0);
+	}
+	sl->edge_mono_ns[sl->edges++] = mono_ns;
 }
 
-static int nearest(const struct shot_line *sl, int64_t mono_ns)
+/* An edge is that of the commanded time that it is nearest to. */
+static int is_of(const struct shot_line *sl, const struct grid *grid, int number, int64_t mono_ns)
 {
-	int best = -1;
+	int64_t off_ns = llabs(mono_ns - grid_mono_ns(grid, sl->due[number].dc_ns));
 
-	for (int i = 0; i < sl->edges; i++) {
-		int64_t off_ns = llabs(sl->edge_mono_ns[i] - mono_ns);
-
-		if (off_ns <= NEAR_NS &&
-		    (best < 0 || off_ns < llabs(sl->edge_mono_ns[best] - mono_ns))) {
-			best = i;
+	for (int i = 0; i < sl->waiting; i++) {
+		if (llabs(mono_ns - grid_mono_ns(grid, sl->due[i].dc_ns)) < off_ns) {
+			return 0;
 		}
 	}
-	return best;
+	return off_ns <= NEAR_NS;
 }
 
-static struct shot_verdict close_shot(struct shot_line *sl, int number, int64_t due_mono_ns)
+static int find_edge(const struct shot_line *sl, const struct grid *grid, int number)
 {
-	struct shot_verdict v = { .news = SHOT_LOST,
-				  .due_dc_ns = sl->due_dc_ns[number],
-				  .mono_ns = due_mono_ns };
-	int edge = nearest(sl, due_mono_ns);
+	for (int i = 0; i < sl->edges; i++) {
+		if (is_of(sl, grid, number, sl->edge_mono_ns[i])) {
+			return i;
+		}
+	}
+	return -1;
+}
 
+/* SHOT_NONE: it was withdrawn, and did not come. */
+static struct shot_verdict close_shot(struct shot_line *sl, const struct grid *grid, int number)
+{
+	struct shot_verdict v = { .news = sl->due[number].is_withdrawn ? SHOT_NONE : SHOT_LOST,
+				  .due_dc_ns = sl->due[number].dc_ns };
+	int64_t due_ns = grid_mono_ns(grid, v.due_dc_ns);
+	int edge = find_edge(sl, grid, number);
+
+	v.mono_ns = due_ns;
 	if (edge >= 0) {
 		v.news = SHOT_CAME;
 		v.mono_ns = sl->edge_mono_ns[edge];
-		v.late_ns = v.mono_ns - due_mono_ns;
-		remove_at(sl->edge_mono_ns, &sl->edges, edge);
+		v.late_ns = v.mono_ns - due_ns;
+		remove_edge(sl, edge);
 	}
-	remove_at(sl->due_dc_ns, &sl->waiting, number);
+	remove_due(sl, number);
 	return v;
+}
+
+static struct shot_verdict next_due(struct shot_line *sl, const struct grid *grid, int64_t until_ns)
+{
+	int i = 0;
+
+	while (i < sl->waiting) {
+		struct shot_verdict v;
+
+		if (grid_mono_ns(grid, sl->due[i].dc_ns) + NEAR_NS >= until_ns) {
+			i++;
+			continue;
+		}
+		v = close_shot(sl, grid, i);
+		if (v.news != SHOT_NONE) {
+			return v;
+		}
+	}
+	return (struct shot_verdict){ .news = SHOT_NONE };
 }
 
 struct shot_verdict shot_next(struct shot_line *sl, const struct grid *grid, int64_t until_ns)
 {
-	struct shot_verdict none = { .news = SHOT_NONE };
+	struct shot_verdict v = next_due(sl, grid, until_ns);
 
-	for (int i = 0; i < sl->waiting; i++) {
-		int64_t due_ns = grid_mono_ns(grid, sl->due_dc_ns[i]);
-
-		if (due_ns + NEAR_NS < until_ns) {
-			return close_shot(sl, i, due_ns);
-		}
+	if (v.news == SHOT_NONE && sl->edges > 0 &&
+	    sl->edge_mono_ns[0] + EXTRA_AFTER_NS < until_ns) {
+		v = (struct shot_verdict){ .news = SHOT_EXTRA, .mono_ns = sl->edge_mono_ns[0] };
+		remove_edge(sl, 0);
 	}
-	if (sl->edges > 0 && sl->edge_mono_ns[0] + EXTRA_AFTER_NS < until_ns) {
-		struct shot_verdict v = { .news = SHOT_EXTRA, .mono_ns = sl->edge_mono_ns[0] };
-
-		remove_at(sl->edge_mono_ns, &sl->edges, 0);
-		return v;
-	}
-	return none;
+	return v;
 }

@@ -11,8 +11,13 @@
 
 enum { SHOT_WAITING = 16, SHOT_EDGES = 64 };
 
+struct shot_due {
+	int64_t dc_ns;
+	int is_withdrawn; /* another time was set before: it may come, it need not */
+};
+
 struct shot_line {
-	int64_t due_dc_ns[SHOT_WAITING]; /* commanded, oldest first */
+	struct shot_due due[SHOT_WAITING]; /* commanded, oldest first */
 	int waiting;
 	int64_t edge_mono_ns[SHOT_EDGES]; /* belonging to none yet, oldest first */
 	int edges;
@@ -27,8 +32,11 @@ struct shot_verdict {
 	int64_t late_ns;
 };
 
-/** A shot was commanded for @due_dc_ns. */
-void shot_command(struct shot_line *sl, int64_t due_dc_ns);
+/**
+ * At DC time @at_dc_ns the time of the shot was set to @due_dc_ns; one that has passed, 0 above
+ * all, arms none. What was armed and is not due yet is withdrawn; the slave may see that too late.
+ */
+void shot_command(struct shot_line *sl, int64_t at_dc_ns, int64_t due_dc_ns);
 void shot_edge(struct shot_line *sl, int64_t mono_ns);
 /**
  * All edges before @until_ns are known: what can be said? Ask again until SHOT_NONE. The grid is

@@ -62,7 +62,7 @@ void watch_name_lines(struct watch *w)
 		ls = &page->line[w->line_of_slave[pos] - 1];
 		ls->slave_pos = pos;
 		ls->is_open = w->lines == NULL;
-		ls->is_oneshot = w->spec.cfg->slave[pos].mode == CONFIG_MODE_ONESHOT;
+		ls->is_oneshot = (uint32_t)config_is_oneshot(w->spec.cfg, (uint16_t)pos);
 		snprintf(ls->line, sizeof(ls->line), "%.95s",
 			 line_text(w, w->line_of_slave[pos] - 1));
 		snprintf(ls->slave, sizeof(ls->slave), "%.31s", w->spec.cfg->slave[pos].name);

@@ -67,8 +67,7 @@ static enum checker_mode mode_of(const struct watch *w, uint16_t pos)
 	if (w->lines != NULL && !lines_is_open(w->lines, w->line_of_slave[pos] - 1)) {
 		return CHECKER_OFF;
 	}
-	return w->spec.cfg->slave[pos].mode == CONFIG_MODE_ONESHOT ? CHECKER_ONESHOT
-								   : CHECKER_PERIODIC;
+	return config_is_oneshot(w->spec.cfg, pos) ? CHECKER_ONESHOT : CHECKER_PERIODIC;
 }
 
 static void fill_lines(const struct watch *w, struct checker_spec *spec)
@@ -177,7 +176,7 @@ static void take_cycle(struct watch *w, const struct master_item *item)
 	checker_cycle(w->checker, cy);
 	for (size_t i = 0; i < item->shots; i++) {
 		checker_shot(w->checker, w->line_of_slave[item->shot[i].slave_pos] - 1,
-			     item->shot[i].dc_ns);
+			     cy->due_dc_ns, item->shot[i].dc_ns);
 	}
 }
 

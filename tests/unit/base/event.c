@@ -16,3 +16,24 @@ TEST(event, a_number_that_is_none_is_an_error)
 	CHECK_EQ(event_severity(EVENT_COUNT), EVENT_ERROR);
 	CHECK_STR(event_severity_to_str((enum event_severity)99), "error");
 }
+
+TEST(event, a_shot_says_how_far_it_came_and_within_its_error_only_a_bound)
+{
+	struct event ev = { .id = EVENT_SYNC0_SHOT,
+			    .slave_pos = 3,
+			    .line = 2,
+			    .value = 845,
+			    .arg = { -7000, 50 } };
+	char text[128];
+
+	event_format(&ev, text, sizeof(text));
+	CHECK_STR(text,
+		  "slave 3, line 2: one-shot for DC time 845 came 7000 ns before it, +-50 ns");
+	ev.arg[0] = 51;
+	event_format(&ev, text, sizeof(text));
+	CHECK_STR(text, "slave 3, line 2: one-shot for DC time 845 came 51 ns after it, +-50 ns");
+	ev.arg[0] = 0;
+	event_format(&ev, text, sizeof(text));
+	CHECK_STR(text, "slave 3, line 2: one-shot for DC time 845 came; distance below 50 ns "
+			"(unresolved)");
+}

@@ -132,6 +132,23 @@ TEST(config, slaves_and_their_objects_are_read_in_order)
 	CHECK_EQ(cfg.bus_presence, CONFIG_EXACT_SLAVES);
 }
 
+TEST(config, one_shot_is_the_mode_or_the_object_that_the_mode_would_write)
+{
+	static struct config cfg;
+
+	parse_ok("slaves:\n"
+		 "  - mode: oneshot\n"
+		 "  - sdo: [ { index: 0x8000, subindex: 1, type: USINT, value: 1 } ]\n"
+		 "  - sdo: [ { index: 0x8000, subindex: 2, type: UINT, value: 1 } ]\n"
+		 "  - mode: periodic\n",
+		 &cfg);
+	CHECK_EQ(config_is_oneshot(&cfg, 0), 1);
+	CHECK_EQ(config_is_oneshot(&cfg, 1), 1);
+	CHECK_EQ(config_is_oneshot(&cfg, 2), 0);
+	CHECK_EQ(config_is_oneshot(&cfg, 3), 0);
+	CHECK_EQ(config_is_oneshot(&cfg, 60), 0);
+}
+
 TEST(config, presence_that_is_said_beats_the_one_that_follows)
 {
 	static struct config cfg;

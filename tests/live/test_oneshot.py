@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: MIT
+"""One-shot mode the whole way: commanded at the master, fired by the slave, judged by its pulse."""
+
+from __future__ import annotations
+
+import json
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from segment import Segment, recorded, wait_for
+from test_sync0 import Checked
+
+SLAVE, OTHER = 1, 0
+# Far enough ahead for a refresh of the slave's outputs, on a busy machine, too.
+AHEAD = "500ms"
+MS = 1_000_000
+MODES = {"slaves[0].mode": "periodic", "slaves[1].mode": "oneshot"}
+
+
+def make(make_segment: Callable[..., Segment]) -> Checked:
+    checked = Checked(make_segment(settings=MODES))
+    checked.wait_for_windows(1)
+    return checked
+
+
+def fire(checked: Checked, ahead: str = AHEAD, *more: str) -> int:
+    """Arm the slave; the DC time at which SYNC0 is to come."""
+    said = checked.segment.ecdaq("oneshot", str(SLAVE), "--in", ahead, "--json", *more)
+    at: int = json.loads(said.stdout)["dc_time_ns"]
+    return at
+
+
+def told(checked: Checked, event: str, count: int = 1) -> list[dict[str, Any]]:
+    def enough() -> list[dict[str, Any]]:
+        found = [e for e in checked.events() if e["event"] == event]
+        return found if len(found) >= count else []
+
+    return wait_for(f"{count} {event}", enough, 120)
+
+
+def shots(checked: Checked) -> list[dict[str, Any]]:
+    """All that was said of shots, and of pulses that nobody had asked for."""
+    return [e for e in checked.events() if e["slave"] == SLAVE]
+
+
+def pulses(edges: Path) -> list[int]:
+    """DC times of the slave's own pulses."""
+    lines = edges.read_text().splitlines()[:-1]
+    return [int(line.split()[2]) for line in lines if line.startswith(f"{SLAVE} ")]
+
+
+def test_a_shot_is_timed_against_its_command_and_one_that_does_not_come_is_told(
+    make_segment: Callable[..., Segment],
+) -> None:
+    checked = make(make_segment)
+    segment = checked.segment
+    segment.start_recorder()
+    came = fire(checked, AHEAD, "--wait")
+    (event,) = told(checked, "sync0_shot")
+    assert (event["slave"], event["value"]) == (SLAVE, came)
+    late, bound = event["arg"]
+    # The pulse is exact; what it is said to be off by is the error of the clocks' map.
+    assert came in pulses(checked.edges)
+    assert abs(late) <= bound < MS
+    line = checked.report()["lines"][SLAVE]
+    assert (line["oneshot"], line["shots"], line["shots_lost"]) == (True, 1, 0)
+    assert line["shot"]["came"] is True and line["shot"]["dc_time_ns"] == came
+    assert abs(line["shot"]["late_ns"] - late) <= 1
+
+    checked.fault(f"at=0s sync0-lost slave={SLAVE} count=1")
+    lost = fire(checked)
+    (event,) = told(checked, "sync0_shot_lost")
+    assert (event["slave"], event["value"]) == (SLAVE, lost)
+    line = checked.report()["lines"][SLAVE]
+    assert (line["shots"], line["shots_lost"], line["verdict"]) == (2, 1, "FAIL")
+    assert f"shot for DC time {lost} did not come" in segment.ecdaq("sync0").stdout
+    assert lost not in pulses(checked.edges)
+
+    again = fire(checked)
+    assert [e["value"] for e in told(checked, "sync0_shot", 2)] == [came, again]
+    assert [e["event"] for e in shots(checked)] == ["sync0_shot", "sync0_shot_lost", "sync0_shot"]
+    # The slave beside it is periodic, and none of its pulses is missing.
+    assert checked.report()["lines"][OTHER]["missing"] == 0
+    segment.stop("sync0")
+    segment.stop("daemon")
+    assert segment.stop("recorder") == 0
+    kept = [m for m in recorded(segment.record_dir, "/ecdaq/sync0") if m.slave == SLAVE]
+    assert [(m.shot_dc_ns, m.missing) for m in kept] == [(came, 0), (lost, 1), (again, 0)]
+
+
+def test_another_command_withdraws_a_shot_and_a_check_that_starts_late_blames_nobody(
+    make_segment: Callable[..., Segment],
+) -> None:
+    checked = make(make_segment)
+    segment = checked.segment
+    withdrawn = fire(checked, "30s")
+    first = fire(checked, AHEAD, "--wait")
+    told(checked, "sync0_shot")
+    # Nobody listens to this one, which the ring of the master still tells of.
+    segment.stop("sync0", signal.SIGKILL)
+    unheard = fire(checked, AHEAD, "--wait")
+    wait_for("its pulse", lambda: unheard in pulses(checked.edges), 60)
+    # And this one was commanded before the check began, to come when it listens.
+    last = fire(checked, "10s")
+    checked.start_check()
+    pid = segment.processes["sync0"].pid
+    wait_for("the second check", lambda: checked.report().get("pid") == pid, 60)
+    assert [e["value"] for e in told(checked, "sync0_shot")] == [last]
+    assert [e["event"] for e in shots(checked)] == ["sync0_shot"]
+    assert pulses(checked.edges) == [first, unheard, last]
+    assert withdrawn not in pulses(checked.edges)
