@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* ecdaq-sim: the simulated segment on a network interface, in real time. */
 #include <errno.h>
-#include <fcntl.h>
 #include <sched.h>
 #include <signal.h>
 #include <stdatomic.h>
@@ -9,10 +8,10 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include "sim/control.h"
+#include "sim/edge_writer.h"
 #include "sim/fault.h"
 #include "sim/line_up.h"
 #include "sim/options.h"
@@ -23,7 +22,6 @@ enum {
 	WAKE_MIN_NS = 200000, /* so near to each other events are run together */
 	WAKE_MAX_NS = 10000000,
 	CONTROL_NS = 10000000, /* how often the control socket is looked at */
-	FLUSH_NS = 50000000,   /* edges are in their file at the latest after this */
 	HELD_MAX = 64,
 	FRAME_BYTES = 1600,
 };
@@ -43,12 +41,10 @@ struct simulation {
 	struct segment *segment;
 	struct fault_plan *faults;
 	struct held held[HELD_MAX];
-	FILE *edges;
-	int edges_pipe; /* -1: edges is a file */
+	struct edge_writer *edges; /* NULL: not wanted */
 	int fd;
 	int control_fd;
 	int64_t control_ns; /* when it was looked at last */
-	int64_t flushed_ns;
 	uint64_t frames;
 	uint64_t bad_frames;
 };
@@ -65,34 +61,7 @@ static void on_signal(int number)
 
 static void write_edge(void *ctx, unsigned slave, int64_t t_ns, uint64_t system_time_ns)
 {
-	static const char form[] = "%u %lld %llu\n";
-	struct simulation *sim = ctx;
-	long long at_ns = t_ns;
-	unsigned long long dc_ns = system_time_ns;
-
-	if (sim->edges_pipe < 0) {
-		fprintf(sim->edges, form, slave, at_ns, dc_ns);
-		return;
-	}
-	/* Now or never: a reader that is gone, or too slow, must not hold the segment. */
-	(void)!dprintf(sim->edges_pipe, form, slave, at_ns, dc_ns);
-}
-
-/* Who reads a pipe wants each edge at once. */
-static int open_edges(struct simulation *sim, const char *path)
-{
-	struct stat st;
-
-	sim->edges = fopen(path, "w");
-	if (sim->edges == NULL || fstat(fileno(sim->edges), &st) < 0) {
-		return -errno;
-	}
-	if (S_ISFIFO(st.st_mode)) {
-		sim->edges_pipe = fileno(sim->edges);
-		signal(SIGPIPE, SIG_IGN);
-		return fcntl(sim->edges_pipe, F_SETFL, O_WRONLY | O_NONBLOCK) < 0 ? -errno : 0;
-	}
-	return 0;
+	edge_writer_put(((struct simulation *)ctx)->edges, slave, t_ns, system_time_ns);
 }
 
 static int open_all(struct simulation *sim)
@@ -110,7 +79,7 @@ static int open_all(struct simulation *sim)
 		return sim_complain(error);
 	}
 	if (sim->opt.edges != NULL) {
-		r = open_edges(sim, sim->opt.edges);
+		r = edge_writer_open(sim->opt.edges, sim->opt.edges_keep_bytes, &sim->edges);
 		if (r < 0) {
 			snprintf(error, sizeof(error), "%s: %s", sim->opt.edges, strerror(-r));
 			return sim_complain(error);
@@ -134,9 +103,13 @@ static int open_all(struct simulation *sim)
 
 static void flush_edges(struct simulation *sim, int64_t now_ns)
 {
-	if (sim->edges != NULL && now_ns - sim->flushed_ns >= FLUSH_NS) {
-		sim->flushed_ns = now_ns;
-		fflush(sim->edges);
+	char error[256];
+	int r = sim->edges == NULL ? 0 : edge_writer_flush(sim->edges, now_ns);
+
+	if (r < 0) {
+		snprintf(error, sizeof(error), "--edges-keep: %s: %s: all is kept", sim->opt.edges,
+			 strerror(-r));
+		sim_complain(error);
 	}
 }
 
@@ -303,7 +276,6 @@ int main(int argc, char **argv)
 	static struct simulation sim = {
 		.opt = { .slaves = "2", .seed = 1, .cpu = -1, .jitter_ns = 10, .wander_ppm = 0.5 },
 		.control_fd = -1,
-		.edges_pipe = -1,
 	};
 	struct sigaction action = { .sa_handler = on_signal };
 	int r;
@@ -320,9 +292,7 @@ int main(int argc, char **argv)
 	r = serve(&sim);
 	fprintf(stderr, "ecdaq-sim: %llu frames, %llu damaged\n", (unsigned long long)sim.frames,
 		(unsigned long long)sim.bad_frames);
-	if (sim.edges != NULL) {
-		fclose(sim.edges);
-	}
+	edge_writer_close(sim.edges);
 	if (sim.opt.control != NULL) {
 		unlink(sim.opt.control);
 	}

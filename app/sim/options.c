@@ -29,6 +29,7 @@ static const char usage_text[] =
 	"  --edges FILE       write every SYNC0 edge: slave, CLOCK_MONOTONIC ns, DC ns; each at "
 	"once\n"
 	"                     if FILE is a pipe (waited for until somebody reads it)\n"
+	"  --edges-keep MIB   of that file keep so much only, the newest\n"
 	"  --priority N       SCHED_FIFO\n"
 	"  --cpu N            run on this core only\n"
 	"  --help, --version\n"
@@ -106,6 +107,12 @@ static int take_option(int c, const char *value, struct sim_options *opt)
 	case 'e':
 		opt->edges = value;
 		return 0;
+	case 'k':
+		if (number_of(value, "--edges-keep", 1, 1 << 20, &n) < 0) {
+			return -1;
+		}
+		opt->edges_keep_bytes = (uint64_t)n << 20;
+		return 0;
 	case 'g':
 		return signal_parse(value, &opt->signal) < 0
 			       ? sim_complain("--signal: not sine:HZ:V:OFFSET_V[:PHASE_DEG]")
@@ -155,6 +162,7 @@ void sim_options_read(int argc, char **argv, struct sim_options *opt)
 		{ "faults", required_argument, NULL, 'f' },
 		{ "control", required_argument, NULL, 'c' },
 		{ "edges", required_argument, NULL, 'e' },
+		{ "edges-keep", required_argument, NULL, 'k' },
 		{ "priority", required_argument, NULL, 'r' },
 		{ "cpu", required_argument, NULL, 'u' },
 		{ "help", no_argument, NULL, 'h' },

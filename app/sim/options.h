@@ -15,6 +15,7 @@ struct sim_options {
 	const char *faults;
 	const char *control;
 	const char *edges;
+	uint64_t edges_keep_bytes; /* 0: all */
 	struct signal_spec signal;
 	double wander_ppm;
 	int64_t jitter_ns;

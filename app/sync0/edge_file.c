@@ -102,6 +102,31 @@ int edge_line_parse(const char *line, struct edge_item *ret)
 	return is_cycle ? parse_cycle(value, count, ret) : parse_edge(value, count, ret);
 }
 
+/* From its start it is read more than once, which a pipe cannot. */
+static int kind_error(enum edge_file_from from, mode_t mode)
+{
+	if (S_ISDIR(mode)) {
+		return -EISDIR;
+	}
+	return from == EDGE_FILE_START && !S_ISREG(mode) ? -ESPIPE : 0;
+}
+
+/* Where that may be within a line, begin with the one behind it. */
+static void seek(struct edge_file *ef, enum edge_file_from from, const struct stat *st)
+{
+	off_t at = 0;
+
+	if (from == EDGE_FILE_END) {
+		at = st->st_size - 1;
+	} else if (S_ISREG(st->st_mode)) {
+		at = lseek(ef->fd, 0, SEEK_DATA); /* ecdaq-sim --edges-keep makes a hole before */
+	}
+	if (at > 0) {
+		ef->taken = lseek(ef->fd, at, SEEK_SET);
+		ef->is_skipping = 1;
+	}
+}
+
 int edge_file_open(const char *path, enum edge_file_from from, struct edge_file **ret_file)
 {
 	struct edge_file *ef = calloc(1, sizeof(*ef));
@@ -118,13 +143,14 @@ int edge_file_open(const char *path, enum edge_file_from from, struct edge_file 
 		edge_file_close(ef);
 		return r;
 	}
+	r = kind_error(from, st.st_mode);
+	if (r < 0) {
+		edge_file_close(ef);
+		return r;
+	}
 	ef->dev = st.st_dev;
 	ef->ino = st.st_ino;
-	if (from == EDGE_FILE_END && st.st_size > 0) {
-		/* The line that ends there may be half written: from the one behind it on. */
-		ef->taken = lseek(ef->fd, st.st_size - 1, SEEK_SET);
-		ef->is_skipping = 1;
-	}
+	seek(ef, from, &st);
 	*ret_file = ef;
 	return 0;
 }
@@ -214,5 +240,5 @@ int edge_file_is_replaced(const struct edge_file *ef)
 	struct stat st;
 
 	return stat(ef->path, &st) < 0 || st.st_dev != ef->dev || st.st_ino != ef->ino ||
-	       st.st_size < ef->taken;
+	       (S_ISREG(st.st_mode) && st.st_size < ef->taken);
 }

@@ -33,8 +33,8 @@ struct edge_file;
 enum edge_file_from { EDGE_FILE_START, EDGE_FILE_END };
 
 /**
- * Open @path, at its start or behind the last whole line. 0 or -errno. Free with
- * edge_file_close().
+ * Open @path, at its start or behind the last whole line. 0 or -errno; -ESPIPE: from its start, and
+ * it is no regular file. Free with edge_file_close().
  */
 int edge_file_open(const char *path, enum edge_file_from from, struct edge_file **ret_file);
 void edge_file_close(struct edge_file *ef);

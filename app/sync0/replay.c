@@ -67,7 +67,9 @@ static int each(const char *path, void (*take)(void *ctx, const struct edge_item
 	int r = edge_file_open(path, EDGE_FILE_START, &ef);
 
 	if (r < 0) {
-		snprintf(why, WHY_BYTES, "%.200s: %s", path, strerror(-r));
+		snprintf(why, WHY_BYTES, "%.200s: %s", path,
+			 r == -ESPIPE ? "is no regular file, and is read more than once"
+				      : strerror(-r));
 		return r;
 	}
 	while ((r = edge_file_next(ef, &item)) == 1) {
@@ -233,6 +235,7 @@ int replay_calibrate(const char *path, const char *save_to, FILE *out, char *why
 	struct contents contents = { .cycles = 0 };
 	struct collected c = { .lines = 0 };
 	struct calibration calibration;
+	char said[CALIBRATION_WHY_BYTES] = "";
 	int r = each(path, look, &contents, why);
 
 	for (unsigned i = 0; i < LIMIT_SLAVES; i++) {
@@ -256,5 +259,9 @@ int replay_calibrate(const char *path, const char *save_to, FILE *out, char *why
 	snprintf(calibration.first, sizeof(calibration.first), "slave %u", c.slave[0]);
 	snprintf(calibration.second, sizeof(calibration.second), "slave %u", c.slave[1]);
 	print_calibration(&calibration, out);
-	return calibration_save(save_to, &calibration, why);
+	r = calibration_save(save_to, &calibration, said);
+	if (r < 0) {
+		snprintf(why, WHY_BYTES, "%.200s: %.200s", save_to, said);
+	}
+	return r;
 }

@@ -38,6 +38,8 @@ MISTAKES = [
     (USAGE, [*NIC, "--wander", "inf"], "--wander"),
     (USAGE, [*NIC, "--signal", "square"], "--signal"),
     (USAGE, [*NIC, "--seed", "many"], "--seed"),
+    (USAGE, [*NIC, "--edges-keep", "0"], "--edges-keep"),
+    (FAILED, [*NIC, "--edges", "/nonexistent/edges"], "/nonexistent/edges: No such file"),
     (USAGE, [*NIC, "--priority", "100"], "--priority"),
     (FAILED, [*NIC, "--faults", "/nonexistent"], "/nonexistent: No such file"),
     (USAGE, [*NIC, "word"], "more words than options"),
@@ -75,7 +77,7 @@ def test_help_names_every_option_and_every_fault() -> None:
     assert result.returncode == 0
     for option in ("interface", "slaves", "sii", "ppm", "wander", "jitter", "signal", "seed"):
         assert f"--{option} " in result.stdout
-    for option in ("faults", "control", "edges", "priority", "cpu"):
+    for option in ("faults", "control", "edges", "edges-keep", "priority", "cpu"):
         assert f"--{option} " in result.stdout
     for fault in ("lose", "hold", "damage", "power-off", "mailbox-stuck", "identity"):
         assert fault in result.stdout

@@ -106,6 +106,12 @@ def test_an_empty_or_foreign_file_is_refused_in_one_line(tmp_path: Path) -> None
     short = write(tmp_path / "short", edges(100))
     one_line(check("--replay", short), FAILED, "too short", "sync0.window")
     one_line(check("--replay", short, "--calibrate"), FAILED, "too few")
+    one_line(check("--replay", str(tmp_path)), FAILED, "Is a directory")
+    one_line(check("--replay", "/dev/null"), FAILED, "no regular file")
+    same = write(tmp_path / "same", edges(2000))
+    nowhere = f"sync0.calibration={tmp_path / 'none' / 'calibration'}"
+    unsaved = check("--replay", same, "--calibrate", "--set", nowhere)
+    one_line(unsaved, FAILED, "none/calibration: No such file or directory")
 
 
 def test_mistakes_on_the_command_line_are_one_line(tmp_path: Path) -> None:

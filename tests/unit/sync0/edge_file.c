@@ -147,3 +147,33 @@ TEST(sync0, a_line_without_end_is_refused_once_and_not_kept)
 	edge_file_close(ef);
 	unlink(path);
 }
+
+TEST(sync0, a_file_whose_old_edges_are_a_hole_begins_behind_it)
+{
+	char path[128];
+	FILE *f;
+	struct edge_file *ef;
+
+	/* On a tmpfs a hole is one. */
+	snprintf(path, sizeof(path), "/dev/shm/ecdaq-unit-%d-hole", (int)getpid());
+	f = fresh(path);
+	CHECK_EQ(fseek(f, 65536, SEEK_SET), 0);
+	fputs("5 21\n0 30 40\n", f);
+	fclose(f);
+	CHECK_EQ(edge_file_open(path, EDGE_FILE_START, &ef), 0);
+	CHECK_EQ(edge_file_next(ef, &item), 1);
+	CHECK_EQ(item.edge.mono_ns, 30);
+	CHECK_EQ(edge_file_next(ef, &item), 0);
+	edge_file_close(ef);
+	unlink(path);
+}
+
+TEST(sync0, what_cannot_be_read_twice_is_no_file_of_edges)
+{
+	struct edge_file *ef = NULL;
+
+	CHECK_EQ(edge_file_open("/tmp", EDGE_FILE_START, &ef), -EISDIR);
+	CHECK_EQ(edge_file_open("/tmp", EDGE_FILE_END, &ef), -EISDIR);
+	CHECK_EQ(edge_file_open("/dev/null", EDGE_FILE_START, &ef), -ESPIPE);
+	CHECK(ef == NULL);
+}
