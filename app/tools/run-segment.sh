@@ -12,7 +12,8 @@ usage()
 usage: ./build.sh run [OPTION...]
 
 Brings a simulated segment to OP over a veth pair in a network namespace of its own, records every
-cycle, publishes it over DDS and shows it live. Ctrl-C ends it in order (ecdaqd, recorder, segment) and prints a summary.
+cycle, publishes it over DDS, checks the SYNC0 pulses and shows it live. Ctrl-C ends it in order (ecdaqd, recorder, segment)
+and prints a summary.
 It needs no privilege where the kernel grants users their own namespaces; real-time priority is then
 not to be had, and ecdaqd says so once.
 
@@ -25,6 +26,8 @@ not to be had, and ecdaqd says so once.
   --record DIR    where recordings go (default: build/run/record)
   --no-dds        without ecdaq-dds. Else it publishes on this machine's loopback, in a domain and with a
                   tag of its own (one line says which); where FILE has a section dds, as that says
+  --no-sync0      without ecdaq-sync0. Else it checks the simulated pulses, marked as such in `ecdaq sync0`; where section
+                  sync0 of FILE has enable or edges, it does as that says
   --json          no live view; the last line printed is `ecdaq status --json --summary`
 
 environment:
@@ -56,6 +59,7 @@ config=
 record=$root/build/run/record
 json=no
 dds=yes
+sync0=yes
 mode=outside
 bin=${ECDAQ_BIN_DIR:-$root/build/stage/bin}
 
@@ -70,6 +74,7 @@ parse_options()
 			;;
 		--json) json=yes ;;
 		--no-dds) dds=no ;;
+		--no-sync0) sync0=no ;;
 		--check) mode=check ;;
 		--inside) mode=inside ;;
 		--help)
@@ -201,9 +206,33 @@ stop()
 	0 | 143) ;;
 	*)
 		note "$name ended with $status"
-		failed=1
+		# Who only looks on does not spoil the run.
+		[ "$name" = sync0 ] || failed=1
 		;;
 	esac
+}
+
+# Does the configuration itself say what ecdaq-sync0 has to look at?
+has_sync0_source()
+{
+	[ -n "$config" ] && awk '
+		/^[^ \t#-]/ { is_in = /^sync0:/ }
+		is_in && /[ \t{,](enable|edges)[ \t]*:/ { found = 1 }
+		END { exit !found }' "$config"
+}
+
+start_sync0()
+{
+	local options=()
+
+	[ "$sync0" = yes ] || return 0
+	if [ ! -x "$bin/ecdaq-sync0" ]; then
+		note "no check of SYNC0: ecdaq-sync0 is not there"
+		return 0
+	fi
+	[ -z "$config" ] || options=(--config "$config")
+	has_sync0_source || options+=(--edges "$ECDAQ_RUN_DIR/edges")
+	start sync0 "$bin/ecdaq-sync0" "${options[@]}"
 }
 
 # ecdaq-dds was started before this shell: tail stands in for it, and ends when it does.
@@ -228,6 +257,7 @@ interrupted=no
 end_in_order()
 {
 	stop view
+	stop sync0
 	stop daemon
 	stop recorder
 	stop_dds
@@ -240,6 +270,7 @@ clean_up()
 {
 	trap '' INT TERM
 	end_in_order
+	rm -f "$ECDAQ_RUN_DIR/edges"
 	[ -z "${run_dir_is_own:-}" ] || rm -rf "$ECDAQ_RUN_DIR"
 }
 
@@ -251,14 +282,20 @@ start_interruptible()
 	trap 'interrupted=yes; kill "${pid[interrupt]}" 2> /dev/null || true' INT TERM
 }
 
-# Which of the children ended? Waits for the first.
+# Which of the children ended? Waits for the first, ecdaq-sync0 apart: the run goes on without it.
 wait_for_end()
 {
-	local ended=
+	local ended='' status
 
-	[ "$interrupted" = no ] || return 0
-	wait -n -p ended "${pid[@]}" || true
-	[ "$interrupted" = no ] || return 0
+	while :; do
+		status=0
+		[ "$interrupted" = no ] || return 0
+		wait -n -p ended "${pid[@]}" || status=$?
+		[ "$interrupted" = no ] || return 0
+		[ "$ended" = "${pid[sync0]:-none}" ] || break
+		unset 'pid[sync0]'
+		[ "$status" = 0 ] || note "ecdaq-sync0 ended with $status"
+	done
 	for name in "${!pid[@]}"; do
 		[ "${pid[$name]}" = "$ended" ] || continue
 		case $name in
@@ -278,6 +315,8 @@ run_inside()
 	local daemon_options=(--simulated)
 	local segment_options=(--interface ecsim0 --slaves "$slaves" --control "$ECDAQ_RUN_DIR/segment")
 
+	[ "$sync0" = no ] || segment_options+=(--edges "$ECDAQ_RUN_DIR/edges" --edges-keep 8)
+
 	# As root the segment gets a real-time priority below the master's: it stands for hardware.
 	! chrt -f 1 true 2> /dev/null || segment_options+=(--priority 50)
 	[ -z "$sii" ] || segment_options+=(--sii "$sii")
@@ -291,6 +330,7 @@ run_inside()
 	start segment "$bin/ecdaq-sim" "${segment_options[@]}"
 	start recorder "$bin/ecdaq-record" "${set_options[@]}"
 	start daemon "$bin/ecdaqd" "${set_options[@]}" "${daemon_options[@]}"
+	start_sync0
 	adopt_dds
 	if [ "$json" = no ] && [ -t 1 ]; then
 		start view "$bin/ecdaq" top

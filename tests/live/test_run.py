@@ -215,6 +215,7 @@ def test_build_sh_run_ends_with_one_json_line(tmp_path: Path) -> None:
         "recorded_cycles",
         "recorded_gaps",
         "dds",
+        "sync0",
     ):
         assert key in line
     for key in ("wake_latency_ns", "round_trip_ns", "phase_ns"):
@@ -225,6 +226,8 @@ def test_build_sh_run_ends_with_one_json_line(tmp_path: Path) -> None:
     assert line["dds"]["published_cycles"] > 1000
     assert (line["dds"]["missed_cycles"], line["dds"]["failed_messages"]) == (0, 0)
     assert (line["dds"]["interface"], line["dds"]["commands"]) == ("lo", False)
+    check = line["sync0"]
+    assert (check["source"], check["lines"], check["state"]) == ("simulated edges", 3, "ended")
     assert line["recording"].endswith(".mcap")
     assert list((tmp_path / "record").glob("*.mcap"))
 

@@ -24,9 +24,12 @@ echo "start $(basename "$0") $*" >> "$LOG"
 while :; do sleep 0.05; done
 """
 # Ends only when the others run: else they could be ended before they can say so.
-WHEN_ALL_RUN = """until [ "$(grep -c '^start' "$LOG")" -ge 4 ]; do sleep 0.01; done
+WHEN_RUN = """until [ "$(grep -c '^start' "$LOG")" -ge {count} ]; do sleep 0.01; done
 """
-PROGRAMS = ("ecdaqd", "ecdaq-record", "ecdaq-dds", "ecdaq-sim")
+WHEN_ALL_RUN = WHEN_RUN.format(count=5)
+WHEN_ALL_BUT_ONE_RUN = WHEN_RUN.format(count=4)
+PROGRAMS = ("ecdaqd", "ecdaq-record", "ecdaq-dds", "ecdaq-sim", "ecdaq-sync0")
+END_ORDER = ["ecdaq-sync0", "ecdaqd", "ecdaq-record", "ecdaq-dds", "ecdaq-sim"]
 TOOL = """#!/bin/bash
 echo "tool $*" >> "$LOG"
 [ "$1" = status ] && echo '{"state":"STOPPED"}'
@@ -98,7 +101,7 @@ def test_an_interrupt_ends_all_in_order_with_a_summary(bench: Bench, number: int
     os.killpg(run.pid, number)
     out, err = run.communicate(timeout=20)
     assert run.returncode == 0, err
-    assert ends(bench) == ["end ecdaqd", "end ecdaq-record", "end ecdaq-dds", "end ecdaq-sim"]
+    assert ends(bench) == [f"end {name}" for name in END_ORDER]
     assert bench.log[-1] == "tool status --summary"
     assert out.splitlines()[-1] == '{"state":"STOPPED"}'
     assert not any(line.startswith("interrupted") for line in bench.log)
@@ -121,7 +124,7 @@ def test_a_master_that_fails_fails_the_run(bench: Bench) -> None:
     _, err = run.communicate(timeout=20)
     assert run.returncode == 1
     assert "daemon ended with 8" in err
-    assert ends(bench) == ["end ecdaq-record", "end ecdaq-dds", "end ecdaq-sim"]
+    assert ends(bench) == [f"end {name}" for name in END_ORDER if name != "ecdaqd"]
 
 
 def test_a_segment_that_ends_by_itself_fails_the_run(bench: Bench) -> None:
@@ -173,7 +176,7 @@ def test_dds_is_done_as_the_configuration_says_where_it_does(bench: Bench) -> No
 
 
 def test_without_dds_there_is_none(bench: Bench) -> None:
-    bench.make_it("ecdaqd", WHEN_ALL_RUN.replace("4", "3") + "exit 0")
+    bench.make_it("ecdaqd", WHEN_ALL_BUT_ONE_RUN + "exit 0")
     run = bench.start("--seconds", "1", "--no-dds")
     _, err = run.communicate(timeout=20)
     assert run.returncode == 0
@@ -195,7 +198,7 @@ def test_where_dds_cannot_be_had_one_line_says_so_and_the_run_goes_on(
         (bench.bin / "ecdaq-dds").unlink()
     else:
         bench.program("ecdaq-dds", program)
-    bench.make_it("ecdaqd", WHEN_ALL_RUN.replace("4", "3") + "exit 0")
+    bench.make_it("ecdaqd", WHEN_ALL_BUT_ONE_RUN + "exit 0")
     run = bench.start("--seconds", "1")
     _, err = run.communicate(timeout=20)
     assert run.returncode == 0
@@ -209,3 +212,75 @@ def test_a_publisher_that_ends_by_itself_fails_the_run(bench: Bench) -> None:
     _, err = run.communicate(timeout=20)
     assert run.returncode == 1
     assert "dds ended by itself" in err
+
+
+def sync0_line(bench: Bench) -> str:
+    return next((line for line in bench.log if line.startswith("start ecdaq-sync0")), "")
+
+
+def run_dir_of(bench: Bench) -> str:
+    (line,) = [entry for entry in bench.log if entry.startswith("run dir ")]
+    return line.removeprefix("run dir ")
+
+
+def test_the_simulated_pulses_are_checked(bench: Bench) -> None:
+    bench.make_it("ecdaqd", WHEN_ALL_RUN + 'echo "run dir $ECDAQ_RUN_DIR" >> "$LOG"; exit 0')
+    assert bench.start("--seconds", "1").wait(20) == 0
+    edges = f"{run_dir_of(bench)}/edges"
+    assert sync0_line(bench) == f"start ecdaq-sync0 --edges {edges}"
+    (segment,) = [line for line in bench.log if line.startswith("start ecdaq-sim")]
+    assert f"--edges {edges} --edges-keep 8" in segment
+
+
+@pytest.mark.parametrize(
+    ("section", "is_simulated"),
+    [
+        ("cycle:\n  period: 2ms\n", True),
+        ("sync0:\n  window: 1s\ndds:\n  enable: on\n  interface: lo\n", True),
+        ("sync0:\n  # none\n  window: 1s\n\n  enable: on\n", False),
+        ("sync0: { window: 1s, edges: /tmp/mine }\n", False),
+        ("cycle:\n  period: 1ms\nsync0:\n  enable: off\nrecord:\n  enable: on\n", False),
+    ],
+)
+def test_the_check_is_done_as_the_configuration_says_where_it_does(
+    bench: Bench, section: str, is_simulated: bool
+) -> None:
+    config = bench.folder / "mine.yaml"
+    config.write_text(section)
+    bench.make_it("ecdaqd", WHEN_ALL_RUN + 'echo "run dir $ECDAQ_RUN_DIR" >> "$LOG"; exit 0')
+    assert bench.start("--seconds", "1", "--config", str(config)).wait(20) == 0
+    more = f" --edges {run_dir_of(bench)}/edges" if is_simulated else ""
+    assert sync0_line(bench) == f"start ecdaq-sync0 --config {config}{more}"
+
+
+def test_without_the_check_no_edges_are_written(bench: Bench) -> None:
+    bench.make_it("ecdaqd", WHEN_ALL_BUT_ONE_RUN + "exit 0")
+    assert bench.start("--seconds", "1", "--no-sync0").wait(20) == 0
+    assert not sync0_line(bench)
+    assert not any("--edges" in line for line in bench.log)
+
+
+def test_where_the_check_is_missing_one_line_says_so_and_the_run_goes_on(bench: Bench) -> None:
+    (bench.bin / "ecdaq-sync0").unlink()
+    bench.make_it("ecdaqd", WHEN_RUN.format(count=3) + "exit 0")
+    run = bench.start("--seconds", "1", "--no-dds")
+    _, err = run.communicate(timeout=20)
+    assert run.returncode == 0
+    assert err == "-- no check of SYNC0: ecdaq-sync0 is not there\n"
+
+
+@pytest.mark.parametrize(("code", "said"), [(0, []), (1, ["-- ecdaq-sync0 ended with 1"])])
+def test_a_check_that_ends_by_itself_ends_nothing_else(
+    bench: Bench, code: int, said: list[str]
+) -> None:
+    bench.make_it("ecdaq-sync0", f"exit {code}")
+    run = bench.start("--no-dds")
+    bench.wait_for_log(*(f"start {name}" for name in PROGRAMS if name != "ecdaq-dds"))
+    assert run.stderr is not None
+    assert [run.stderr.readline().rstrip() for _ in said] == said
+    assert run.poll() is None
+    assert not ends(bench)
+    os.killpg(run.pid, signal.SIGINT)
+    _, err = run.communicate(timeout=20)
+    assert (run.returncode, err) == (0, "")
+    assert ends(bench) == ["end ecdaqd", "end ecdaq-record", "end ecdaq-sim"]
