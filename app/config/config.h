@@ -197,6 +197,7 @@ int config_parse_duration(const char *text, int64_t *ret_ns, char *why);
 #define CONFIG_RUN_SYNC0 "sync0"                     /* ring of struct sync0_result */
 #define CONFIG_RUN_SYNC0_EVENTS "sync0-events"       /* ring of events of ecdaq-sync0 */
 #define CONFIG_RUN_SYNC0_STATUS "sync0-status"       /* struct sync0_status */
+#define CONFIG_RUN_SYNC0_LOCK "sync0-lock"           /* held by the one ecdaq-sync0 */
 #define CONFIG_RUN_ADMIN "admin"                     /* socket, admin/protocol.h */
 
 /** Where the run directory is: @cfg->run_dir, else $ECDAQ_RUN_DIR, else /run/ecdaq (root) or

@@ -73,7 +73,8 @@ static const char help_text[] =
 	"\n"
 	"Exit codes: 0 stopped in order, or nothing bad in the file; 1 failed; 2 command line;\n"
 	"3 configuration; 4 a right is missing; 5 a check failed in the file; 6 a line is in "
-	"use.\n";
+	"use,\n"
+	"or another ecdaq-sync0 runs here.\n";
 
 static int take_option(struct arguments *a, int c)
 {
@@ -271,7 +272,7 @@ static int run_calibration(const struct config *cfg, const char *dev_dir)
 static int run_watch(const struct arguments *a, const struct config *cfg, const char *dev_dir)
 {
 	struct watch_spec spec = { .cfg = cfg, .dev_dir = dev_dir, .platform = platform_posix() };
-	char why[ERROR_BYTES] = "";
+	char why[WATCH_WHY_BYTES] = "";
 	struct watch *watch;
 	int r;
 

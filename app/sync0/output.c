@@ -2,9 +2,13 @@
 #include "sync0/output.h"
 
 #include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "base/ring.h"
@@ -13,6 +17,7 @@
 enum { RESULT_SLOTS = 4096, EVENT_SLOTS = 1024, FILE_MODE = 0644 };
 
 struct output {
+	int lock; /* -1: rings and page are not made */
 	struct ring *results;
 	struct ring *events;
 	struct sync0_status *page;
@@ -20,6 +25,7 @@ struct output {
 	char results_path[CONFIG_PATH_BYTES];
 	char events_path[CONFIG_PATH_BYTES];
 	char page_path[CONFIG_PATH_BYTES];
+	char lock_path[CONFIG_PATH_BYTES];
 	char said[256];
 };
 
@@ -38,11 +44,14 @@ struct output *output_create(const struct config *cfg, enum sync0_source source)
 	r = r < 0 ? r
 		  : config_run_path(cfg, CONFIG_RUN_SYNC0_STATUS, out->page_path,
 				    CONFIG_PATH_BYTES);
+	r = r < 0 ? r
+		  : config_run_path(cfg, CONFIG_RUN_SYNC0_LOCK, out->lock_path, CONFIG_PATH_BYTES);
 	if (r < 0) {
 		free(out);
 		errno = -r;
 		return NULL;
 	}
+	out->lock = -1;
 	out->page = &out->own;
 	out->own.magic = SYNC0_STATUS_MAGIC;
 	out->own.bytes = sizeof(out->own);
@@ -51,17 +60,30 @@ struct output *output_create(const struct config *cfg, enum sync0_source source)
 	return out;
 }
 
-void output_destroy(struct output *out)
+/* What is said from here on goes to the page of our own. */
+static void close_all(struct output *out)
 {
-	if (out == NULL) {
-		return;
-	}
 	ring_destroy(out->results);
 	ring_destroy(out->events);
+	out->results = NULL;
+	out->events = NULL;
 	if (out->page != &out->own) {
+		memcpy(&out->own, out->page, sizeof(out->own));
 		status_unmap(out->page, sizeof(*out->page));
+		out->page = &out->own;
 	}
-	free(out);
+	if (out->lock >= 0) {
+		close(out->lock);
+		out->lock = -1;
+	}
+}
+
+void output_destroy(struct output *out)
+{
+	if (out != NULL) {
+		close_all(out);
+		free(out);
+	}
 }
 
 static int open_ring(const char *path, const char *kind, uint32_t bytes, uint64_t slots,
@@ -75,29 +97,95 @@ static int open_ring(const char *path, const char *kind, uint32_t bytes, uint64_
 		.file_mode = FILE_MODE,
 	};
 
-	return *ret != NULL ? 0 : ring_create(&spec, ret);
+	return ring_create(&spec, ret);
 }
 
-int output_open(struct output *out)
+static int fail(const char *path, int error, char *why)
 {
-	struct sync0_status *page;
+	snprintf(why, OUTPUT_WHY_BYTES, "%.200s: %s", path, strerror(-error));
+	return error;
+}
+
+static int busy(const struct output *out, char *why)
+{
+	const struct sync0_status *page =
+		status_open(out->page_path, SYNC0_STATUS_MAGIC, sizeof(*page));
+	char pid[32] = "";
+
+	if (page != NULL) {
+		snprintf(pid, sizeof(pid), " (pid %" PRId64 ")", page->pid);
+		status_unmap(page, sizeof(*page));
+	}
+	snprintf(why, OUTPUT_WHY_BYTES, "%.200s: another ecdaq-sync0 is running here%s",
+		 out->lock_path, pid);
+	return -EBUSY;
+}
+
+/* To hold it no right to write is needed: it may have been made by another user's. */
+static int take_lock(struct output *out, char *why)
+{
 	int r;
 
-	r = open_ring(out->results_path, "sync0", sizeof(struct sync0_result), RESULT_SLOTS,
-		      &out->results);
-	r = r < 0 ? r
-		  : open_ring(out->events_path, "event", sizeof(struct event), EVENT_SLOTS,
-			      &out->events);
-	if (r < 0 || out->page != &out->own) {
-		return r;
+	out->lock = open(out->lock_path, O_RDONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, FILE_MODE);
+	if (out->lock < 0) {
+		return fail(out->lock_path, -errno, why);
+	}
+	if (flock(out->lock, LOCK_EX | LOCK_NB) == 0) {
+		return 0;
+	}
+	r = errno == EWOULDBLOCK ? busy(out, why) : fail(out->lock_path, -errno, why);
+	close(out->lock);
+	out->lock = -1;
+	return r;
+}
+
+static int make_all(struct output *out, char *why)
+{
+	struct sync0_status *page;
+	int r = open_ring(out->results_path, "sync0", sizeof(struct sync0_result), RESULT_SLOTS,
+			  &out->results);
+
+	if (r < 0) {
+		return fail(out->results_path, r, why);
+	}
+	r = open_ring(out->events_path, "event", sizeof(struct event), EVENT_SLOTS, &out->events);
+	if (r < 0) {
+		return fail(out->events_path, r, why);
 	}
 	page = status_create(out->page_path, SYNC0_STATUS_MAGIC, sizeof(*page), FILE_MODE);
 	if (page == NULL) {
-		return -errno;
+		return fail(out->page_path, -errno, why);
 	}
 	memcpy(page, &out->own, sizeof(*page));
 	out->page = page;
 	return 0;
+}
+
+/* Its directory was removed, and ours is no more what others open. */
+static int is_gone(const struct output *out)
+{
+	struct stat st;
+
+	return fstat(out->lock, &st) < 0 || st.st_nlink == 0;
+}
+
+int output_open(struct output *out, char *why)
+{
+	int r;
+
+	if (out->lock >= 0 && !is_gone(out)) {
+		return 0;
+	}
+	close_all(out);
+	r = take_lock(out, why);
+	if (r < 0) {
+		return r;
+	}
+	r = make_all(out, why);
+	if (r < 0) {
+		close_all(out);
+	}
+	return r;
 }
 
 struct sync0_status *output_page(struct output *out)

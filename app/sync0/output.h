@@ -16,8 +16,14 @@ struct output;
 struct output *output_create(const struct config *cfg, enum sync0_source source);
 void output_destroy(struct output *out);
 
-/** Make rings and page if they are not there yet. 0 or -errno: the run directory is not there. */
-int output_open(struct output *out);
+enum { OUTPUT_WHY_BYTES = 256 };
+
+/**
+ * Make rings and page if they are not there, or their directory was made anew. 0, or -errno with
+ * one line in @why (OUTPUT_WHY_BYTES): -ENOENT: the run directory is not there yet; -EBUSY: another
+ * process has them.
+ */
+int output_open(struct output *out, char *why);
 
 /** The page, to be filled; never NULL (one of its own until output_open() has succeeded). */
 struct sync0_status *output_page(struct output *out);

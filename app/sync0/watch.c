@@ -10,11 +10,12 @@
 #include "base/clock.h"
 #include "sync0/watch_inside.h"
 
-enum { STEP_MS = 20, TEXT_BYTES = 256 };
+enum { STEP_MS = 20, TEXT_BYTES = WATCH_WHY_BYTES };
 
 #define RETRY_NS (2 * NS_PER_S)             /* between two tries to open what cannot be had */
 #define QUEUED_NS (5 * NS_PER_MS)           /* from interrupt to queue, at most */
 #define SIMULATION_BEHIND_NS (2 * NS_PER_S) /* it writes its edges a little later */
+#define SIMULATION_AHEAD_NS NS_PER_S        /* and never earlier: what is so is no edge */
 
 int64_t watch_now_ns(const struct watch *w)
 {
@@ -24,6 +25,19 @@ int64_t watch_now_ns(const struct watch *w)
 void watch_set_state(struct watch *w, enum sync0_state state)
 {
 	atomic_store_explicit(&output_page(w->out)->state, state, memory_order_relaxed);
+}
+
+int watch_has_source(const struct watch *w)
+{
+	if (w->lines == NULL) {
+		return w->edges != NULL;
+	}
+	for (size_t i = 0; i < w->line_count; i++) {
+		if (lines_is_open(w->lines, i)) {
+			return 1;
+		}
+	}
+	return 0;
 }
 
 /* --- lines --- */
@@ -61,7 +75,7 @@ void watch_name_lines(struct watch *w)
 		}
 		ls = &page->line[w->line_of_slave[pos] - 1];
 		ls->slave_pos = pos;
-		ls->is_open = w->lines == NULL;
+		ls->is_open = (uint32_t)(w->lines == NULL && w->edges != NULL);
 		ls->is_oneshot = (uint32_t)config_is_oneshot(w->spec.cfg, (uint16_t)pos);
 		snprintf(ls->line, sizeof(ls->line), "%.95s",
 			 line_text(w, w->line_of_slave[pos] - 1));
@@ -150,6 +164,11 @@ int watch_create(const struct watch_spec *spec, struct watch **ret_watch, char *
 	output_page(w->out)->window_ns = spec->cfg->sync0_window_ns;
 	have_calibration(w);
 	watch_name_lines(w);
+	r = output_open(w->out, why);
+	if (r < 0 && r != -ENOENT) {
+		watch_destroy(w);
+		return r;
+	}
 	*ret_watch = w;
 	return 0;
 }
@@ -204,6 +223,7 @@ static void open_sources(struct watch *w)
 	if (w->edges != NULL && edge_file_is_replaced(w->edges)) {
 		edge_file_close(w->edges);
 		w->edges = NULL;
+		w->has_news = 1;
 	}
 	if (w->edges == NULL) {
 		r = edge_file_open(w->spec.cfg->sync0_edges, EDGE_FILE_END, &w->edges);
@@ -215,6 +235,7 @@ static void open_sources(struct watch *w)
 			watch_set_state(w, SYNC0_NO_LINE);
 		} else {
 			w->since_ns = watch_now_ns(w);
+			w->has_news = 1;
 			output_say(w->out, "");
 		}
 	}
@@ -222,14 +243,16 @@ static void open_sources(struct watch *w)
 
 static void read_file(struct watch *w)
 {
+	int64_t limit_ns = watch_now_ns(w) + SIMULATION_AHEAD_NS;
 	struct edge_item item;
 	int r;
 
 	while ((r = edge_file_next(w->edges, &item)) != 0) {
 		uint64_t line;
 
-		if (r < 0 || item.kind != EDGE_ITEM_EDGE) {
-			continue; /* the line that was being written when it was opened */
+		/* Half a line, of a file that was written anew, is none, or of some other time. */
+		if (r < 0 || item.kind != EDGE_ITEM_EDGE || item.edge.mono_ns > limit_ns) {
+			continue;
 		}
 		w->newest_ns = item.edge.mono_ns > w->newest_ns ? item.edge.mono_ns : w->newest_ns;
 		line = w->line_of_slave[item.edge.line];
@@ -257,20 +280,48 @@ static int64_t read_edges(struct watch *w)
 							       : before_ns - SIMULATION_BEHIND_NS;
 }
 
+static void tell_counts(struct watch *w)
+{
+	struct sync0_status *page = output_page(w->out);
+	uint64_t windows = w->checker == NULL ? 0 : checker_windows(w->checker);
+	uint64_t alarms = w->checker == NULL ? 0 : checker_alarms(w->checker);
+
+	atomic_store_explicit(&page->windows, w->windows + windows, memory_order_relaxed);
+	atomic_store_explicit(&page->alarms, w->alarms + alarms, memory_order_relaxed);
+}
+
 static void tell(struct watch *w)
 {
 	struct sync0_status *page = output_page(w->out);
 
 	atomic_fetch_add_explicit(&page->heartbeat, 1, memory_order_relaxed);
+	tell_counts(w);
 	if (w->checker == NULL) {
 		return;
 	}
-	atomic_store_explicit(&page->windows, checker_windows(w->checker), memory_order_relaxed);
-	atomic_store_explicit(&page->alarms, checker_alarms(w->checker), memory_order_relaxed);
+	if (!watch_has_source(w)) {
+		watch_set_state(w, SYNC0_NO_LINE);
+	} else if (checker_windows(w->checker) > 0) {
+		watch_set_state(w, SYNC0_RUNNING);
+	}
 	for (size_t i = 0; i < w->line_count; i++) {
 		atomic_store_explicit(&page->line[i].is_lost,
 				      (uint32_t)checker_is_lost(w->checker, i),
 				      memory_order_relaxed);
+	}
+}
+
+/* Where nobody sees what is on the page, standard error says so, once. */
+static void open_output(struct watch *w)
+{
+	char why[OUTPUT_WHY_BYTES] = "";
+
+	(void)output_open(w->out, why);
+	if (strcmp(w->said, why) != 0) {
+		memcpy(w->said, why, sizeof(w->said));
+		if (why[0] != '\0') {
+			fprintf(stderr, "ecdaq-sync0: waiting: %s\n", why);
+		}
 	}
 }
 
@@ -279,7 +330,7 @@ void watch_step(struct watch *w)
 	int64_t until_ns;
 	int is_open;
 
-	(void)output_open(w->out);
+	open_output(w);
 	open_sources(w);
 	is_open = master_open(w->master);
 	if (is_open == 1 && w->has_session && w->has_news) {

@@ -11,6 +11,8 @@
 #include "base/platform.h"
 #include "config/config.h"
 
+enum { WATCH_WHY_BYTES = 256 };
+
 struct watch;
 
 struct watch_spec {
@@ -20,7 +22,10 @@ struct watch_spec {
 	struct platform platform;
 };
 
-/** 0, or -errno with a line in @why (256). Free with watch_destroy(). */
+/**
+ * 0, or -errno with a line in @why (WATCH_WHY_BYTES): -ENOENT: there is nothing to watch; -EBUSY:
+ * another process does. Free with watch_destroy().
+ */
 int watch_create(const struct watch_spec *spec, struct watch **ret_watch, char *why);
 void watch_destroy(struct watch *w);
 /** Take what is there; waits at most about 20 ms. */

@@ -27,10 +27,15 @@ struct watch {
 	int64_t since_ns;  /* edges are heard from here on */
 	int64_t newest_ns; /* edge of the file */
 	int64_t tried_ns;
+	uint64_t windows; /* and alarms, of the sessions before this one */
+	uint64_t alarms;
+	char said[OUTPUT_WHY_BYTES]; /* why nobody sees the page */
 	char master_path[CONFIG_PATH_BYTES];
 };
 
 int64_t watch_now_ns(const struct watch *w);
+/** Are edges heard at all? */
+int watch_has_source(const struct watch *w);
 void watch_set_state(struct watch *w, enum sync0_state state);
 /** The status page's lines: which they are, of which slaves. */
 void watch_name_lines(struct watch *w);

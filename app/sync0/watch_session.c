@@ -11,6 +11,9 @@
 /* Behind the start: listening has begun for sure. */
 #define SETTLE_NS (NS_PER_S / 10)
 
+/* As config_check() has them for the period of the configuration. */
+enum { WINDOW_CYCLES_MIN = 100, LOST_CYCLES_MIN = 3 };
+
 /* --- what comes out of the checker --- */
 
 static void on_result(void *ctx, const struct sync0_result *r)
@@ -18,7 +21,6 @@ static void on_result(void *ctx, const struct sync0_result *r)
 	struct watch *w = ctx;
 
 	output_result(w->out, r);
-	watch_set_state(w, SYNC0_RUNNING);
 }
 
 static void on_event(void *ctx, const struct event *ev)
@@ -64,7 +66,8 @@ static void lines_of_session(struct watch *w)
 
 static enum checker_mode mode_of(const struct watch *w, uint16_t pos)
 {
-	if (w->lines != NULL && !lines_is_open(w->lines, w->line_of_slave[pos] - 1)) {
+	if (!watch_has_source(w) ||
+	    (w->lines != NULL && !lines_is_open(w->lines, w->line_of_slave[pos] - 1))) {
 		return CHECKER_OFF;
 	}
 	return config_is_oneshot(w->spec.cfg, pos) ? CHECKER_ONESHOT : CHECKER_PERIODIC;
@@ -84,6 +87,27 @@ static void fill_lines(const struct watch *w, struct checker_spec *spec)
 			};
 		}
 	}
+}
+
+/* The master's period need not be that of our own configuration. */
+static void fit_to_period(struct watch *w, struct checker_spec *spec)
+{
+	char text[WATCH_WHY_BYTES];
+	int64_t least_ns = WINDOW_CYCLES_MIN * spec->period_ns;
+
+	if (spec->lost_ns < LOST_CYCLES_MIN * spec->period_ns) {
+		spec->lost_ns = LOST_CYCLES_MIN * spec->period_ns;
+	}
+	if (spec->window_ns < least_ns) {
+		spec->window_ns = least_ns;
+		snprintf(text, sizeof(text),
+			 "sync0.window is less than %d cycles of the master: %" PRId64
+			 " ms are taken",
+			 WINDOW_CYCLES_MIN, least_ns / NS_PER_MS);
+		output_say(w->out, text);
+	}
+	atomic_store_explicit(&output_page(w->out)->window_ns, spec->window_ns,
+			      memory_order_relaxed);
 }
 
 static struct checker_spec session_spec(struct watch *w)
@@ -114,6 +138,7 @@ static struct checker_spec session_spec(struct watch *w)
 	};
 
 	fill_lines(w, &spec);
+	fit_to_period(w, &spec);
 	return spec;
 }
 
@@ -148,11 +173,22 @@ void watch_end_session(struct watch *w)
 {
 	if (w->checker != NULL) {
 		checker_finish(w->checker);
+		w->windows += checker_windows(w->checker);
+		w->alarms += checker_alarms(w->checker);
 		checker_destroy(w->checker);
 		w->checker = NULL;
 	}
 	w->has_session = 0;
+	for (size_t i = 0; i < w->line_count; i++) {
+		atomic_store_explicit(&output_page(w->out)->line[i].is_lost, 0,
+				      memory_order_relaxed);
+	}
 	watch_set_state(w, SYNC0_WAITING);
+}
+
+static uint32_t state_of(const struct watch *w)
+{
+	return atomic_load_explicit(&output_page(w->out)->state, memory_order_relaxed);
 }
 
 static void take_cycle(struct watch *w, const struct master_item *item)
@@ -172,6 +208,9 @@ static void take_cycle(struct watch *w, const struct master_item *item)
 	}
 	if (w->checker == NULL) {
 		return;
+	}
+	if (state_of(w) == SYNC0_NO_DC) {
+		watch_set_state(w, SYNC0_LEARNING);
 	}
 	checker_cycle(w->checker, cy);
 	for (size_t i = 0; i < item->shots; i++) {
