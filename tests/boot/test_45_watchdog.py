@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: MIT
+"""A machine whose user space hangs is reset by its hardware watchdog and comes back by itself.
+
+QEMU's i6300ESB, in guest time; a reset ends QEMU, and the test plays the power supply.
+"""
+
+from __future__ import annotations
+
+from machine import Machine, profile, wait_for
+
+BOOT_FILES = {"ecdaq.yaml": profile("guest")}
+OP_S = 900
+RESET_S = 1800
+DEVICE = "/sys/class/watchdog/watchdog0"
+# Above everybody else on both processors: neither systemd nor any interrupt's thread gets to run.
+SPIN = "chrt --fifo 99 taskset --cpu-list {cpu} sh -c 'while :; do :; done'"
+HANG = f"sleep 2; {SPIN.format(cpu=0)} & {SPIN.format(cpu=1)} & wait"
+
+
+def in_operation(machine: Machine) -> bool:
+    return '"state":"OP"' in machine.try_run("ecdaq status --json").stdout
+
+
+def test_systemd_feeds_it_with_fifteen_seconds(machine: Machine) -> None:
+    assert machine.run(f"cat {DEVICE}/state").strip() == "active"
+    assert machine.run(f"cat {DEVICE}/timeout").strip() == "15"
+
+
+def test_a_machine_that_hangs_is_reset(machine: Machine) -> None:
+    wait_for("OP", OP_S, lambda: in_operation(machine))
+    assert machine.process is not None
+    process = machine.process
+    machine.run(f'sudo systemd-run --quiet --collect sh -c "{HANG}"')
+    wait_for("the watchdog's reset", RESET_S, lambda: process.poll() is not None)
+    # QEMU ends with 0 for a reset; a signal or an error of its own would be another number.
+    assert process.returncode == 0
+    assert "Kernel panic" not in machine.console(), "the kernel itself rebooted, not the watchdog"
+
+
+def test_it_comes_back_and_goes_on(machine: Machine) -> None:
+    machine.process = None
+    machine.start()
+    machine.wait_for_login()
+    wait_for("OP again", OP_S, lambda: in_operation(machine))
+    machine.run(
+        "sudo find /data/record -name '*.mcap' -print0 | sudo xargs -0 ecdaq log check", 900
+    )
