@@ -118,6 +118,13 @@ def test_every_frame_is_accounted_for_and_the_recording_has_no_gap(machine: Mach
     assert abs(came - after["frames_sent"]) <= 1, after
 
 
+def test_the_publisher_says_in_the_run_directory_that_it_is_there(machine: Machine) -> None:
+    """It is another user than the master's, in a directory of their group."""
+    wait_for("the publisher", 300, lambda: (status(machine)["dds"] or {}).get("running"))
+    found = status(machine)["dds"]
+    assert (found["domain"], found["interface"]) == (int(DOMAIN), LAN)
+
+
 def gaps_of(path: Path) -> tuple[int, int]:
     """Of the C subscriber's file: samples, and gaps within each slave's cycles of one session."""
     cycles: dict[tuple[str, str], list[int]] = {}
