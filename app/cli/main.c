@@ -58,11 +58,13 @@ static const struct verb verbs[] = {
 	  verb_histogram },
 	{ "log", "...", "Recordings: list, info, check, recover, export (see ecdaq log --help).",
 	  NULL, verb_log },
-	{ "security", "init|add-subscriber|add-commander|check [NAME|DIR]",
+	{ "security", "init|add-appliance|add-subscriber|add-commander|check [NAME|DIR]",
 	  "The keys of DDS Security (app/doc/dds.md).",
 	  "ecdaq security init makes a store with the appliance's keys, add-subscriber NAME and\n"
 	  "add-commander NAME those of a participant; check DIR looks at one participant's "
-	  "folder.\n",
+	  "folder.\n"
+	  "add-appliance renews the appliance's, once its folder has been removed from the "
+	  "store.\n",
 	  verb_security },
 	{ "doctor", "", "Is this machine fit for the cycle? Each check with what mends it.",
 	  "OK, WARN: costs latency or safety. FAIL: measuring cannot be relied on. SKIP: does not\n"

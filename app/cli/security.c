@@ -26,16 +26,34 @@ static enum cli_exit exit_of(const struct security *s, int r, const char *error)
 	return r < 0 ? cli_fail(s->cli, code, "%s", error) : CLI_OK;
 }
 
+static void tell_appliance(const struct security *s)
+{
+	printf("%s/appliance: for the appliance, where only ecdaq-dds may read it: dds.security\n",
+	       s->dir);
+}
+
 static enum cli_exit init(const struct security *s)
 {
 	char error[KEYSTORE_ERROR_BYTES];
 	enum cli_exit result = exit_of(s, keystore_init(s->dir, (unsigned)s->days, error), error);
 
 	if (result == CLI_OK) {
-		printf("%s/appliance: for the appliance, where only ecdaq-dds may read it: "
-		       "dds.security\n"
-		       "%s/ca: whoever has it lets people in: keep it away from both\n",
-		       s->dir, s->dir);
+		tell_appliance(s);
+		printf("%s/ca: whoever has it lets people in: keep it away from both\n", s->dir);
+	}
+	return result;
+}
+
+/* To renew its keys or what they allow: with those of everybody else left as they are. */
+static enum cli_exit add_appliance(const struct security *s)
+{
+	char error[KEYSTORE_ERROR_BYTES];
+	enum cli_exit result = exit_of(
+		s, keystore_add(s->dir, "appliance", KEYSTORE_APPLIANCE, (unsigned)s->days, error),
+		error);
+
+	if (result == CLI_OK) {
+		tell_appliance(s);
 	}
 	return result;
 }
@@ -88,6 +106,7 @@ static const struct subject {
 	enum cli_exit (*run)(const struct security *s);
 } subjects[] = {
 	{ "init", NULL, init },
+	{ "add-appliance", NULL, add_appliance },
 	{ "add-subscriber", "NAME", add_subscriber },
 	{ "add-commander", "NAME", add_commander },
 	{ "check", "DIR", check },
@@ -108,7 +127,9 @@ static enum cli_exit run(struct security *s, const struct args *args)
 		s->name = args->operand_count == 2 ? args->operands[1] : NULL;
 		return subject->run(s);
 	}
-	return cli_fail(s->cli, CLI_USAGE, "%s: wants init, add-subscriber, add-commander or check",
+	return cli_fail(s->cli, CLI_USAGE,
+			"%s: wants init, add-appliance, add-subscriber, "
+			"add-commander or check",
 			args->operands[0]);
 }
 

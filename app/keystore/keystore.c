@@ -42,8 +42,11 @@ static void store_close(struct store *store)
 	pki_free(&store->permissions);
 }
 
-static int check_name(const char *name, char *error)
+static int check_name(const char *name, enum keystore_role role, char *error)
 {
+	if (role == KEYSTORE_APPLIANCE && strcmp(name, APPLIANCE) == 0) {
+		return 0;
+	}
 	if (name[0] == '\0' || name[0] == '-' || strlen(name) >= KEYSTORE_NAME_BYTES ||
 	    name[strspn(name, NAME_CHARS)] != '\0') {
 		return files_fail(error, -EINVAL,
@@ -188,7 +191,7 @@ int keystore_add(const char *dir, const char *name, enum keystore_role role, uns
 		 char *error)
 {
 	struct store store = { .dir = dir };
-	int r = check_name(name, error);
+	int r = check_name(name, role, error);
 
 	r = r < 0 ? r : open_ca(&store, error);
 	r = r < 0 ? r : add(&store, name, role, days, error);

@@ -40,8 +40,9 @@ enum { KEYSTORE_NAME_BYTES = 41, KEYSTORE_ERROR_BYTES = 512 };
 int keystore_init(const char *dir, unsigned days, char *error);
 
 /**
- * Add the participant @name with a folder of its own. Same errors; -EINVAL: the name is none;
- * -ENOENT: no store in @dir.
+ * Add the participant @name with a folder of its own, which must not be there: to renew one, remove
+ * it first. The appliance's name is "appliance". Same errors; -EINVAL: the name is none; -ENOENT:
+ * no store in @dir.
  */
 int keystore_add(const char *dir, const char *name, enum keystore_role role, unsigned days,
 		 char *error);

@@ -17,7 +17,7 @@ struct topics {
 	dds_entity_t status;
 	dds_entity_t event;
 	dds_entity_t timemap;
-	dds_entity_t sync0;
+	dds_entity_t sync0; /* 0: keys of before this topic do not allow it */
 	dds_entity_t idl;
 	dds_entity_t command; /* the one reader */
 	dds_entity_t reply;

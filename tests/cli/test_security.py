@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -36,7 +37,7 @@ def test_a_store_is_made_filled_and_looked_at(tmp_path: Path) -> None:
     ("words", "code", "said"),
     [
         ([], 2, "wants"),
-        (["open"], 2, "open: wants init, add-subscriber, add-commander or check"),
+        (["open"], 2, "open: wants init, add-appliance, add-subscriber, add-commander or check"),
         (["init", "twice"], 2, "init: wants no word"),
         (["add-commander"], 2, "add-commander: wants NAME"),
         (["add-commander", "../x"], 2, "../x: a name is 1 to 40 letters"),
@@ -53,6 +54,24 @@ def test_what_is_wrong_is_one_line(tmp_path: Path, words: list[str], code: int, 
     assert ended.stderr.count("\n") == 1
     assert ended.stderr.startswith("ecdaq: security: ")
     assert said in ended.stderr
+
+
+def test_the_appliance_s_keys_are_renewed_alone(tmp_path: Path) -> None:
+    assert security(tmp_path, "init").returncode == 0
+    assert security(tmp_path, "add-subscriber", "alice").returncode == 0
+    folder = tmp_path / "security" / "appliance"
+    again = security(tmp_path, "add-appliance")
+    assert again.returncode == 1
+    assert "security/appliance: is there already; remove it first to renew it" in again.stderr
+    before = (folder / "cert.pem").read_text()
+    shutil.rmtree(folder)
+    made = security(tmp_path, "add-appliance", "--days", "5")
+    assert made.stdout.startswith("security/appliance: for the appliance"), made.stderr
+    assert (folder / "cert.pem").read_text() != before
+    for name in ("appliance", "alice"):
+        assert security(tmp_path, "check", f"security/{name}").returncode == 0
+        allowed = (tmp_path / "security" / name / "permissions.p7s").read_text()
+        assert "<topic>ecdaq/sync0</topic>" in allowed
 
 
 def test_a_store_stays_as_it_is(tmp_path: Path) -> None:

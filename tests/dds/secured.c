@@ -21,9 +21,11 @@ struct pc {
 	dds_entity_t domain;
 	dds_entity_t participant;
 	dds_entity_t sample;
+	dds_entity_t sync0;
 	dds_entity_t reply;
 	dds_entity_t command;
 	long samples;
+	long results; /* of ecdaq-sync0 */
 	unsigned long long id;
 	int is_answered;
 	int is_accepted;
@@ -74,6 +76,10 @@ static void open_all(struct pc *pc, int is_commander)
 
 	pc->sample = dds_create_reader(pc->participant,
 				       topic(pc, &ecdaq_SampleV1_desc, "ecdaq/sample"), qos, NULL);
+	dds_qset_durability(qos, DDS_DURABILITY_TRANSIENT_LOCAL);
+	pc->sync0 = dds_create_reader(pc->participant,
+				      topic(pc, &ecdaq_Sync0V1_desc, "ecdaq/sync0"), qos, NULL);
+	dds_qset_durability(qos, DDS_DURABILITY_VOLATILE);
 	if (is_commander) {
 		pc->reply = dds_create_reader(
 			pc->participant, topic(pc, &ecdaq_ReplyV1_desc, "ecdaq/reply"), qos, NULL);
@@ -95,6 +101,11 @@ static void take(struct pc *pc)
 	while ((n = dds_take(pc->sample, messages, info, AT_ONCE, AT_ONCE)) > 0) {
 		pc->samples += n;
 		dds_return_loan(pc->sample, messages, n);
+	}
+	messages[0] = NULL;
+	while (pc->sync0 > 0 && (n = dds_take(pc->sync0, messages, info, AT_ONCE, AT_ONCE)) > 0) {
+		pc->results += n;
+		dds_return_loan(pc->sync0, messages, n);
 	}
 	messages[0] = NULL;
 	while (pc->reply > 0 && (n = dds_take(pc->reply, messages, info, AT_ONCE, AT_ONCE)) > 0) {
@@ -140,11 +151,12 @@ int main(int argc, char **argv)
 		dds_sleepfor(DDS_MSECS(PERIOD_MS)); /* a pace, not a synchronisation */
 		take(&pc);
 	}
-	printf("{\"samples\": %ld, \"sent\": %llu, \"reader\": %d, \"writer\": %d, \"answered\": "
+	printf("{\"samples\": %ld, \"results\": %ld, \"sent\": %llu, \"reader\": %d, \"writer\": "
+	       "%d, \"answered\": "
 	       "%d, "
 	       "\"accepted\": %d, \"reason\": \"%s\"}\n",
-	       pc.samples, pc.id, pc.sample > 0, pc.command > 0, pc.is_answered, pc.is_accepted,
-	       pc.reason);
+	       pc.samples, pc.results, pc.id, pc.sample > 0, pc.command > 0, pc.is_answered,
+	       pc.is_accepted, pc.reason);
 	/* The whole domain: its threads use libcrypto, which ends with the process. */
 	dds_delete(pc.domain);
 	return 0;

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
@@ -52,19 +53,39 @@ def result(bench: Bench, name: str, process: subprocess.Popen[bytes]) -> Any:
     return json.loads(bench.log(name).splitlines()[-1])
 
 
+def check_sync0(bench: Bench) -> None:
+    """All that there is, and a window of ecdaq-sync0, which a subscriber that comes later gets."""
+    segment = bench.segment
+    edges = ["--edges", str(bench.folder / "edges")]
+    segment.start_sim(*edges)
+    segment.start_daemon()
+    segment.start_recorder()
+    segment.wait_for_op()
+    bench.start_dds()
+    program = str(live.BIN / "ecdaq-sync0")
+    segment.start("sync0", program, *segment.options(), *edges, "--set", "sync0.window=1s")
+
+    def has_result() -> bool:
+        said = segment.ecdaq("sync0", "--json", check=False)
+        return said.returncode == 0 and json.loads(said.stdout)["windows"] > 0
+
+    live.wait_for("a window of ecdaq-sync0", has_result, 60)
+
+
 def test_only_who_has_a_key_hears_and_only_a_commanders_key_commands(
     make_bench: Callable[..., Bench], store: Path, tmp_path: Path
 ) -> None:
     bench = make_bench(**SECURED, **{"dds.security": str(store / "appliance")})
-    bench.start_all()
+    check_sync0(bench)
     assert "DDS Security as CN=appliance, until 20" in bench.segment.log("dds")
+    assert "older" not in bench.segment.log("dds")
 
     friends = {
         "alice": start(bench, "alice", store / "alice", PATIENCE_S),
         "bob": start(bench, "bob", store / "bob", PATIENCE_S, LED, "1"),
     }
     alice, bob = (result(bench, name, process) for name, process in friends.items())
-    assert alice["samples"] > 100
+    assert alice["samples"] > 100 and alice["results"] > 0, alice
     assert bob["accepted"] and bob["samples"] > 100, bob
 
     other = tmp_path / "other"
@@ -80,7 +101,8 @@ def test_only_who_has_a_key_hears_and_only_a_commanders_key_commands(
     assert (mallory["writer"], mallory["answered"], mallory["accepted"]) == (0, 0, 0)
     # Without keys, or with those of another store, one hears nothing and is not heard.
     for stranger in (eve, fake):
-        assert (stranger["samples"], stranger["answered"], stranger["accepted"]) == (0, 0, 0)
+        assert (stranger["samples"], stranger["results"]) == (0, 0)
+        assert (stranger["answered"], stranger["accepted"]) == (0, 0)
 
     status = json.loads(bench.segment.ecdaq("status", "--json").stdout)["dds"]
     assert (status["secure"], status["commands"]) == (True, True)
@@ -143,3 +165,36 @@ def test_keys_that_are_not_fit_are_one_clear_line(
     assert ended.stderr.count("\n") == 1
     assert ended.stderr.startswith("ecdaq-dds: dds.security: ")
     assert reason in ended.stderr
+
+
+def forget_sync0(store: Path) -> None:
+    """The appliance's permissions as they were before there was ecdaq/sync0."""
+    signed = store / "appliance" / "permissions.p7s"
+    text = signed.read_text()
+    xml = text[text.index("<?xml") : text.index("</dds>") + 7]
+    line = "          <topic>ecdaq/sync0</topic>\n"
+    assert line in xml
+    ca = store / "ca" / "permissions_ca"
+    subprocess.run(
+        [
+            "openssl", "smime", "-sign", "-text", "-signer", f"{ca}.cert.pem",
+            "-inkey", f"{ca}.key.pem", "-out", str(signed),
+        ],
+        input=xml.replace(line, ""), text=True, capture_output=True, check=True,
+    )  # fmt: skip
+
+
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl to make old keys with")
+def test_keys_from_before_a_topic_are_told_and_all_else_is_published(
+    make_bench: Callable[..., Bench], tmp_path: Path
+) -> None:
+    folder = tmp_path / "store"
+    security("init", "--dir", str(folder))
+    security("add-subscriber", "alice", "--dir", str(folder))
+    forget_sync0(folder)
+    bench = make_bench(**{"dds.security": str(folder / "appliance")})
+    check_sync0(bench)
+    assert "these keys are older than ecdaq/sync0" in bench.segment.log("dds")
+    alice = result(bench, "alice", start(bench, "alice", folder / "alice", PATIENCE_S))
+    assert alice["samples"] > 100
+    assert alice["results"] == 0
