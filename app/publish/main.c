@@ -123,15 +123,8 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
 static int configure(const struct arguments *a, struct config *cfg)
 {
 	char error[ERROR_BYTES] = "";
-	int r = 0;
+	int r = config_assemble(a->config_path, a->set, a->set_count, cfg, error, sizeof(error));
 
-	config_defaults(cfg);
-	if (a->config_path != NULL) {
-		r = config_load(a->config_path, cfg, error, sizeof(error));
-	}
-	for (size_t i = 0; r == 0 && i < a->set_count; i++) {
-		r = config_set(cfg, a->set[i], error, sizeof(error));
-	}
 	if (r == 0) {
 		r = config_check(cfg, error, sizeof(error));
 	}

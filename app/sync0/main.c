@@ -176,15 +176,8 @@ static int put_path(char *field, size_t field_bytes, const char *option, const c
 static int configure(const struct arguments *a, struct config *cfg)
 {
 	char error[ERROR_BYTES] = "";
-	int r = 0;
+	int r = config_assemble(a->config_path, a->set, a->set_count, cfg, error, sizeof(error));
 
-	config_defaults(cfg);
-	if (a->config_path != NULL) {
-		r = config_load(a->config_path, cfg, error, sizeof(error));
-	}
-	for (size_t i = 0; r == 0 && i < a->set_count; i++) {
-		r = config_set(cfg, a->set[i], error, sizeof(error));
-	}
 	if (r == 0) {
 		r = config_check(cfg, error, sizeof(error));
 	}
