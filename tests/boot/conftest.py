@@ -50,7 +50,8 @@ def machine(
     failed_before = request.session.testsfailed
     try:
         vm.lay_boot_files(files)
-        vm.start(options=vm.wire_options() if getattr(module, "WIRE", False) else ())
+        devices = getattr(module, "DEVICES", ())
+        vm.start(options=vm.wire_options() if getattr(module, "WIRE", False) else devices)
         vm.wait_for_login()
         yield vm
     finally:

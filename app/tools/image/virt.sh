@@ -9,7 +9,7 @@
 #        1/N of the time to the next timer is spent, N being the number of processors. With two, one
 #        waits up to half a cycle for the other. So N is 16, of which Linux uses two (nr_cpus=2; the
 #        others are never started), and the turns are short.
-# A reset, be it the watchdog's, ends QEMU (-no-reboot).
+# A reset ends QEMU (-no-reboot).
 # ECDAQ_APPEND adds words to the kernel's command line.
 set -eu
 
@@ -36,4 +36,4 @@ shift 2
 exec "$here/qemu.sh" "$folder" qemu-system-aarch64 -M virt,gic-version=3 -cpu cortex-a72 -m 1024 $timing \
 	-no-reboot -kernel vmlinux -append "$append" \
 	-drive file=disk.img,if=none,format=raw,id=disk -device virtio-blk-pci,drive=disk,num-queues=1 \
-	-device virtio-rng-pci "$@" -device i6300esb
+	-device virtio-rng-pci "$@"
