@@ -62,6 +62,11 @@ void cycle_skip(struct cycle *cy, uint64_t count)
 	}
 }
 
+static uint64_t whole_periods(const struct cycle *cy, int64_t ns)
+{
+	return ns > 0 ? (uint64_t)(ns / cy->period.ns) : 0;
+}
+
 /*
  * Edges by which the number was behind when the frame was sent, though this master was not late:
  * the deadline is right as it is. Moved with the number, it would pass one more edge in every
@@ -70,13 +75,18 @@ void cycle_skip(struct cycle *cy, uint64_t count)
 static uint64_t passed_before_sending(const struct cycle *cy, const struct exchange_result *res)
 {
 	int64_t round_trip_ns = res->round_trip.ns > 0 ? res->round_trip.ns : 0;
+	int64_t late_ns = mono_sub(res->sent, cy->deadline).ns;
 	int64_t since_edge_ns = res->dc_time_ns - round_trip_ns -
 				numbering_dc_time(&cy->numbering, cy->sample.cycle);
-	uint64_t passed =
-		since_edge_ns > 0 ? (uint64_t)(since_edge_ns / cy->numbering.period_ns) : 0;
-	uint64_t late = numbering_skipped(cy->period.ns, cy->set_point_ns,
-					  mono_sub(res->sent, cy->deadline).ns);
+	uint64_t passed = whole_periods(cy, since_edge_ns);
+	uint64_t late = numbering_skipped(cy->period.ns, cy->set_point_ns, late_ns);
 
+	/* Locked, a punctual frame passes at the set point, half a period from being misjudged: one
+	 * that was sent just before an edge, and held up past it, is late. */
+	if (cy->servo.state == DC_LOCKED) {
+		return whole_periods(cy, since_edge_ns - late_ns - cy->set_point_ns +
+						 cy->period.ns / 2);
+	}
 	return passed > late ? passed - late : 0;
 }
 
@@ -97,7 +107,8 @@ int cycle_place(struct cycle *cy, const struct exchange_result *res)
 	}
 	if (place.passed_edges > 0) {
 		mono_t deadline = cy->deadline;
-		uint64_t moved = place.passed_edges - passed_before_sending(cy, res);
+		uint64_t behind = passed_before_sending(cy, res);
+		uint64_t moved = place.passed_edges > behind ? place.passed_edges - behind : 0;
 
 		cycle_skip(cy, place.passed_edges);
 		cy->deadline = mono_add(deadline, (span_t){ (int64_t)moved * cy->period.ns });

@@ -19,6 +19,7 @@ static struct {
 	enum exchange_status status;
 	int64_t dc_offset_ns; /* DC time minus host time */
 	int64_t transit_ns;
+	int64_t hold_ns; /* between the sending and the wire, in no round trip */
 	int is_timeless; /* the reference's time in the frame is not to be believed */
 	uint64_t slaves_low;
 	unsigned late;
@@ -52,7 +53,8 @@ struct exchange_result exchange_run(struct exchange *ex, uint8_t *image, mono_t 
 		world.now = deadline;
 		return res;
 	}
-	world.now.ns += world.transit_ns;
+	world.now.ns += world.hold_ns + world.transit_ns;
+	world.hold_ns = 0;
 	res.dc_time_ns = world.is_timeless ? 0 : world.now.ns + world.dc_offset_ns;
 	if (world.conversions_from_dc) {
 		world.counter[0] = (uint16_t)((world.now.ns + world.dc_offset_ns) / PERIOD_NS);
@@ -514,6 +516,20 @@ TEST(cycle, a_stall_found_at_the_wake_and_again_by_the_frame_is_one_overrun)
 	CHECK_EQ(stats.cycles_skipped, 3);
 	steps(3);
 	CHECK_EQ(stats.overruns, 1);
+}
+
+TEST(cycle, a_late_frame_that_is_held_past_the_next_edge_moves_the_deadline_with_the_number)
+{
+	start_in_op();
+	world.late_ns = 2 * PERIOD_NS + 480000;
+	world.hold_ns = 100000;
+	steps(1);
+	CHECK_EQ(stats.cycles_skipped, 3);
+	CHECK_EQ(stats.overruns, 1);
+	steps(200);
+	CHECK_EQ(stats.cycles_skipped, 3);
+	CHECK_EQ(stats.frames_late, 0);
+	CHECK_EQ(stats.samples_bad, 2 * 3);
 }
 
 TEST(cycle, a_number_behind_the_edges_is_set_right_once_and_the_deadline_stays)
