@@ -317,11 +317,17 @@ enum cli_exit verb_sync0(struct cli *cli, int argc, char **argv)
 	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
 		return result;
 	}
+	if (is_json && is_histogram) {
+		return cli_fail(cli, CLI_USAGE, "--json and --histogram: one of them");
+	}
 	if (args.operand_count == 0) {
 		return show(cli, is_json, is_histogram);
 	}
 	if (strcmp(args.operands[0], "calibrate") != 0) {
 		return cli_fail(cli, CLI_USAGE, "%s: is not calibrate", args.operands[0]);
+	}
+	if (is_json || is_histogram) {
+		return cli_fail(cli, CLI_USAGE, "calibrate has no --json and no --histogram");
 	}
 	return run_calibration(cli);
 }

@@ -132,6 +132,13 @@ static int check_slaves(const struct config *cfg, const char **ret_key, int *ret
 			snprintf(why, OPTION_WHY_BYTES, "must be less than one cycle.period");
 			return -EINVAL;
 		}
+		for (size_t j = 0; j < i && slave->sync0_line[0] != '\0'; j++) {
+			if (strcmp(slave->sync0_line, cfg->slave[j].sync0_line) == 0) {
+				*ret_key = "slaves[].sync0_line";
+				snprintf(why, OPTION_WHY_BYTES, "is that of slave %zu already", j);
+				return -EINVAL;
+			}
+		}
 		for (size_t j = 0; j < i && slave->name[0] != '\0'; j++) {
 			if (strcmp(slave->name, cfg->slave[j].name) == 0) {
 				*ret_key = "slaves[].name";

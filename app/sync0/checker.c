@@ -15,7 +15,8 @@ enum {
 	FAR_WINDOWS = 4,
 };
 
-#define MASTER_GONE_NS NS_PER_S /* do not wait longer for its samples */
+#define MASTER_GONE_NS NS_PER_S     /* do not wait longer for its samples */
+#define FINISH_NS (100 * NS_PER_MS) /* before its newest cycle: all edges have come */
 
 int checker_create(const struct checker_spec *spec, struct checker **ret_checker)
 {
@@ -113,15 +114,9 @@ struct window *checker_window(struct checker *ck, int64_t cycle)
 	return ck->window[number % OPEN_WINDOWS];
 }
 
-/* A clock has stepped: nothing that is counted in the open windows can be held against anyone. */
-void checker_clock_stepped(struct checker *ck, int64_t cycle, int64_t step_ns)
+/* Nothing that is counted in the open windows can be held against anyone. */
+static void disturb(struct checker *ck, int64_t cycle, int64_t step_ns)
 {
-	struct event ev = checker_event(ck, 0, EVENT_SYNC0_CLOCK_STEP, cycle);
-
-	ev.slave_pos = EVENT_NO_SLAVE;
-	ev.line = 0;
-	ev.arg[0] = alarm_clamp((double)step_ns);
-	checker_emit(ck, &ev);
 	for (size_t i = 0; i < ck->spec.line_count; i++) {
 		track_reset(&ck->line[i].track);
 		ck->line[i].has_last = 0;
@@ -135,6 +130,17 @@ void checker_clock_stepped(struct checker *ck, int64_t cycle, int64_t step_ns)
 			w->clock_step_cycle = cycle;
 		}
 	}
+}
+
+void checker_clock_stepped(struct checker *ck, int64_t cycle, int64_t step_ns)
+{
+	struct event ev = checker_event(ck, 0, EVENT_SYNC0_CLOCK_STEP, cycle);
+
+	ev.slave_pos = EVENT_NO_SLAVE;
+	ev.line = 0;
+	ev.arg[0] = alarm_clamp((double)step_ns);
+	checker_emit(ck, &ev);
+	disturb(ck, cycle, step_ns);
 }
 
 static void pair(struct checker *ck, const struct checker_cycle *cy)
@@ -165,8 +171,10 @@ static void have_origin(struct checker *ck, const struct checker_cycle *cy)
 {
 	int64_t origin_dc_ns = cy->due_dc_ns - cy->cycle * ck->spec.period_ns;
 
+	/* The master counts its cycles anew, and tells so itself; a clock that has stepped as well
+	 * is found by its frames. */
 	if (ck->has_origin && origin_dc_ns != ck->origin_dc_ns && grid_is_ready(ck->grid)) {
-		checker_clock_stepped(ck, cy->cycle, ck->origin_dc_ns - origin_dc_ns);
+		disturb(ck, cy->cycle, ck->origin_dc_ns - origin_dc_ns);
 	}
 	ck->has_origin = 1;
 	ck->origin_dc_ns = origin_dc_ns;
@@ -274,11 +282,17 @@ void checker_advance(struct checker *ck, int64_t mono_ns)
 void checker_finish(struct checker *ck)
 {
 	struct track_out out;
+	int64_t newest_ns;
 
 	if (!grid_is_ready(ck->grid) || !ck->has_base) {
 		return;
 	}
+	newest_ns = grid_mono_ns(ck->grid, grid_due_dc_ns(ck->grid, ck->newest_cycle));
 	for (size_t i = 0; i < ck->spec.line_count; i++) {
+		if (ck->spec.line[i].mode == CHECKER_ONESHOT) {
+			checker_look_at_shots(ck, i, newest_ns - FINISH_NS);
+			continue;
+		}
 		track_finish(&ck->line[i].track, ck->grid, &out);
 		checker_take(ck, i, &out);
 	}

@@ -83,10 +83,22 @@ static int parse_cycle(const int64_t *v, int count, struct edge_item *ret)
 	return 0;
 }
 
+static int parse_shot(const int64_t *v, int count, struct edge_item *ret)
+{
+	if (count != 3 || v[0] < 0 || v[0] >= LIMIT_SLAVES || v[1] < 0 || v[2] < 0) {
+		return -EINVAL;
+	}
+	*ret = (struct edge_item){
+		.kind = EDGE_ITEM_SHOT,
+		.shot = { .slave_pos = (uint16_t)v[0], .at_dc_ns = v[1], .due_dc_ns = v[2] }
+	};
+	return 0;
+}
+
 int edge_line_parse(const char *line, struct edge_item *ret)
 {
 	int64_t value[FIELDS_MAX];
-	int is_cycle;
+	char first;
 	int count;
 
 	line += strspn(line, " \t\r\n");
@@ -94,12 +106,14 @@ int edge_line_parse(const char *line, struct edge_item *ret)
 		*ret = (struct edge_item){ .kind = EDGE_ITEM_NONE };
 		return 0;
 	}
-	is_cycle = *line == 'c';
-	count = parse_numbers(line + is_cycle, value);
+	first = *line;
+	count = parse_numbers(line + (first == 'c' || first == 's'), value);
 	if (count < 0) {
 		return count;
 	}
-	return is_cycle ? parse_cycle(value, count, ret) : parse_edge(value, count, ret);
+	return first == 'c'   ? parse_cycle(value, count, ret)
+	       : first == 's' ? parse_shot(value, count, ret)
+			      : parse_edge(value, count, ret);
 }
 
 /* From its start it is read more than once, which a pipe cannot. */

@@ -5,6 +5,7 @@
  *   SLAVE MONO_NS [DC_NS [SEQNO]]    as ecdaq-sim --edges writes them, and ecdaq-sync0 --dump
  *   c CYCLE DUE_DC_NS FRAME_DC_NS FRAME_MONO_NS LATENCY_NS DC_DIFF_NS JUDGED
  *                                    what the master said of a cycle (--dump)
+ *   s SLAVE AT_DC_NS DUE_DC_NS       the time of its one-shot was set (--dump); checker_shot()
  *   # comment
  *
  * Nothing in it is trusted. Context: blocking.
@@ -17,12 +18,19 @@
 #include "sync0/checker.h"
 #include "sync0/edge.h"
 
-enum edge_item_kind { EDGE_ITEM_NONE, EDGE_ITEM_EDGE, EDGE_ITEM_CYCLE };
+enum edge_item_kind { EDGE_ITEM_NONE, EDGE_ITEM_EDGE, EDGE_ITEM_CYCLE, EDGE_ITEM_SHOT };
+
+struct edge_shot {
+	uint16_t slave_pos;
+	int64_t at_dc_ns;
+	int64_t due_dc_ns;
+};
 
 struct edge_item {
 	enum edge_item_kind kind;
 	struct edge edge; /* its line is the slave's position */
 	struct checker_cycle cycle;
+	struct edge_shot shot;
 };
 
 /** Take a line apart. 0, or -EINVAL (ret untouched). */

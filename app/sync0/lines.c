@@ -15,6 +15,7 @@ struct one_line {
 	struct gpio *gpio; /* NULL: not open */
 	uint16_t slave_pos;
 	const char *text;
+	int error;
 	char said[GPIO_WHY_BYTES];
 };
 
@@ -79,6 +80,11 @@ int lines_is_open(const struct lines *l, size_t line)
 	return l->line[line].gpio != NULL;
 }
 
+int lines_error(const struct lines *l, size_t line)
+{
+	return l->line[line].error;
+}
+
 int lines_is_hte(const struct lines *l, size_t line)
 {
 	return l->line[line].gpio != NULL && gpio_is_hte(l->line[line].gpio);
@@ -113,7 +119,8 @@ size_t lines_open(struct lines *l, lines_tell tell, void *ctx)
 			open++;
 			continue;
 		}
-		if (gpio_open(&spec, &ol->gpio, why) < 0) {
+		ol->error = gpio_open(&spec, &ol->gpio, why);
+		if (ol->error < 0) {
 			ol->gpio = NULL;
 			complain(l, i, why, tell, ctx);
 			continue;
@@ -162,6 +169,7 @@ void lines_read(struct lines *l, void (*take)(void *ctx, const struct edge *edge
 		if (l->line[i].gpio != NULL && read_line(l, i, take, ctx) < 0) {
 			gpio_close(l->line[i].gpio);
 			l->line[i].gpio = NULL;
+			l->line[i].error = -ENODEV;
 			complain(l, i, "its chip is gone", tell, ctx);
 		}
 	}

@@ -22,6 +22,8 @@ size_t lines_count(const struct lines *l);
 uint16_t lines_slave(const struct lines *l, size_t line);
 const char *lines_text(const struct lines *l, size_t line);
 int lines_is_open(const struct lines *l, size_t line);
+/** Why it is not: what gpio_open() said last, or -ENODEV: its chip is gone. */
+int lines_error(const struct lines *l, size_t line);
 int lines_is_hte(const struct lines *l, size_t line);
 /** Open what is not open. Returns how many are. */
 size_t lines_open(struct lines *l, lines_tell tell, void *ctx);

@@ -27,7 +27,7 @@ static void on_line(void *ctx, size_t line, const char *why)
 {
 	struct listening *ls = ctx;
 
-	if (why != NULL && line < 2) {
+	if (why != NULL && line < 2 && ls->said[0] == '\0') {
 		snprintf(ls->said, sizeof(ls->said), "line '%.90s' of slave %u: %.120s",
 			 lines_text(ls->lines, line), lines_slave(ls->lines, line), why);
 	}
@@ -97,9 +97,14 @@ static int listen_to(struct listening *ls, const struct config *cfg,
 	lines_open(ls->lines, on_line, ls);
 	if (!lines_is_open(ls->lines, 0) || !lines_is_open(ls->lines, 1)) {
 		snprintf(why, WHY_BYTES, "%s", ls->said);
-		return -EBUSY;
+		return lines_error(ls->lines, lines_is_open(ls->lines, 0) ? 1 : 0);
 	}
 	collect(ls, has_stopped);
+	if (*has_stopped) {
+		snprintf(why, WHY_BYTES, "stopped after %zu and %zu of %d edges: nothing is stored",
+			 ls->count[0], ls->count[1], EDGES);
+		return -EINTR;
+	}
 	return compute(ls, cfg, out, why);
 }
 

@@ -10,7 +10,7 @@
 
 /**
  * Listen to the first two lines of @cfg until there are enough edges, compute, tell @out and store.
- * Ends early when *@has_stopped. 0, or -errno with a line in @why (512).
+ * 0, or -errno with a line in @why (512): -EINTR: *@has_stopped, nothing is stored.
  */
 int listen_calibrate(const struct config *cfg, const char *dev_dir,
 		     const volatile sig_atomic_t *has_stopped, FILE *out, char *why);

@@ -160,6 +160,23 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
 	return 0;
 }
 
+static int do_fit(const struct arguments *a)
+{
+	const char *said = NULL;
+
+	if (a->is_json && a->replay == NULL) {
+		said = "--json is for --replay (else: ecdaq sync0 --json)";
+	} else if (a->dump != NULL && (a->replay != NULL || a->is_calibrate)) {
+		said = "--dump does not go with --replay or --calibrate";
+	} else if (a->edges != NULL && (a->replay != NULL || a->is_calibrate)) {
+		said = "--edges does not go with --replay or --calibrate";
+	}
+	if (said != NULL) {
+		fprintf(stderr, "ecdaq-sync0: %s\n", said);
+	}
+	return said == NULL;
+}
+
 static int put_path(char *field, size_t field_bytes, const char *option, const char *value)
 {
 	if (value == NULL) {
@@ -299,6 +316,9 @@ int main(int argc, char **argv)
 	struct arguments arguments = { .dev_dir = "/dev" };
 
 	if (parse_arguments(argc, argv, &arguments) < 0) {
+		return STATUS_USAGE;
+	}
+	if (!do_fit(&arguments)) {
 		return STATUS_USAGE;
 	}
 	if (arguments.is_help || arguments.is_version) {

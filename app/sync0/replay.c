@@ -17,6 +17,7 @@ enum { WHY_BYTES = 512, ADVANCE_EDGES = 64 };
 /* What the file holds, seen in a first pass. */
 struct contents {
 	uint64_t edges[LIMIT_SLAVES];
+	uint64_t shots[LIMIT_SLAVES];
 	uint64_t cycles;
 	int64_t first_ns;
 	int64_t cycle_first; /* with its due time, and the last one: they give the period */
@@ -91,6 +92,8 @@ static void look(void *ctx, const struct edge_item *item)
 	if (item->kind == EDGE_ITEM_EDGE) {
 		c->edges[item->edge.line]++;
 		c->first_ns = c->first_ns == 0 ? item->edge.mono_ns : c->first_ns;
+	} else if (item->kind == EDGE_ITEM_SHOT) {
+		c->shots[item->shot.slave_pos]++;
 	} else if (c->cycles++ == 0) {
 		c->cycle_first = item->cycle.cycle;
 		c->cycle_first_dc_ns = item->cycle.due_dc_ns;
@@ -109,6 +112,11 @@ static void feed(void *ctx, const struct edge_item *item)
 		checker_cycle(run->checker, &item->cycle);
 		return;
 	}
+	if (item->kind == EDGE_ITEM_SHOT) {
+		checker_shot(run->checker, run->line_of_slave[item->shot.slave_pos] - 1,
+			     item->shot.at_dc_ns, item->shot.due_dc_ns);
+		return;
+	}
 	edge.line = (uint16_t)(run->line_of_slave[edge.line] - 1);
 	checker_edge(run->checker, &edge);
 	/* Lines are written in bunches, one after the other: look back a little. */
@@ -124,6 +132,25 @@ static int has_config_period(const struct contents *c, int64_t *ret_period_ns)
 	}
 	*ret_period_ns = (c->cycle_last_dc_ns - c->cycle_first_dc_ns) / cycles;
 	return 1;
+}
+
+static void fill_lines(struct replay_run *run, const struct contents *c, struct checker_spec *spec)
+{
+	const struct config *cfg = run->spec->cfg;
+
+	for (uint16_t pos = 0; pos < LIMIT_SLAVES; pos++) {
+		int is_oneshot = c->shots[pos] > 0 || config_is_oneshot(cfg, pos);
+
+		if (c->edges[pos] + c->shots[pos] == 0) {
+			continue;
+		}
+		run->line_of_slave[pos] = spec->line_count + 1;
+		spec->line[spec->line_count++] = (struct checker_line){
+			.slave_pos = pos,
+			.mode = is_oneshot ? CHECKER_ONESHOT : CHECKER_PERIODIC,
+			.shift_ns = cfg->slave[pos].sync0_shift_ns,
+		};
+	}
 }
 
 static struct checker_spec spec_of(struct replay_run *run, const struct contents *c)
@@ -151,14 +178,7 @@ static struct checker_spec spec_of(struct replay_run *run, const struct contents
 	if (calibration_load(cfg->sync0_calibration, &calibration) == 0) {
 		spec.noise = calibration.noise;
 	}
-	for (uint16_t pos = 0; pos < LIMIT_SLAVES; pos++) {
-		if (c->edges[pos] > 0) {
-			run->line_of_slave[pos] = spec.line_count + 1;
-			spec.line[spec.line_count++] =
-				(struct checker_line){ .slave_pos = pos,
-						       .shift_ns = cfg->slave[pos].sync0_shift_ns };
-		}
-	}
+	fill_lines(run, c, &spec);
 	return spec;
 }
 

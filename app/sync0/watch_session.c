@@ -214,6 +214,10 @@ static void take_cycle(struct watch *w, const struct master_item *item)
 	}
 	checker_cycle(w->checker, cy);
 	for (size_t i = 0; i < item->shots; i++) {
+		if (w->spec.dump != NULL) {
+			fprintf(w->spec.dump, "s %u %" PRId64 " %" PRId64 "\n",
+				item->shot[i].slave_pos, cy->due_dc_ns, item->shot[i].dc_ns);
+		}
 		checker_shot(w->checker, w->line_of_slave[item->shot[i].slave_pos] - 1,
 			     cy->due_dc_ns, item->shot[i].dc_ns);
 	}

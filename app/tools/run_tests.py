@@ -33,7 +33,7 @@ IMAGES = ("qemuarm64", "raspberrypi4-64")
 # What two threads share, and how they hand it over: these run under ThreadSanitizer.
 SHARED_STATE_TESTS = r"^(ring|line|board|handover|status|histogram)[._]"
 CONTROL_TESTS = r"^(control|sim_control|sim_loopback)[.]"
-SYNC0_TESTS = r"^sync0(_gpio)?\."
+SYNC0_TESTS = r"^sync0(_gpio|_watch)?\."
 
 
 @dataclass(frozen=True)
@@ -253,7 +253,12 @@ GROUPS: dict[str, list[Suite]] = {
     "sync0": [
         Suite("sync0 release", "release", run_ctest, ("-R", SYNC0_TESTS)),
         Suite("sync0 cli python", "release", run_pytest, ("tests/cli", "-k", "test_sync0")),
-        Suite("sync0 live python", "release", run_pytest, ("tests/live", "-k", "test_sync0")),
+        Suite(
+            "sync0 live python",
+            "release",
+            run_pytest,
+            ("tests/live", "-k", "test_sync0 or test_oneshot"),
+        ),
     ],
     "boot": [replace(pytest("boot", "release", "-s"), seconds=BOOT_SECONDS, images=IMAGES)],
 }

@@ -97,6 +97,31 @@ def test_a_missing_pulse_is_named_by_slave_and_cycle(tmp_path: Path) -> None:
     assert "! slave 2, line 2: cycle 5000: SYNC0 missing, 1 in a row" in got.stdout
 
 
+def shots(cycles: int, due: list[int], came: list[int]) -> Iterable[str]:
+    """A dump: slave 0 is periodic, slave 1 in one-shot mode."""
+    for cycle in range(cycles):
+        dc, at = 845 * 10**15 + cycle * PERIOD, START + cycle * PERIOD
+        yield f"c {cycle} {dc} {dc + 500_000} {at + 500_000} 10000 12 1"
+        yield from (f"s 1 {dc} {845 * 10**15 + d * PERIOD}" for d in due if d == cycle + 100)
+        yield f"0 {at} 0 {cycle + 1}"
+        yield from (f"1 {at} 0 {n + 1}" for n, c in enumerate(came) if c == cycle)
+
+
+def test_recorded_shots_are_judged_by_their_commands(tmp_path: Path) -> None:
+    file = tmp_path / "dump"
+    file.write_text("\n".join(shots(12000, due=[2000, 5000, 11500], came=[2000, 11500])) + "\n")
+    got = check("--replay", str(file), "--json")
+    assert got.returncode == BAD, got.stderr
+    said = [json.loads(line) for line in got.stdout.splitlines()]
+    told = [(m["event"], m["value"] - 845 * 10**15) for m in said if "event" in m]
+    lost = ("sync0_shot_lost", 5000 * PERIOD)
+    shot = [("sync0_shot", c * PERIOD) for c in (2000, 11500)]
+    assert told == [shot[0], lost, shot[1]]
+    assert [(m["slave"], m["edges"], m["missing"]) for m in windows(got.stdout)] == [(0, 10000, 0)]
+    file.write_text("\n".join(shots(12000, due=[2000], came=[2000])) + "\n")
+    assert check("--replay", str(file)).returncode == 0
+
+
 def test_an_empty_or_foreign_file_is_refused_in_one_line(tmp_path: Path) -> None:
     one_line(check("--replay", str(tmp_path / "none")), FAILED, "No such file")
     (tmp_path / "empty").write_text("# nothing\n")
@@ -118,6 +143,11 @@ def test_mistakes_on_the_command_line_are_one_line(tmp_path: Path) -> None:
     one_line(check("--nonsense"), USAGE, "--nonsense")
     one_line(check("word"), USAGE, "takes no operand")
     one_line(check("--replay"), USAGE, "needs a value")
+    one_line(check("--json"), USAGE, "--json is for --replay")
+    one_line(check("--replay", "x", "--dump", "y"), USAGE, "--dump does not go with")
+    one_line(check("--calibrate", "--edges", "y"), USAGE, "--edges does not go with")
+    same = ["--set", "slaves[0].sync0_line=A", "--set", "slaves[1].sync0_line=A"]
+    one_line(check(*same), CONFIG, "sync0_line: is that of slave 0 already")
     one_line(check("--set", "sync0.windw=1s"), CONFIG, "sync0.window")
     one_line(check("--set", "sync0.window=1h"), CONFIG, "sync0.window")
     one_line(check("--set", "sync0.enable=on"), CONFIG, "slaves[].sync0_line")
@@ -166,6 +196,8 @@ def test_a_line_that_cannot_be_had_is_said_once_and_waited_for(run_dir: Path) ->
 def test_without_ecdaq_sync0_the_verb_says_so(run_dir: Path) -> None:
     fails(ecdaq(run_dir, "sync0"), NO_DAEMON, "is ecdaq-sync0 running?")
     fails(ecdaq(run_dir, "sync0", "measure"), USAGE, "calibrate")
+    fails(ecdaq(run_dir, "sync0", "--json", "--histogram"), USAGE, "one of them")
+    fails(ecdaq(run_dir, "sync0", "calibrate", "--json"), USAGE, "no --json")
 
 
 def test_a_calibration_needs_two_lines(tmp_path: Path) -> None:
@@ -175,7 +207,7 @@ def test_a_calibration_needs_two_lines(tmp_path: Path) -> None:
     assert got.returncode != 0 and "the same signal on two lines" in got.stderr
     config.write_text("slaves:\n  - sync0_line: x-none:1\n  - sync0_line: x-none:2\n")
     got = ecdaq(None, "--config", str(config), "sync0", "calibrate")
-    assert got.returncode != 0 and got.stderr.count("\n") == 1
+    assert got.returncode == FAILED and got.stderr.count("\n") == 1
     assert "line 'x-none:" in got.stderr
 
 

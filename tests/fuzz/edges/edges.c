@@ -36,6 +36,9 @@ static void feed(struct checker *ck, struct edge_item *item)
 {
 	if (item->kind == EDGE_ITEM_CYCLE) {
 		checker_cycle(ck, &item->cycle);
+	} else if (item->kind == EDGE_ITEM_SHOT) {
+		checker_shot(ck, item->shot.slave_pos % LINES, item->shot.at_dc_ns,
+			     item->shot.due_dc_ns);
 	} else if (item->kind == EDGE_ITEM_EDGE) {
 		item->edge.line %= LINES;
 		checker_edge(ck, &item->edge);

@@ -30,6 +30,8 @@ TEST(config, options_that_do_not_fit_to_each_other_blame_a_line_of_the_file)
 		    "t.yaml:2: bus.presence: exact wants slaves to be listed");
 	parse_fails("slaves:\n- name: a\n- name: a\n",
 		    "t.yaml:3: slaves[].name: slaves 0 and 1 are both called a");
+	parse_fails("slaves:\n- sync0_line: GPIO17\n- {}\n- sync0_line: GPIO17\n",
+		    "t.yaml:4: slaves[].sync0_line: is that of slave 0 already");
 	parse_fails("slaves:\n- sync0_shift: 1ms\n",
 		    "t.yaml:2: slaves[].sync0_shift: must be less than one cycle.period");
 	parse_fails("outputs:\n- { channel: a, min: 1, max: 0, fail_safe: 1 }\n",

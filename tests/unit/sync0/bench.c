@@ -107,7 +107,7 @@ static void give_cycle(struct bench *b)
 	int64_t due_ns = BENCH_DC0_NS + b->cycle * BENCH_PERIOD_NS;
 	int64_t frame_ns = due_ns + BENCH_PERIOD_NS / 2;
 	struct checker_cycle cy = {
-		.cycle = b->cycle,
+		.cycle = b->cycle + b->number_step,
 		.due_dc_ns = due_ns,
 		.frame_dc_ns = frame_ns,
 		.frame_mono_ns = bench_mono_ns(b, frame_ns),

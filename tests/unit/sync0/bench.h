@@ -32,6 +32,7 @@ struct bench {
 	int64_t cycle;                /* next */
 	/* Called for each edge; it may change it, and give others itself. */
 	enum bench_fate (*alter)(struct bench *b, unsigned line, int64_t cycle, struct edge *edge);
+	int64_t number_step;  /* added to the master's cycle numbers from now on */
 	int64_t host_step_ns; /* added to all the host's times from now on */
 	uint32_t seqno[BENCH_LINES];
 	/* what came */

@@ -366,6 +366,28 @@ TEST(sync0, a_clock_that_steps_is_told_as_that_and_no_slave_is_blamed)
 	bench_destroy(b);
 }
 
+TEST(sync0, cycles_that_are_numbered_anew_are_no_clock_that_stepped)
+{
+	struct bench *b = noisy();
+
+	bench_start(b);
+	bench_run(b, 3500);
+	b->number_step = 1;
+	bench_run(b, 6700);
+	if (b->events != 0) {
+		bench_show(b);
+	}
+	CHECK_EQ(b->events, 0);
+	for (unsigned i = 0; i < b->results; i++) {
+		CHECK(b->result[i].verdict != SYNC0_FAIL);
+	}
+	CHECK_EQ(b->result[b->results - 1].verdict, SYNC0_OK);
+	CHECK_EQ(b->result[b->results - 1].edges, 1000);
+	CHECK(llabs(b->result[b->results - 1].phase_ns) <=
+	      b->result[b->results - 1].phase_error_ns);
+	bench_destroy(b);
+}
+
 TEST(sync0, edges_alone_are_counted_without_a_master)
 {
 	struct bench *b = noisy();

@@ -29,6 +29,11 @@ TEST(sync0, a_line_of_edges_is_slave_time_dc_time_and_number)
 	CHECK_EQ(item.cycle.frame_mono_ns, 2500);
 	CHECK_EQ(item.cycle.dc_diff_ns, -1);
 	CHECK_EQ(item.cycle.is_judged, 1);
+	CHECK_EQ(edge_line_parse("s 63 1000 0", &item), 0);
+	CHECK_EQ(item.kind, EDGE_ITEM_SHOT);
+	CHECK_EQ(item.shot.slave_pos, 63);
+	CHECK_EQ(item.shot.at_dc_ns, 1000);
+	CHECK_EQ(item.shot.due_dc_ns, 0);
 }
 
 TEST(sync0, a_line_that_is_none_is_refused_and_leaves_the_output_untouched)
@@ -55,6 +60,11 @@ TEST(sync0, a_line_that_is_none_is_refused_and_leaves_the_output_untouched)
 		"0 9223372036854775807",
 		"0 99999999999999999999",
 		"cc 1 2 3 4 5 6 1",
+		"s 1 2",
+		"s 64 2 3",
+		"s 1 2 3 4",
+		"s 1 -2 3",
+		"sc 1 2 3",
 	};
 
 	for (size_t i = 0; i < sizeof(bad) / sizeof(bad[0]); i++) {

@@ -4,10 +4,13 @@
 
 #include <errno.h>
 #include <gpiod.h>
+#include <stdio.h>
+#include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "harness/test.h"
+#include "sync0/listen.h"
 #include "unit/sync0/fake_gpiod.h"
 
 static char why[GPIO_WHY_BYTES];
@@ -32,6 +35,17 @@ static const char *dev_with(unsigned chips)
 	return dir;
 }
 
+static void remove_dev(const char *dir, unsigned chips)
+{
+	for (unsigned i = 0; i < chips; i++) {
+		char path[96];
+
+		snprintf(path, sizeof(path), "%s/gpiochip%u", dir, i);
+		unlink(path);
+	}
+	rmdir(dir);
+}
+
 static int open_with(const char *line, unsigned chips, enum config_edge_clock clock)
 {
 	const struct gpio_spec spec = {
@@ -39,13 +53,7 @@ static int open_with(const char *line, unsigned chips, enum config_edge_clock cl
 	};
 	int r = gpio_open(&spec, &gpio, why);
 
-	for (unsigned i = 0; i < chips; i++) {
-		char path[96];
-
-		snprintf(path, sizeof(path), "%s/gpiochip%u", spec.dev_dir, i);
-		unlink(path);
-	}
-	rmdir(spec.dev_dir);
+	remove_dev(spec.dev_dir, chips);
 	return r;
 }
 
@@ -151,4 +159,35 @@ TEST(sync0_gpio, a_chip_that_fails_to_be_read_is_told)
 	fake_gpiod.read_error = ENODEV;
 	CHECK_EQ(gpio_read(gpio, edges, 4), -ENODEV);
 	gpio_close(gpio);
+}
+
+TEST(sync0_gpio, a_calibration_that_is_stopped_or_has_no_line_stores_nothing)
+{
+	static struct config cfg;
+	static char said[512];
+	static const volatile sig_atomic_t stopped = 1;
+	char error[256];
+	char dev[64];
+
+	fake_gpiod_reset();
+	config_defaults(&cfg);
+	CHECK_EQ(config_set(&cfg, "sync0.calibration=/nonexistent/c", error, sizeof(error)), 0);
+	CHECK_EQ(listen_calibrate(&cfg, "/dev", &stopped, stdout, said), -ENOENT);
+	CHECK_STR(said, "no slave has a line: set slaves[].sync0_line");
+	CHECK_EQ(config_set(&cfg, "slaves[0].sync0_line=pinctrl-test:1", error, sizeof(error)), 0);
+	CHECK_EQ(listen_calibrate(&cfg, "/dev", &stopped, stdout, said), -EINVAL);
+	CHECK(strstr(said, "wants the same signal on two lines") != NULL);
+	CHECK_EQ(config_set(&cfg, "slaves[1].sync0_line=pinctrl-test:2", error, sizeof(error)), 0);
+	snprintf(dev, sizeof(dev), "%s", dev_with(1));
+	CHECK_EQ(listen_calibrate(&cfg, dev, &stopped, stdout, said), -EINTR);
+	CHECK_STR(said, "stopped after 0 and 0 of 10000 edges: nothing is stored");
+	fake_gpiod.request_error = EBUSY;
+	fake_gpiod.consumer = "w1-gpio";
+	CHECK_EQ(listen_calibrate(&cfg, dev, &stopped, stdout, said), -EBUSY);
+	CHECK_STR(said, "line 'pinctrl-test:1' of slave 0: already used by w1-gpio");
+	fake_gpiod.request_error = EPERM;
+	CHECK_EQ(listen_calibrate(&cfg, dev, &stopped, stdout, said), -EACCES);
+	remove_dev(dev, 1);
+	CHECK_EQ(listen_calibrate(&cfg, dev, &stopped, stdout, said), -ENOENT);
+	CHECK_EQ(fake_gpiod.live, 0);
 }
