@@ -116,7 +116,7 @@ static int busy(const struct output *out, char *why)
 		snprintf(pid, sizeof(pid), " (pid %" PRId64 ")", page->pid);
 		status_unmap(page, sizeof(*page));
 	}
-	snprintf(why, OUTPUT_WHY_BYTES, "%.200s: another ecdaq-sync0 is running here%s",
+	snprintf(why, OUTPUT_WHY_BYTES, "%.170s: another ecdaq-sync0 is running here%s",
 		 out->lock_path, pid);
 	return -EBUSY;
 }
