@@ -228,6 +228,7 @@ struct collected {
 	size_t room;
 	uint16_t slave[2];
 	unsigned lines;
+	int is_backwards; /* a time before that of the edge before */
 };
 
 static void collect(void *ctx, const struct edge_item *item)
@@ -246,6 +247,8 @@ static void collect(void *ctx, const struct edge_item *item)
 		c->lines = n + 1;
 	}
 	if (n < 2 && c->count[n] < c->room) {
+		c->is_backwards |=
+			c->count[n] > 0 && item->edge.mono_ns < c->at_ns[n][c->count[n] - 1];
 		c->at_ns[n][c->count[n]++] = item->edge.mono_ns;
 	}
 }
@@ -267,6 +270,10 @@ int replay_calibrate(const char *path, const char *save_to, FILE *out, char *why
 	c.at_ns[0] = calloc(c.room + 1, sizeof(int64_t));
 	c.at_ns[1] = calloc(c.room + 1, sizeof(int64_t));
 	r = c.at_ns[0] == NULL || c.at_ns[1] == NULL ? -ENOMEM : each(path, collect, &c, why);
+	if (r == 0 && c.is_backwards) {
+		snprintf(why, WHY_BYTES, "%.200s: the edges are not in order of time", path);
+		r = -EBADMSG;
+	}
 	if (r == 0) {
 		r = calibration_compute(c.at_ns[0], c.count[0], c.at_ns[1], c.count[1],
 					&calibration, why);

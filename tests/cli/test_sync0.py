@@ -133,6 +133,8 @@ def test_an_empty_or_foreign_file_is_refused_in_one_line(tmp_path: Path) -> None
     one_line(check("--replay", short, "--calibrate"), FAILED, "too few")
     one_line(check("--replay", str(tmp_path)), FAILED, "Is a directory")
     one_line(check("--replay", "/dev/null"), FAILED, "no regular file")
+    mixed = write(tmp_path / "mixed", sorted(edges(2000), key=lambda e: e[1] % 7))
+    one_line(check("--replay", mixed, "--calibrate"), FAILED, "not in order of time")
     same = write(tmp_path / "same", edges(2000))
     nowhere = f"sync0.calibration={tmp_path / 'none' / 'calibration'}"
     unsaved = check("--replay", same, "--calibrate", "--set", nowhere)
