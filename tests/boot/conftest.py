@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
-from machine import IMAGE, NAME, Machine, Space
+from machine import AHEAD, IMAGE, NAME, Machine, Space
 
 KEEP = Path(__file__).resolve().parents[2] / "build" / "test-logs"
 
@@ -50,8 +50,10 @@ def machine(
     failed_before = request.session.testsfailed
     try:
         vm.lay_boot_files(files)
-        devices = getattr(module, "DEVICES", ())
-        vm.start(options=vm.wire_options() if getattr(module, "WIRE", False) else devices)
+        if getattr(module, "WIRE", False):
+            vm.start(options=vm.wire_options(), ahead=AHEAD)
+        else:
+            vm.start(**getattr(module, "START", {}))
         vm.wait_for_login()
         yield vm
     finally:

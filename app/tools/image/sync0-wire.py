@@ -125,9 +125,11 @@ def carry(pipe: TextIO, pins: Pins, line_of: dict[int, int], log: TextIO | None)
         line = line_of.get(slave)
         if line is None:
             continue
+        began_ns = time.monotonic_ns()
         pins.pulse(line)
         if log is not None:
-            print(slave, at_ns, dc_ns, time.monotonic_ns() - at_ns, file=log, flush=True)
+            times = (at_ns, dc_ns, began_ns, time.monotonic_ns())
+            print(slave, *times, file=log, flush=True)
 
 
 def take_lines(text: str) -> dict[int, int]:
