@@ -22,6 +22,7 @@ struct edge_writer {
 /* Who reads a pipe wants each edge at once; one that is gone, or too slow, must not hold us. */
 static int set_up_pipe(struct edge_writer *ew)
 {
+	const struct sigaction ignore = { .sa_handler = SIG_IGN };
 	struct stat st;
 
 	if (fstat(fileno(ew->file), &st) < 0) {
@@ -31,7 +32,7 @@ static int set_up_pipe(struct edge_writer *ew)
 		return 0;
 	}
 	ew->pipe = fileno(ew->file);
-	signal(SIGPIPE, SIG_IGN);
+	sigaction(SIGPIPE, &ignore, NULL);
 	return fcntl(ew->pipe, F_SETFL, O_WRONLY | O_NONBLOCK) < 0 ? -errno : 0;
 }
 
