@@ -25,7 +25,15 @@ static void on_result(void *ctx, const struct sync0_result *r)
 
 static void on_event(void *ctx, const struct event *ev)
 {
-	output_event(((struct watch *)ctx)->out, ev);
+	struct watch *w = ctx;
+
+	/* No result tells of a pulse that is no shot's. */
+	if (ev->id == EVENT_SYNC0_EXTRA && ev->line > 0 &&
+	    output_page(w->out)->line[ev->line - 1].is_oneshot) {
+		atomic_fetch_add_explicit(&output_page(w->out)->line[ev->line - 1].extra,
+					  (uint64_t)ev->arg[0], memory_order_relaxed);
+	}
+	output_event(w->out, ev);
 }
 
 static void on_deviation(void *ctx, size_t line, int64_t ns)

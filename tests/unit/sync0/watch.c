@@ -279,3 +279,19 @@ TEST(sync0_watch, with_one_shot_slaves_alone_it_runs_and_tells_of_each)
 	CHECK_EQ(page()->alarms, 1);
 	end();
 }
+
+TEST(sync0_watch, a_pulse_that_nobody_asked_for_is_counted)
+{
+	begin();
+	set("slaves[0].mode=periodic");
+	set("slaves[1].mode=oneshot");
+	b.silent_from = 0;
+	start(NS_PER_MS);
+	run(1000);
+	fprintf(b.edges, "1 %lld 0\n", (long long)fake_mono_ns(b.fake.dc_ns) - 300);
+	run(3000);
+	CHECK_EQ(page()->line[1].extra, 1);
+	CHECK_EQ(page()->line[1].shots, 0);
+	CHECK_EQ(page()->line[0].extra, 0);
+	end();
+}
