@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import socket
 from collections.abc import Callable
@@ -137,3 +138,34 @@ def test_a_slave_that_loses_power_is_lost_and_the_check_may_die_without_harm(
     assert [e["slave"] for e in events] == [0]
     assert checked.report()["lines"][0]["lost"] is True
     assert segment.stop("sync0") == 0
+
+
+def test_a_pipe_takes_the_edges_and_its_reader_may_go_and_come_back(
+    make_segment: Callable[..., Segment],
+) -> None:
+    segment = make_segment()
+    pipe = segment.folder / "pipe"
+    os.mkfifo(pipe)
+
+    def read_edges(count: int) -> list[list[int]]:
+        with os.fdopen(os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)) as edges:
+            if "sim" not in segment.processes:
+                segment.start_sim("--edges", str(pipe))
+                segment.start_daemon()
+                segment.wait_for_op()
+            os.set_blocking(edges.fileno(), True)
+            lines = [edges.readline().split() for _ in range(count)]
+            # Where the last one ended to read, a line may be cut.
+            return [[int(word) for word in line] for line in lines[1:]]
+
+    first = read_edges(200)
+    before = segment.status()
+    segment.wait_for_cycles(100, 60)  # with nobody at the other end
+    second = read_edges(200)
+    after = segment.status()
+    for edges in (first, second):
+        assert {slave for slave, _, _ in edges} == {0, 1}
+        assert [at for _, at, _ in edges] == sorted(at for _, at, _ in edges)
+    assert second[0][1] > first[-1][1]
+    assert after["state"] == "OP"
+    assert after["pid"] == before["pid"]
