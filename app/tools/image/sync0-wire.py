@@ -121,7 +121,10 @@ def open_pipe(path: Path) -> TextIO:
 def carry(pipe: TextIO, pins: Pins, line_of: dict[int, int], log: TextIO | None) -> None:
     """Each edge to its line, until nobody writes any more."""
     for edge in pipe:
-        slave, at_ns, dc_ns = (int(word) for word in edge.split())
+        words = edge.split()
+        if len(words) != 3:
+            continue  # what another reader left of a line
+        slave, at_ns, dc_ns = (int(word) for word in words)
         line = line_of.get(slave)
         if line is None:
             continue
