@@ -12,11 +12,20 @@ enum {
 	MASTER_BEHIND = 16,
 	WINDOW_CYCLES_MIN = 16,
 	WINDOWS_AT_ONCE = 16,
-	FAR_WINDOWS = 4,
+	FAR_WINDOWS = 4, /* behind the open ones */
 };
 
 #define MASTER_GONE_NS NS_PER_S     /* do not wait longer for its samples */
+#define BUNCH_NS (5 * NS_PER_S / 2) /* of one line, before others and cycles are given */
 #define FINISH_NS (100 * NS_PER_MS) /* before its newest cycle: all edges have come */
+
+/* So many that a bunch does not close one before the others' edges are in it. */
+static int open_windows(const struct checker_spec *spec)
+{
+	int64_t n = 2 + BUNCH_NS / spec->window_ns;
+
+	return n < OPEN_WINDOWS ? (int)n : OPEN_WINDOWS;
+}
 
 int checker_create(const struct checker_spec *spec, struct checker **ret_checker)
 {
@@ -33,9 +42,10 @@ int checker_create(const struct checker_spec *spec, struct checker **ret_checker
 	}
 	ck->spec = *spec;
 	ck->window_cycles = (uint32_t)(spec->window_ns / spec->period_ns);
+	ck->open_windows = open_windows(spec);
 	ck->grid = grid_create(spec->period_ns);
 	r = ck->grid == NULL ? -ENOMEM : figures_room_create(ck->window_cycles, &ck->room);
-	for (int i = 0; r == 0 && i < OPEN_WINDOWS; i++) {
+	for (int i = 0; r == 0 && i < ck->open_windows; i++) {
 		r = window_create(ck->window_cycles, spec->line_count, &ck->window[i]);
 	}
 	if (r < 0) {
@@ -88,7 +98,7 @@ void checker_begin_at(struct checker *ck, int64_t cycle)
 	ck->has_base = 1;
 	ck->base = cycle;
 	ck->window_number = 0;
-	for (int i = 0; i < OPEN_WINDOWS; i++) {
+	for (int i = 0; i < ck->open_windows; i++) {
 		window_clear(ck->window[i], cycle + (int64_t)i * ck->window_cycles);
 	}
 }
@@ -102,16 +112,16 @@ struct window *checker_window(struct checker *ck, int64_t cycle)
 	}
 	number = (cycle - ck->base) / ck->window_cycles;
 	/* So far ahead that nothing can be known of what lies between: only the newest matter. */
-	if (number - ck->window_number > FAR_WINDOWS) {
+	if (number - ck->window_number > ck->open_windows + FAR_WINDOWS) {
 		checker_close_window(ck);
 		checker_close_window(ck);
 		checker_begin_at(ck, cycle);
 		number = 0;
 	}
-	while (number >= ck->window_number + OPEN_WINDOWS) {
+	while (number >= ck->window_number + ck->open_windows) {
 		checker_close_window(ck);
 	}
-	return ck->window[number % OPEN_WINDOWS];
+	return ck->window[number % ck->open_windows];
 }
 
 /* Nothing that is counted in the open windows can be held against anyone. */
@@ -122,7 +132,7 @@ static void disturb(struct checker *ck, int64_t cycle, int64_t step_ns)
 		ck->line[i].has_last = 0;
 		ck->line[i].last_cycle = cycle;
 	}
-	for (int i = 0; ck->has_base && i < OPEN_WINDOWS; i++) {
+	for (int i = 0; ck->has_base && i < ck->open_windows; i++) {
 		struct window *w = ck->window[i];
 
 		if (w->first_cycle <= cycle + GRACE_CYCLES) {
@@ -279,6 +289,15 @@ void checker_advance(struct checker *ck, int64_t mono_ns)
 	}
 }
 
+/* Nothing of the oldest window is still on its way. */
+static int is_whole(const struct checker *ck)
+{
+	int64_t end = checker_oldest(ck)->first_cycle + (int64_t)ck->window_cycles;
+	int64_t way = ck->spec.source == SYNC0_RECORDED ? 0 : FINISH_NS / ck->spec.period_ns;
+
+	return ck->newest_cycle >= end + way;
+}
+
 void checker_finish(struct checker *ck)
 {
 	struct track_out out;
@@ -296,7 +315,7 @@ void checker_finish(struct checker *ck)
 		track_finish(&ck->line[i].track, ck->grid, &out);
 		checker_take(ck, i, &out);
 	}
-	if (ck->newest_cycle >= checker_oldest(ck)->first_cycle + (int64_t)ck->window_cycles) {
+	for (int n = 0; n < ck->open_windows && is_whole(ck); n++) {
 		checker_close_window(ck);
 	}
 }

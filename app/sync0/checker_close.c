@@ -152,7 +152,7 @@ static void close_line(struct checker *ck, const struct window *w, size_t number
 
 void checker_close_window(struct checker *ck)
 {
-	struct window *w = ck->window[ck->window_number % OPEN_WINDOWS];
+	struct window *w = ck->window[ck->window_number % ck->open_windows];
 
 	find_common_step(ck, w);
 	for (size_t i = 0; i < ck->spec.line_count; i++) {
@@ -162,7 +162,7 @@ void checker_close_window(struct checker *ck)
 	}
 	ck->windows++;
 	ck->window_number++;
-	window_clear(w, w->first_cycle + (int64_t)OPEN_WINDOWS * w->cycles);
+	window_clear(w, w->first_cycle + (int64_t)ck->open_windows * w->cycles);
 }
 
 /* --- shots --- */

@@ -12,7 +12,7 @@
 #include "sync0/track.h"
 #include "sync0/window.h"
 
-enum { OPEN_WINDOWS = 2 };
+enum { OPEN_WINDOWS = 32 };
 
 struct line {
 	struct track track;
@@ -34,7 +34,8 @@ struct checker {
 	struct grid *grid;
 	struct self_grid self;
 	struct figures_room room;
-	struct window *window[OPEN_WINDOWS]; /* the oldest open one is number % OPEN_WINDOWS */
+	struct window *window[OPEN_WINDOWS]; /* the oldest open one is number % open_windows */
+	int open_windows;
 	int64_t window_number;
 	uint32_t window_cycles;
 	int has_base;
@@ -49,7 +50,7 @@ struct checker {
 
 static inline struct window *checker_oldest(const struct checker *ck)
 {
-	return ck->window[ck->window_number % OPEN_WINDOWS];
+	return ck->window[ck->window_number % ck->open_windows];
 }
 
 /** Judge from @cycle on. */

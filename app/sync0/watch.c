@@ -13,6 +13,7 @@
 enum { STEP_MS = 20, TEXT_BYTES = WATCH_WHY_BYTES };
 
 #define RETRY_NS (2 * NS_PER_S)             /* between two tries to open what cannot be had */
+#define STALL_NS NS_PER_S                   /* not having run for so long, edges are lost */
 #define QUEUED_NS (5 * NS_PER_MS)           /* from interrupt to queue, at most */
 #define SIMULATION_BEHIND_NS (2 * NS_PER_S) /* it writes its edges a little later */
 #define SIMULATION_AHEAD_NS NS_PER_S        /* and never earlier: what is so is no edge */
@@ -325,11 +326,27 @@ static void open_output(struct watch *w)
 	}
 }
 
+/* The kernel's queue has run over meanwhile, and the file of edges may have a hole. */
+static void look_for_stall(struct watch *w)
+{
+	int64_t now_ns = watch_now_ns(w);
+
+	if (w->stepped_ns != 0 && now_ns - w->stepped_ns > STALL_NS && w->has_session) {
+		fprintf(stderr,
+			"ecdaq-sync0: did not run for %" PRId64
+			" ms: what came meanwhile is not judged\n",
+			(now_ns - w->stepped_ns) / NS_PER_MS);
+		w->has_news = 1;
+	}
+	w->stepped_ns = now_ns;
+}
+
 void watch_step(struct watch *w)
 {
 	int64_t until_ns;
 	int is_open;
 
+	look_for_stall(w);
 	open_output(w);
 	open_sources(w);
 	is_open = master_open(w->master);

@@ -27,7 +27,8 @@ struct watch {
 	int64_t since_ns;  /* edges are heard from here on */
 	int64_t newest_ns; /* edge of the file */
 	int64_t tried_ns;
-	uint64_t windows; /* and alarms, of the sessions before this one */
+	int64_t stepped_ns; /* 0: not yet */
+	uint64_t windows;   /* and alarms, of the sessions before this one */
 	uint64_t alarms;
 	char said[OUTPUT_WHY_BYTES]; /* why nobody sees the page */
 	char master_path[CONFIG_PATH_BYTES];

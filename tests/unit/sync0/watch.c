@@ -114,24 +114,37 @@ static void end(void)
 	CHECK_EQ(rmdir(b.dir), 0);
 }
 
+static void write_cycle(uint64_t shot_ns)
+{
+	int64_t edge_ns = fake_mono_ns(b.fake.dc_ns);
+
+	for (int slave = 0; b.edges != NULL && slave < FAKE_SLAVES; slave++) {
+		if (slave == 0 || b.fake.cycle < b.silent_from) {
+			fprintf(b.edges, "%d %lld 0\n", slave, (long long)edge_ns);
+		}
+	}
+	fake_master_push(&b.fake, shot_ns);
+	b.now_ns = fake_mono_ns(b.fake.dc_ns);
+}
+
 static void run_with(int64_t cycles, uint64_t shot_ns)
 {
 	for (int64_t i = 1; i <= cycles; i++) {
-		int64_t edge_ns = fake_mono_ns(b.fake.dc_ns);
-
-		for (int slave = 0; b.edges != NULL && slave < FAKE_SLAVES; slave++) {
-			if (slave == 0 || b.fake.cycle < b.silent_from) {
-				fprintf(b.edges, "%d %lld 0\n", slave, (long long)edge_ns);
-			}
-		}
-		fake_master_push(&b.fake, shot_ns);
-		b.now_ns = fake_mono_ns(b.fake.dc_ns);
+		write_cycle(shot_ns);
 		if (i % STEP_CYCLES == 0) {
 			if (b.edges != NULL) {
 				fflush(b.edges);
 			}
 			watch_step(b.watch);
 		}
+	}
+}
+
+/* The check is not run meanwhile. */
+static void stall(int64_t cycles)
+{
+	for (int64_t i = 0; i < cycles; i++) {
+		write_cycle(0);
 	}
 }
 
@@ -269,7 +282,7 @@ TEST(sync0_watch, with_one_shot_slaves_alone_it_runs_and_tells_of_each)
 	start(NS_PER_MS);
 	fclose(b.edges);
 	b.edges = NULL;
-	run(1000);
+	run(3000);
 	CHECK_EQ(page()->state, SYNC0_RUNNING);
 	at_ns = b.fake.dc_ns + 100 * NS_PER_MS;
 	run_with(300, (uint64_t)at_ns);
@@ -293,5 +306,27 @@ TEST(sync0_watch, a_pulse_that_nobody_asked_for_is_counted)
 	CHECK_EQ(page()->line[1].extra, 1);
 	CHECK_EQ(page()->line[1].shots, 0);
 	CHECK_EQ(page()->line[0].extra, 0);
+	end();
+}
+
+TEST(sync0_watch, pulses_that_came_while_it_was_held_up_are_not_missed)
+{
+	uint64_t windows;
+
+	begin();
+	start(NS_PER_MS);
+	run(1000);
+	windows = page()->windows;
+	stall(900); /* they wait in the queue */
+	run(1000);
+	CHECK(page()->windows >= windows + 17);
+	CHECK_EQ(page()->line[1].missing, 0);
+	stall(30000); /* nobody knows what came */
+	run(2000);
+	CHECK(page()->windows >= windows + 27);
+	CHECK_EQ(page()->line[0].missing, 0);
+	CHECK_EQ(page()->line[1].missing, 0);
+	CHECK_EQ(page()->alarms, 0);
+	CHECK_EQ(page()->state, SYNC0_RUNNING);
 	end();
 }
