@@ -48,6 +48,16 @@ static const char *line_text(const struct watch *w, size_t line)
 	return w->lines == NULL ? w->spec.cfg->sync0_edges : lines_text(w->lines, line);
 }
 
+static int are_all_open(const struct watch *w)
+{
+	for (size_t i = 0; i < lines_count(w->lines); i++) {
+		if (!lines_is_open(w->lines, i)) {
+			return 0;
+		}
+	}
+	return 1;
+}
+
 static void on_line(void *ctx, size_t line, const char *why)
 {
 	struct watch *w = ctx;
@@ -61,6 +71,8 @@ static void on_line(void *ctx, size_t line, const char *why)
 		snprintf(text, sizeof(text), "line '%.95s' of slave %u: %s", line_text(w, line),
 			 (unsigned)ls->slave_pos, why);
 		output_say(w->out, text);
+	} else if (are_all_open(w)) {
+		output_say(w->out, "");
 	}
 }
 
