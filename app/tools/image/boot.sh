@@ -10,7 +10,7 @@ usage()
 {
 	cat <<'USAGE'
 usage: ./build.sh boot [--fresh] [--ssh-port N] [--key FILE] [--config FILE] [--icount]
-                       [--lan] [-- QEMU-OPTION...]
+                       [--lan] [--wire] [-- QEMU-OPTION...]
 
 Boots the image of machine qemuarm64 in QEMU (no KVM needed): its serial console here, its SSH port on
 127.0.0.1, the EtherCAT segment simulated inside. Nobody has a password: log in with
@@ -26,6 +26,9 @@ and end it with `sudo poweroff` there, or Ctrl-a x here. The disk keeps what was
                 app/tools/image/profile-host.yaml or profile-guest.yaml)
   --lan         the guest's network port is a tap of this host, ecdaqlan: 192.168.77.1 here,
                 192.168.77.2 there; its SSH port is there, and samples come over DDS, domain 0
+  --wire        the segment is on this host, and its SYNC0 pins are wired to lines 0 and 1 of the
+                guest's GPIO chip, which ecdaq-sync0 watches (app/doc/sync0.md); faults by
+                app/tools/tell-segment.py --control build/image/boot/control
   --icount      the guest's clock counts instructions: slower, and a 1 ms cycle holds in guest time
 USAGE
 }
@@ -41,6 +44,7 @@ port=2222
 key=
 config=
 lan=no
+wire=no
 timing=host
 check=no
 while [ $# -gt 0 ]; do
@@ -49,6 +53,7 @@ while [ $# -gt 0 ]; do
 	--check) check=yes ;; # build.sh: are the options good?
 	--icount) timing=guest ;;
 	--lan) lan=yes ;;
+	--wire) wire=yes ;;
 	--ssh-port | --key | --config)
 		[ $# -ge 2 ] || die "$1 needs a value"
 		case $1 in
@@ -73,6 +78,7 @@ done
 case $port in
 '' | *[!0-9]*) die "--ssh-port: '$port' is no port" ;;
 esac
+[ "$wire$timing" != yesguest ] || die "--wire: the segment keeps the host's time, --icount does not"
 [ "$check" = no ] || exit 0
 
 image=$root/build/image/qemuarm64
@@ -97,6 +103,7 @@ cp "$image/$name-vmlinux" "$vm/vmlinux"
 cp "$image/$name.cmdline" "$vm/cmdline"
 cp "$key" "$vm/authorized_keys"
 cp "$config" "$vm/ecdaq.yaml"
+[ "$wire" = no ] || grep -q '^sync0:' "$vm/ecdaq.yaml" || cat "$here/profile-wire.yaml" >> "$vm/ecdaq.yaml"
 # The boot partition starts at 4 MiB. Its folder network/ belongs to --lan.
 boot()
 {
@@ -113,17 +120,54 @@ if [ "$lan" = yes ]; then
 fi
 boot mcopy -o authorized_keys ecdaq.yaml ::ecdaq/
 
-if [ "$lan" = no ]; then
-	echo "-- ssh -p $port -i $vm/key operator@127.0.0.1    (end: Ctrl-a x)" >&2
-	exec "$here/virt.sh" "$vm" "$timing" -nographic \
-		-netdev "user,id=lan,hostfwd=tcp:127.0.0.1:$port-:22" \
-		-device virtio-net-pci,netdev=lan,romfile= "$@"
-fi
-echo "-- ssh -i $vm/key operator@192.168.77.2    (end: Ctrl-a x)" >&2
-ip tuntap add dev ecdaqlan mode tap || die "--lan: no tap ecdaqlan to be had (its reason stands above)"
-trap 'ip link delete ecdaqlan' EXIT
+# What is started and made for the guest ends with it.
+pids=
+taps=
+end()
+{
+	# shellcheck disable=SC2086 # lists
+	[ -z "$pids" ] || kill $pids 2> /dev/null || :
+	for tap in $taps; do
+		ip link delete "$tap"
+	done
+}
+trap end EXIT
 trap 'exit 1' INT TERM HUP
-ip address add 192.168.77.1/24 dev ecdaqlan
-ip link set ecdaqlan multicast on up
-"$here/virt.sh" "$vm" "$timing" -nographic -netdev tap,id=lan,ifname=ecdaqlan,script=no,downscript=no \
+add_tap()
+{
+	ip tuntap add dev "$2" mode tap || die "$1: no tap $2 to be had (its reason stands above)"
+	taps="$taps $2"
+}
+
+if [ "$wire" = yes ]; then
+	sim=$root/build/stage/bin/ecdaq-sim
+	[ -x "$sim" ] || die "--wire: no $sim yet: run ./build.sh first"
+	rm -f "$vm/qtest" "$vm/qmp"
+	add_tap --wire ecdaqecat
+	ip link set ecdaqecat arp off multicast off up
+	[ -p "$vm/edges" ] || mkfifo "$vm/edges"
+	"$here/sync0-wire.py" --edges "$vm/edges" --qtest "$vm/qtest" --qmp "$vm/qmp" &
+	pids=$!
+	"$sim" --interface ecdaqecat --slaves 2 --edges "$vm/edges" --control "$vm/control" &
+	pids="$pids $!"
+	ECDAQ_APPEND="${ECDAQ_APPEND:-} ecdaq.segment=outside"
+	export ECDAQ_APPEND
+	set -- -netdev tap,id=ecat,ifname=ecdaqecat,script=no,downscript=no \
+		-device virtio-net-pci,netdev=ecat,romfile=,mac=52:54:00:ec:da:01 \
+		-qtest "unix:$vm/qtest,server=on,wait=off" -qtest-log none \
+		-qmp "unix:$vm/qmp,server=on,wait=off" "$@"
+fi
+if [ "$lan" = yes ]; then
+	add_tap --lan ecdaqlan
+	ip address add 192.168.77.1/24 dev ecdaqlan
+	ip link set ecdaqlan multicast on up
+	echo "-- ssh -i $vm/key operator@192.168.77.2    (end: Ctrl-a x)" >&2
+	port="tap,id=lan,ifname=ecdaqlan,script=no,downscript=no"
+else
+	echo "-- ssh -p $port -i $vm/key operator@127.0.0.1    (end: Ctrl-a x)" >&2
+	port="user,id=lan,hostfwd=tcp:127.0.0.1:$port-:22"
+fi
+set -- "$here/virt.sh" "$vm" "$timing" -nographic -netdev "$port" \
 	-device virtio-net-pci,netdev=lan,romfile= "$@"
+[ -n "$taps" ] || exec "$@"
+"$@"
