@@ -145,9 +145,9 @@ class Books:
         times = [edge.guest_ns for edge in edges]
         for pulse in self.pulses[slave]:
             at = bisect.bisect_left(times, pulse.put_ns + self.begin_ns - self.NOISE_NS)
-            if at < len(edges) and (
-                at > 0 or times[0] - pulse.put_ns - self.begin_ns < self.period_ns
-            ):
+            if at == 0:
+                edges[0].pulses = [pulse]  # those before it were not listened to
+            elif at < len(edges):
                 edges[at].pulses.append(pulse)
         off = [
             (self.cycle_of[p.dc_ns], edge.guest_ns - p.host_ns - self.begin_ns)
