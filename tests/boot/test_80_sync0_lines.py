@@ -342,8 +342,8 @@ def test_a_chip_that_is_unplugged_is_told_and_taken_again_when_it_is_back(machin
 def test_the_master_has_noticed_nothing_of_all_this(machine: Machine) -> None:
     grown = grown_since(machine, json.loads(baseline(machine).read_text()))
     print(f"\nguest time: {grown}")
-    assert grown.pop("cycles") > 30000
+    assert grown.pop("cycles") > 15000
     # A slave without its SYNC0 says so in its samples.
     assert grown.pop("samples_bad") <= sum(KEPT)
-    assert grown == dict.fromkeys(NO_HARM, 0)
+    assert not any(grown.values()), grown
     assert machine.run("systemctl show --property=NRestarts --value ecdaqd").strip() == "0"
