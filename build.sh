@@ -70,6 +70,7 @@ Without GROUP all groups run, the fast ones first:
 Only when named:
   control  of unit, sim, cli and live what is about control programs
   sync0    of unit, cli and live what is about the SYNC0 check
+  wire     SYNC0 on GPIO lines of the image in QEMU; as root, on a machine that does nothing else
 
   --keep-going      run all groups even if one fails (default)
   --fail-fast       stop behind the first suite with a failure

@@ -30,6 +30,7 @@ SUITE_SECONDS = 3000
 BOOT_SECONDS = 9000
 IMAGE_SECONDS = 5400
 IMAGES = ("qemuarm64", "raspberrypi4-64")
+WIRE_FILES = "*/test_?0_sync0_*.py"
 # What two threads share, and how they hand it over: these run under ThreadSanitizer.
 SHARED_STATE_TESTS = r"^(ring|line|board|handover|status|histogram)[._]"
 CONTROL_TESTS = r"^(control|sim_control|sim_loopback)[.]"
@@ -214,6 +215,12 @@ def pytest(group: str, flavour: str, *options: str) -> Suite:
     return Suite(f"{group} python {flavour}", flavour, run_pytest, (f"tests/{group}", *options))
 
 
+def booted(name: str, *options: str) -> Suite:
+    """Tests of the images, most of them in QEMU."""
+    suite = pytest("boot", "release", "-s", *options)
+    return replace(suite, name=f"{name} python", seconds=BOOT_SECONDS, images=IMAGES)
+
+
 # Fast groups first. Tests labelled "long" run in the release flavour only.
 GROUPS: dict[str, list[Suite]] = {
     "unit": [
@@ -260,10 +267,11 @@ GROUPS: dict[str, list[Suite]] = {
             ("tests/live", "-k", "test_sync0 or test_oneshot"),
         ),
     ],
-    "boot": [replace(pytest("boot", "release", "-s"), seconds=BOOT_SECONDS, images=IMAGES)],
+    "boot": [booted("boot", f"--ignore-glob={WIRE_FILES}")],
+    "wire": [booted("wire", "-k", "test_70_sync0 or test_80_sync0")],
 }
-# Part of other groups: only when named.
-ON_REQUEST = ("control", "sync0")
+# Part of other groups, or too exact for a machine that others load: only when named.
+ON_REQUEST = ("control", "sync0", "wire")
 
 
 class Builder:
