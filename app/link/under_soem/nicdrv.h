@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The port under SOEM's functions: frame buffers by index, as SOEM's sources use them, and the
- * line that carries the frames. One service thread uses it; nothing here is locked.
+ * line that carries the frames. One service thread uses it; nothing here is locked. Written for
+ * ecdaq; the file's name, and those of the functions, are what SOEM's sources ask for.
  */
-#ifndef LINK_SOEM_NICDRV_H
-#define LINK_SOEM_NICDRV_H
+#ifndef LINK_UNDER_SOEM_NICDRV_H
+#define LINK_UNDER_SOEM_NICDRV_H
 
 #include "ethercattype.h"
 

@@ -1,7 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* SOEM's view of the network hardware: a line (link/line.h) and nothing else. */
-#ifndef LINK_SOEM_OSHW_H
-#define LINK_SOEM_OSHW_H
+/*
+ * SOEM's view of the network hardware: a line (link/line.h) and nothing else. Written for ecdaq;
+ * the names are what SOEM's sources ask for.
+ */
+#ifndef LINK_UNDER_SOEM_OSHW_H
+#define LINK_UNDER_SOEM_OSHW_H
 
 #include "ethercattype.h"
 #include "nicdrv.h"

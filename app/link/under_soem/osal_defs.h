@@ -1,7 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* What SOEM's sources expect of the system's compiler; ours, for gcc and clang on Linux. */
-#ifndef LINK_SOEM_OSAL_DEFS_H
-#define LINK_SOEM_OSAL_DEFS_H
+/*
+ * What SOEM's sources expect of the system's compiler, for gcc and clang on Linux. Written for
+ * ecdaq; the names are what those sources ask for.
+ */
+#ifndef LINK_UNDER_SOEM_OSAL_DEFS_H
+#define LINK_UNDER_SOEM_OSAL_DEFS_H
 
 #if defined(__BYTE_ORDER__) && __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__
 #define EC_BIG_ENDIAN
