@@ -14,6 +14,7 @@
 enum {
 	SERVICE_CYCLES = 10, /* the service loop runs once in so many cycles */
 	REPLY_CYCLES = 2000, /* an answer has to come within so many */
+	SETTLE_CYCLES = 100, /* behind the bring-up, before a test begins to count */
 };
 
 #define FNV_START UINT64_C(0xcbf29ce484222325)
@@ -342,6 +343,15 @@ int virtual_master_stop(struct virtual_master *vm)
 void virtual_master_forget(struct virtual_master *vm)
 {
 	vm->result = (struct virtual_result){ .hash = FNV_START };
+}
+
+void virtual_master_settle(struct virtual_master *vm)
+{
+	if (virtual_master_bring_up(vm) < 0) {
+		test_fail(__FILE__, __LINE__, "%s", vm->failure.text);
+	}
+	virtual_master_run(vm, SETTLE_CYCLES);
+	virtual_master_forget(vm);
 }
 
 const struct sample_header *virtual_master_sample(const struct virtual_master *vm)

@@ -73,6 +73,9 @@ int virtual_master_stop(struct virtual_master *vm);
 /** Forget the samples counted so far. */
 void virtual_master_forget(struct virtual_master *vm);
 
+/** In OP, some cycles on, with no sample counted yet. Ends the test where OP is not reached. */
+void virtual_master_settle(struct virtual_master *vm);
+
 /** The newest sample's header; the value of the channel named @name in it. */
 const struct sample_header *virtual_master_sample(const struct virtual_master *vm);
 uint64_t virtual_master_value(const struct virtual_master *vm, const char *name);

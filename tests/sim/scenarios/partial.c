@@ -16,11 +16,7 @@ static void open_all(const char *datagrams)
 	virtual_bench_init(
 		&b, &(struct virtual_spec){ .slaves = SLAVES, .ppm = { 30, -40, 15 }, .seed = 41 });
 	virtual_master_init(&vm, &b, settings);
-	if (virtual_master_bring_up(&vm) < 0) {
-		test_fail(__FILE__, __LINE__, "%s", vm.failure.text);
-	}
-	virtual_master_run(&vm, 100);
-	virtual_master_forget(&vm);
+	virtual_master_settle(&vm);
 }
 
 static void close_all(void)
