@@ -234,6 +234,20 @@ class Machine:
         """What a command in the guest printed, as JSON."""
         return json.loads(self.run(command))
 
+    def answer(self, command: str) -> dict[str, Any]:
+        """What a command in the guest printed, as JSON; {} where it had nothing to say yet."""
+        result = self.try_run(command)
+        found: dict[str, Any] = json.loads(result.stdout) if result.returncode == 0 else {}
+        return found
+
+    def status(self) -> dict[str, Any]:
+        """The master's status."""
+        return self.answer("ecdaq status --json")
+
+    def sync0(self) -> dict[str, Any]:
+        """What ecdaq-sync0 has to say."""
+        return self.answer("ecdaq sync0 --json")
+
     def wait_until(self, what: str, command: str, seconds: float = COMMAND_S) -> None:
         """Until a command in the guest succeeds."""
         wait_for(what, seconds, lambda: self.try_run(command).returncode == 0)

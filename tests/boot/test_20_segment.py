@@ -12,7 +12,6 @@ from __future__ import annotations
 import json
 import os
 import re
-from typing import Any
 
 from machine import Machine, profile, wait_for
 
@@ -22,19 +21,9 @@ OP_S = 900
 SETTLE_S = 3
 
 
-def in_operation(machine: Machine) -> bool:
-    result = machine.try_run("ecdaq status --json")
-    return result.returncode == 0 and machine.json("ecdaq status --json").get("state") == "OP"
-
-
-def status(machine: Machine) -> dict[str, Any]:
-    found: dict[str, Any] = machine.json("ecdaq status --json")
-    return found
-
-
 def test_two_slaves_come_to_op_without_a_hand_on_it(machine: Machine) -> None:
-    wait_for("OP", OP_S, lambda: in_operation(machine))
-    found = status(machine)
+    wait_for("OP", OP_S, lambda: machine.status().get("state") == "OP")
+    found = machine.status()
     assert found["slaves"] == 2
     assert found["rt_degraded"] == []
     assert found["cycle_cpu"] == 1
@@ -59,14 +48,14 @@ def test_the_boot_is_split_by_phase(machine: Machine) -> None:
 
 def test_cycles_go_on_without_loss(machine: Machine) -> None:
     """CYCLES of them, nobody logged in but who waits for the end."""
-    before = status(machine)
+    before = machine.status()
     until = before["cycle_number"] + CYCLES
     machine.run(
         "until ecdaq status --json | grep -Eo '\"cycle_number\":[0-9]+' | cut -d : -f 2 |"
         f" (read n && [ $n -ge {until} ]); do sleep {SETTLE_S}; done",
         seconds=3000,
     )
-    after = status(machine)
+    after = machine.status()
     grown = {
         name: after[name] - before[name]
         for name in (
@@ -86,7 +75,7 @@ def test_cycles_go_on_without_loss(machine: Machine) -> None:
 
 
 def test_the_cycle_thread_had_no_page_fault(machine: Machine) -> None:
-    assert status(machine)["page_faults"] == 0
+    assert machine.status()["page_faults"] == 0
 
 
 def test_the_doctor_finds_nothing_that_fails(machine: Machine) -> None:
@@ -106,8 +95,11 @@ def test_nobody_had_to_be_started_twice(machine: Machine) -> None:
 
 
 def test_the_recording_is_whole(machine: Machine) -> None:
-    checked = machine.run("sudo ecdaq log check --dir /data/record --json")
+    checked = machine.json("sudo ecdaq log check --dir /data/record --json")
     print(checked)
+    assert checked["clean"] is True
+    assert (checked["gaps"], checked["cycles_missing"], checked["damaged_files"]) == (0, 0, 0)
+    assert checked["cycles"] >= CYCLES
 
 
 def cycle_thread(machine: Machine) -> str:
@@ -171,4 +163,4 @@ def test_a_killed_master_comes_back_by_itself(machine: Machine) -> None:
     wait_for(
         "another ecdaqd", 300, lambda: machine.try_run(f"pgrep -x ecdaqd | grep -v {was}").stdout
     )
-    wait_for("OP again", OP_S, lambda: in_operation(machine))
+    wait_for("OP again", OP_S, lambda: machine.status().get("state") == "OP")

@@ -22,17 +22,13 @@ SPIN = "chrt --fifo 99 taskset --cpu-list {cpu} sh -c 'while :; do :; done'"
 HANG = f"sleep 2; {SPIN.format(cpu=0)} & {SPIN.format(cpu=1)} & wait"
 
 
-def in_operation(machine: Machine) -> bool:
-    return '"state":"OP"' in machine.try_run("ecdaq status --json").stdout
-
-
 def test_systemd_feeds_it(machine: Machine) -> None:
     assert machine.run(f"cat {WATCHDOG}/state").strip() == "active"
     assert machine.run(f"cat {WATCHDOG}/timeout").strip() == str(TIMEOUT_S)
 
 
 def test_a_machine_that_hangs_is_reset(machine: Machine) -> None:
-    wait_for("OP", OP_S, lambda: in_operation(machine))
+    wait_for("OP", OP_S, lambda: machine.status().get("state") == "OP")
     assert machine.process is not None
     process = machine.process
     machine.run(f'sudo systemd-run --quiet --collect sh -c "{HANG}"')
@@ -46,7 +42,7 @@ def test_it_comes_back_and_goes_on(machine: Machine) -> None:
     machine.process = None
     machine.start(**START)
     machine.wait_for_login()
-    wait_for("OP again", OP_S, lambda: in_operation(machine))
+    wait_for("OP again", OP_S, lambda: machine.status().get("state") == "OP")
     machine.run(
         "sudo find /data/record -name '*.mcap' -print0 | sudo xargs -0 ecdaq log check", 900
     )

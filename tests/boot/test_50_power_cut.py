@@ -28,11 +28,8 @@ BAD_WORDS = ("cannot be mended", "e2fsck -y", "memory instead of the data partit
 
 def recording(machine: Machine) -> dict[str, Any] | None:
     """The status, once some seconds are recorded."""
-    result = machine.try_run("ecdaq status --json")
-    if result.returncode != 0:
-        return None
-    status: dict[str, Any] = json.loads(result.stdout)
-    return status if status["recorded_cycles"] > 2000 else None
+    status = machine.status()
+    return status if status.get("recorded_cycles", 0) > 2000 else None
 
 
 def check(machine: Machine) -> None:

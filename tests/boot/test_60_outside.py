@@ -16,7 +16,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from machine import TOP, Machine, Space, profile, wait_for
@@ -77,15 +76,9 @@ def time_server(machine: Machine) -> Iterator[None]:
     process.wait(10)
 
 
-def status(machine: Machine) -> dict[str, Any]:
-    result = machine.try_run("ecdaq status --json")
-    found: dict[str, Any] = json.loads(result.stdout) if result.returncode == 0 else {}
-    return found
-
-
 def test_the_bus_comes_to_op_through_the_port(machine: Machine) -> None:
-    wait_for("OP", OP_S, lambda: status(machine).get("state") == "OP")
-    found = status(machine)
+    wait_for("OP", OP_S, lambda: machine.status().get("state") == "OP")
+    found = machine.status()
     assert found["slaves"] == 2
     assert machine.run("readlink /sys/class/net/ecat0/device").strip()
 
@@ -101,9 +94,9 @@ def test_interrupts_of_the_port_are_on_the_core_of_the_cycle_above_it(machine: M
 
 
 def test_every_frame_is_accounted_for_and_the_recording_has_no_gap(machine: Machine) -> None:
-    before = status(machine)
+    before = machine.status()
     machine.run(f"sleep {SECONDS}")
-    after = status(machine)
+    after = machine.status()
     names = (
         *("cycles", "cycles_skipped", "frames_sent", "frames_lost", "frames_late", "overruns"),
         *("samples_good", "samples_bad", "samples_bad_unexplained"),
@@ -120,8 +113,8 @@ def test_every_frame_is_accounted_for_and_the_recording_has_no_gap(machine: Mach
 
 def test_the_publisher_says_in_the_run_directory_that_it_is_there(machine: Machine) -> None:
     """It is another user than the master's, in a directory of their group."""
-    wait_for("the publisher", 300, lambda: (status(machine)["dds"] or {}).get("running"))
-    found = status(machine)["dds"]
+    wait_for("the publisher", 300, lambda: (machine.status()["dds"] or {}).get("running"))
+    found = machine.status()["dds"]
     assert (found["domain"], found["interface"]) == (int(DOMAIN), LAN)
 
 

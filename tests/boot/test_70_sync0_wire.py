@@ -50,18 +50,6 @@ def wire(machine: Machine) -> Iterator[Wire]:
     made.close()
 
 
-def status(machine: Machine) -> dict[str, Any]:
-    result = machine.try_run("ecdaq status --json")
-    found: dict[str, Any] = json.loads(result.stdout) if result.returncode == 0 else {}
-    return found
-
-
-def report(machine: Machine) -> dict[str, Any]:
-    result = machine.try_run("ecdaq sync0 --json")
-    found: dict[str, Any] = json.loads(result.stdout) if result.returncode == 0 else {}
-    return found
-
-
 def events(machine: Machine, *names: str) -> list[dict[str, Any]]:
     lines = machine.run("ecdaq events --json").splitlines()
     return [e for e in map(json.loads, lines) if e["event"] in names]
@@ -69,7 +57,7 @@ def events(machine: Machine, *names: str) -> list[dict[str, Any]]:
 
 def wait_for_windows(machine: Machine, count: int) -> dict[str, Any]:
     def closed() -> dict[str, Any]:
-        found = report(machine)
+        found = machine.sync0()
         return found if found.get("running") and found["windows"] >= count else {}
 
     found: dict[str, Any] = wait_for(f"{count} windows", WINDOWS_S, closed)
@@ -78,11 +66,11 @@ def wait_for_windows(machine: Machine, count: int) -> dict[str, Any]:
 
 def another_window(machine: Machine) -> None:
     """One that begins after this call is full."""
-    wait_for_windows(machine, report(machine)["windows"] + 2)
+    wait_for_windows(machine, machine.sync0()["windows"] + 2)
 
 
 def test_the_kernel_has_the_lines_and_the_power_button_keeps_its_own(machine: Machine) -> None:
-    wait_for("OP", OP_S, lambda: status(machine).get("state") == "OP")
+    wait_for("OP", OP_S, lambda: machine.status().get("state") == "OP")
     said = machine.run("sudo gpioinfo --chip gpiochip0")
     print("\n" + said)
     lines = [line for line in said.splitlines() if line.startswith("\tline")]
@@ -106,10 +94,10 @@ def test_edges_come_by_interrupts_of_the_pl061(machine: Machine) -> None:
 
 
 def test_what_a_gpio_cannot_say_uncalibrated_is_unresolved(machine: Machine) -> None:
-    assert report(machine)["noise_p99_ns"] is None
+    assert machine.sync0()["noise_p99_ns"] is None
 
     def unresolved() -> bool:
-        windows = [line["window"] for line in report(machine)["lines"]]
+        windows = [line["window"] for line in machine.sync0()["lines"]]
         checks = [window["checks"] for window in windows]
         # Where the emulator stood still there is nothing to judge, or a step: never a figure.
         assert all(c["skew"] in ("-", "UNRESOLVED") for c in checks), checks
@@ -241,15 +229,15 @@ def test_the_check_may_be_restarted_or_killed_and_the_cycle_goes_on(machine: Mac
         names = ("cycles", "frames_sent", "frames_lost", "overruns", "cycles_skipped")
         return {name: after[name] - before[name] for name in names}
 
-    first = status(machine)
+    first = machine.status()
     machine.run("sleep 5")
-    second = status(machine)
+    second = machine.status()
     machine.run("sudo systemctl restart ecdaq-sync0")
     machine.run("sudo kill -KILL $(pgrep -x ecdaq-sync0)")
     machine.run("sleep 3")
-    third = status(machine)
+    third = machine.status()
     wait_for_windows(machine, 1)
-    last = status(machine)
+    last = machine.status()
     print(f"\nbefore: {grown(first, second)}\nmeanwhile: {grown(second, third)}")
     for field in ("pid", "session", "state", "recorded_gaps"):
         assert first.get(field) == last.get(field), field
@@ -261,7 +249,7 @@ def test_the_check_may_be_restarted_or_killed_and_the_cycle_goes_on(machine: Mac
 
 
 def test_a_line_that_is_taken_is_one_clear_line(machine: Machine) -> None:
-    before = status(machine)
+    before = machine.status()
     for line, holder in ((3, "GPIO Key Poweroff"), (0, "ecdaq-sync0")):
         result = machine.try_run(
             "mkdir -p /tmp/other; sudo timeout 8 ecdaq-sync0 --run-dir /tmp/other"
@@ -270,5 +258,5 @@ def test_a_line_that_is_taken_is_one_clear_line(machine: Machine) -> None:
         said = [x for x in result.stdout.splitlines() if "not calibrated" not in x]
         wanted = f"ecdaq-sync0: line '{CHIP}:{line}' of slave 0: already used by {holder}"
         assert said == [wanted], said
-    after = status(machine)
+    after = machine.status()
     assert (after["pid"], after["state"]) == (before["pid"], "OP")

@@ -74,18 +74,6 @@ def root(machine: Machine, script: str) -> str:
     return machine.run(f"echo {text} | base64 -d | sudo sh")
 
 
-def status(machine: Machine) -> dict[str, Any]:
-    result = machine.try_run("ecdaq status --json")
-    found: dict[str, Any] = json.loads(result.stdout) if result.returncode == 0 else {}
-    return found
-
-
-def report(machine: Machine) -> dict[str, Any]:
-    result = machine.try_run("ecdaq sync0 --json")
-    found: dict[str, Any] = json.loads(result.stdout) if result.returncode == 0 else {}
-    return found
-
-
 def told(machine: Machine) -> list[dict[str, Any]]:
     lines = machine.run("ecdaq events --json").splitlines()
     return [e for e in map(json.loads, lines) if e["event"].startswith("sync0_")]
@@ -98,15 +86,15 @@ def said(machine: Machine, words: str) -> list[str]:
 
 
 def wait_for_op(machine: Machine) -> dict[str, Any]:
-    wait_for("OP", OP_S, lambda: status(machine).get("state") == "OP")
-    return status(machine)
+    wait_for("OP", OP_S, lambda: machine.status().get("state") == "OP")
+    return machine.status()
 
 
 def wait_for_lines(machine: Machine, *open_ones: int) -> None:
     """Until these lines, and no others, are open."""
 
     def found() -> bool:
-        lines = report(machine).get("lines", [])
+        lines = machine.sync0().get("lines", [])
         return len(lines) == 2 and [n for n in (0, 1) if lines[n]["open"]] == list(open_ones)
 
     wait_for(f"lines {open_ones} open", WINDOWS_S, found)
@@ -120,7 +108,7 @@ def wait_for_windows(machine: Machine, count: int) -> dict[str, Any]:
         f" (read n && [ $n -ge {count} ]); do sleep 0.5; done",
         seconds=WINDOWS_S,
     )
-    return report(machine)
+    return machine.sync0()
 
 
 def carry(machine: Machine, *pairs: str) -> None:
@@ -158,7 +146,7 @@ def baseline(machine: Machine) -> Path:
 
 
 def grown_since(machine: Machine, before: dict[str, Any]) -> dict[str, int]:
-    after = status(machine)
+    after = machine.status()
     assert (after["pid"], after["state"]) == (before["pid"], "OP")
     assert after["recorded_gaps"] == 0
     return {name: after[name] - before[name] for name in (*NO_HARM, "cycles")}
@@ -166,7 +154,7 @@ def grown_since(machine: Machine, before: dict[str, Any]) -> dict[str, int]:
 
 def test_a_missing_chip_is_one_line_for_each_slave_and_the_master_runs(machine: Machine) -> None:
     wait_for_op(machine)
-    wait_for("its state", WINDOWS_S, lambda: report(machine).get("state") == "no line")
+    wait_for("its state", WINDOWS_S, lambda: machine.sync0().get("state") == "no line")
     machine.run("sleep 6")  # three more tries
     journal = said(machine, "of slave")
     print("\n" + "\n".join(journal))
@@ -175,13 +163,13 @@ def test_a_missing_chip_is_one_line_for_each_slave_and_the_master_runs(machine: 
         "ecdaq-sync0: line 'SYNC_B' of slave 1: no line of this name on: 9030000.pl061",
     ]
     assert "NOT OPEN" in machine.run("ecdaq sync0")
-    assert status(machine)["state"] == "OP"
+    assert machine.status()["state"] == "OP"
 
 
 def test_a_chip_that_comes_later_is_taken_by_itself(machine: Machine) -> None:
     root(machine, PLUG)
     wait_for_lines(machine, 0, 1)
-    assert report(machine)["message"] == ""
+    assert machine.sync0()["message"] == ""
     print("\n" + machine.run("sudo gpioinfo"))
 
 
@@ -237,10 +225,10 @@ def test_a_pulse_that_stays_in_the_chip_is_told_to_the_cycle_and_nothing_else(
             f" 'at=0s sync0-lost slave={slave} count={count}'"
         )
         assert answer.strip() == "ok"
-        wait_for_windows(machine, report(machine)["windows"] + 2)
+        wait_for_windows(machine, machine.sync0()["windows"] + 2)
     # A step of the phase by the emulator's turns, 0.2 ms, is rightly told, too: pulses are judged.
     events = [e for e in told(machine) if e["event"] in PULSES]
-    last = report(machine)
+    last = machine.sync0()
     root(machine, "systemctl stop ecdaq-sync0 wire")
     books = Books(
         machine.run(f"cat {PLACE}/log"), machine.run("cat /run/ecdaq/sync0.dump"), PERIOD_NS
@@ -276,12 +264,12 @@ def test_a_pulse_that_stays_in_the_chip_is_told_to_the_cycle_and_nothing_else(
 
 
 def test_restarting_and_killing_the_check_costs_the_master_nothing(machine: Machine) -> None:
-    before = status(machine)
+    before = machine.status()
     for harm in ("systemctl restart ecdaq-sync0", "kill -KILL $(pgrep -x ecdaq-sync0)"):
-        was = report(machine)["pid"]
+        was = machine.sync0()["pid"]
         root(machine, harm)
         wait_for(
-            "another ecdaq-sync0", WINDOWS_S, lambda was=was: report(machine).get("pid") != was
+            "another ecdaq-sync0", WINDOWS_S, lambda was=was: machine.sync0().get("pid") != was
         )
         wait_for_windows(machine, 1)
     grown = grown_since(machine, before)
@@ -316,8 +304,8 @@ def test_who_may_not_open_a_chip_is_told_so(machine: Machine) -> None:
     ]
     assert machine.run("stat -c %U /dev/gpiochip*").split() == ["ecdaq-sync0"] * 2
     machine.run("sudo chown root /dev/gpiochip*; sudo systemctl restart ecdaq-sync0")
-    wait_for("its state", WINDOWS_S, lambda: report(machine).get("state") == "no line")
-    assert no_right in report(machine)["message"]
+    wait_for("its state", WINDOWS_S, lambda: machine.sync0().get("state") == "no line")
+    assert no_right in machine.sync0()["message"]
     assert len(said(machine, no_right)) == 2
     machine.run("sudo udevadm trigger --settle --action=change --subsystem-match=gpio")
     wait_for_lines(machine, 0, 1)
@@ -327,7 +315,7 @@ def test_a_chip_that_is_unplugged_is_told_and_taken_again_when_it_is_back(machin
     wait_for_windows(machine, 1)
     root(machine, f"systemctl stop wire; echo 0 > {CONFIGFS}/live")
     wait_for_lines(machine)
-    wait_for("its state", WINDOWS_S, lambda: report(machine).get("state") == "no line")
+    wait_for("its state", WINDOWS_S, lambda: machine.sync0().get("state") == "no line")
     gone = said(machine, "its chip is gone")
     print("\n" + "\n".join(gone))
     assert sorted(gone) == [
