@@ -89,6 +89,16 @@ def soem_patches(recipe: Recipe, folder: Path) -> list[str]:
     return []
 
 
+def boot_files(recipe: Recipe) -> list[str]:
+    """wic takes a boot file from beside the image, by its bare name, or by its whole path."""
+    rootfs = recipe.value("IMAGE_ROOTFS") + "/"
+    return [
+        f"{recipe.file}: IMAGE_BOOT_FILES: {source} is neither a bare name nor in ${{IMAGE_ROOTFS}}"
+        for source in (e.partition(";")[0] for e in recipe.value("IMAGE_BOOT_FILES").split())
+        if "/" in source and not source.startswith(rootfs)
+    ]
+
+
 def field_order(name: str, text: str) -> list[str]:
     """Fields stand in the order of the style guide; spaces round the sign, double quotes."""
     found = []

@@ -46,6 +46,12 @@ def test_sources_from_outside_are_pinned(metadata: Metadata) -> None:
     check_all(metadata, rules.pins)
 
 
+def test_boot_files_are_where_wic_looks(metadata: Metadata) -> None:
+    image = metadata.recipes["ecdaq-image"]
+    assert image.value("IMAGE_BOOT_FILES")
+    assert rules.boot_files(image) == []
+
+
 def test_both_roads_build_the_same_soem(metadata: Metadata) -> None:
     soem = metadata.recipes["soem"]
     third_party = TOP / "app" / "third_party"

@@ -132,9 +132,18 @@ def test_a_fragment_line_that_says_nothing_is_an_error(tmp_path: Path) -> None:
         differences(tmp_path / "a.cfg", [])
 
 
+@pytest.mark.parametrize(
+    "entry", ["usr/lib/firmware/start.elf;start.elf", "/w/rootfsx/a;a", "../a;a"]
+)
+def test_a_boot_file_that_wic_would_not_find_is_found(entry: str) -> None:
+    good = "vmlinux;Image /w/rootfs/usr/a;a name.dtb"
+    assert rules.boot_files(recipe(IMAGE_ROOTFS="/w/rootfs", IMAGE_BOOT_FILES=good)) == []
+    assert rules.boot_files(recipe(IMAGE_ROOTFS="/w/rootfs", IMAGE_BOOT_FILES=entry)) != []
+
+
 GOOD = """\
 bootloader --ptable gpt
-part /boot --source bootimg-partition --fstype=vfat --label boot --fixed-size 8M
+part --source bootimg-partition --fstype=vfat --label boot --fixed-size 8M
 part / --source rootfs --fstype=ext4 --label root --fixed-size 16M
 """
 
@@ -152,6 +161,7 @@ def test_a_layout_is_read(tmp_path: Path) -> None:
     [
         "part / --source rootfs --fstype=ext4 --label again --fixed-size 1M",
         "part --label x",
+        "part /data --label x --fixed-size 1M",
         "part --label x --fixed-size much",
         "part --label x --fixed-size 1M --fstype=ntfs",
         "partition 'open",

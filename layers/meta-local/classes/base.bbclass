@@ -53,3 +53,8 @@ bbfatal() {
 die() {
 	bbfatal "$*"
 }
+
+# Isar becomes root for these; here the whole build is root's.
+run_privileged() {
+	"$@"
+}

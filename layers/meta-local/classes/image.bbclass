@@ -12,6 +12,9 @@ KERNEL_IMAGE ?= "${IMAGE_FULLNAME}-vmlinux"
 KERNEL_IMAGE_PKG ??= "${@'linux-image-' + d.getVar('KERNEL_NAME') if d.getVar('KERNEL_NAME') else ''}"
 IMAGE_INSTALL += "${KERNEL_IMAGE_PKG}"
 IMAGE_BOOT_FILES ??= ""
+DEPLOYDIR = "${WORKDIR}/out"
+# Functions of the recipe that have the last word on the root file system.
+ROOTFS_POSTPROCESS_COMMAND ?= ""
 IMAGE_COMPONENTS ??= "main"
 DTB_FILES ??= ""
 # What needs no room on an appliance. Licence texts stay.
@@ -71,6 +74,7 @@ do_rootfs() {
 		mount --bind /dev "$1/dev"
 		exec chroot "$1" sh -euc "dpkg --install /tmp/debs/*.deb"' rootfs "${IMAGE_ROOTFS}"
 	rm -rf "${IMAGE_ROOTFS}/tmp/debs"
+	${@'\n\t'.join(d.getVar('ROOTFS_POSTPROCESS_COMMAND').split())}
 	sh "${LAYERDIR_core}/lib/clean-rootfs.sh" "${IMAGE_ROOTFS}"
 	tar -cf "${WORKDIR}/tar/rootfs.tar" --sort=name --numeric-owner --xattrs --xattrs-include='*' \
 		--format=posix --pax-option=exthdr.name=%d/PaxHeaders/%f,delete=atime,delete=ctime \
@@ -84,8 +88,8 @@ do_image[file-checksums] += "${LAYERDIR_core}/lib/image.py:True ${LAYERDIR_core}
                              ${LAYERDIR_core}/lib/sbom.py:True ${LAYERDIR_core}/lib/make-disk.sh:True \
                              ${@wks_path(d)}:True"
 do_image[cleandirs] = "${WORKDIR}/disk ${IMAGE_ROOTFS}"
-do_image[keep] = "${WORKDIR}/out"
-do_image[vardeps] += "IMAGE_BOOT_FILES KERNEL_CMDLINE WKS_FILE DTB_FILES"
+do_image[keep] = "${DEPLOYDIR}"
+do_image[vardeps] += "IMAGE_BOOT_FILES WKS_FILE do_copy_boot_files"
 
 def wks_path(d):
     name = d.getVar("WKS_FILE")
@@ -99,14 +103,31 @@ python do_image() {
     import sys
     sys.path.insert(0, os.path.join(d.getVar("LAYERDIR_core"), "lib"))
     import image
+    bb.build.exec_func("unpack_rootfs", d)
+    bb.build.exec_func("do_copy_boot_files", d)
     image.prepare(image.Inputs(
         work=d.getVar("WORKDIR"), rootfs=d.getVar("IMAGE_ROOTFS"), wks=wks_path(d),
-        name=d.getVar("IMAGE_FULLNAME"), cmdline=d.getVar("KERNEL_CMDLINE"),
-        boot_files=d.getVar("IMAGE_BOOT_FILES").split(),
-        dtb_files=d.getVar("DTB_FILES").split(), version=d.getVar("DISTRO_VERSION"),
-        machine=d.getVar("MACHINE"), epoch=int(d.getVar("SOURCE_DATE_EPOCH"))))
+        name=d.getVar("IMAGE_FULLNAME"), boot_files=d.getVar("IMAGE_BOOT_FILES").split(),
+        version=d.getVar("DISTRO_VERSION"), epoch=int(d.getVar("SOURCE_DATE_EPOCH"))))
     bb.build.exec_func("make_disk", d)
     image.finish(d.getVar("WORKDIR"), d.getVar("IMAGE_FULLNAME"))
+}
+
+unpack_rootfs() {
+	tar -xpf "${WORKDIR}/tar/rootfs.tar" --numeric-owner --xattrs --xattrs-include='*' -C "${IMAGE_ROOTFS}"
+}
+
+# Kernel and device trees stand beside the image.
+do_copy_boot_files[cleandirs] = "${DEPLOYDIR}"
+do_copy_boot_files() {
+	cp "${IMAGE_ROOTFS}/boot/vmlinux" "${DEPLOYDIR}/${KERNEL_IMAGE}"
+	for file in ${DTB_FILES}; do
+		dtb=$(find "${IMAGE_ROOTFS}/usr/lib" -path "*/linux-image-*/$file" | head -n 1)
+		if [ -z "$dtb" ]; then
+			die "DTB_FILES: $file is not in the kernel package"
+		fi
+		cp "$dtb" "${DEPLOYDIR}/"
+	done
 }
 
 make_disk() {

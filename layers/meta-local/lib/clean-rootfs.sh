@@ -6,7 +6,6 @@ set -eu
 root=$1
 
 # Each machine makes its own identity at first boot.
-rm -f "$root"/etc/ssh/ssh_host_*_key*
 echo uninitialized > "$root/etc/machine-id"
 rm -f "$root/var/lib/dbus/machine-id" "$root/etc/resolv.conf" "$root/etc/hostname"
 rm -f "$root/var/lib/systemd/random-seed" "$root/var/lib/systemd/credential.secret"

@@ -7,7 +7,6 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
-import subprocess
 import uuid
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,53 +25,21 @@ class Inputs:
     rootfs: str
     wks: str
     name: str
-    cmdline: str
     boot_files: list[str]
-    dtb_files: list[str]
     version: str
-    machine: str
     epoch: int
 
 
-def _unpack(tar: Path, rootfs: Path) -> None:
-    subprocess.run(
-        ["tar", "-xpf", tar, "--numeric-owner", "--xattrs", "--xattrs-include=*", "-C", rootfs],
-        check=True,
-    )
-
-
-def _deploy_kernel(inputs: Inputs, out: Path) -> None:
-    """Kernel and device trees stand beside the image, as Isar lays them."""
-    rootfs = Path(inputs.rootfs)
-    shutil.copy(rootfs / "boot" / "vmlinux", out / f"{inputs.name}-vmlinux")
-    for dtb in inputs.dtb_files:
-        found = sorted(rootfs.glob(f"usr/lib/linux-image-*/{dtb}"))
-        if not found:
-            raise FileNotFoundError(f"DTB_FILES: {dtb} is not in the kernel package")
-        shutil.copy(found[0], out)
-
-
 def _fill_boot(inputs: Inputs, out: Path, boot: Path) -> None:
-    """The boot partition: IMAGE_BOOT_FILES ("source;target"), cmdline.txt, the ecdaq folder."""
+    """The boot partition: IMAGE_BOOT_FILES ("source;target"; bare names stand beside the image)."""
     for entry in inputs.boot_files:
         source, _, target = entry.partition(";")
         found = out / source
         if not found.exists():
-            found = Path(inputs.rootfs) / source
-        if not found.exists():
-            raise FileNotFoundError(
-                f"IMAGE_BOOT_FILES: {source} is neither deployed nor in the root"
-            )
+            raise FileNotFoundError(f"IMAGE_BOOT_FILES: there is no {found}")
         place = boot / (target or found.name)
         place.parent.mkdir(parents=True, exist_ok=True)
-        if found.is_dir():
-            shutil.copytree(found, place, dirs_exist_ok=True)
-        else:
-            shutil.copy(found, place)
-    (boot / "cmdline.txt").write_text(inputs.cmdline + "\n")
-    template = Path(inputs.rootfs) / "usr/share/ecdaq/boot"
-    if template.is_dir():
-        shutil.copytree(template, boot, dirs_exist_ok=True)
+        shutil.copy(found, place)
     for path in [boot, *boot.rglob("*")]:
         os.utime(path, (inputs.epoch, inputs.epoch))
 
@@ -94,11 +61,7 @@ def prepare(inputs: Inputs) -> None:
     """Lay ready in work/disk what make-disk.sh puts together; papers go to work/out."""
     work = Path(inputs.work)
     out = work / "out"
-    shutil.rmtree(out, ignore_errors=True)
-    out.mkdir()
     tar = work / "tar" / "rootfs.tar"
-    _unpack(tar, Path(inputs.rootfs))
-    _deploy_kernel(inputs, out)
     layout = wks.parse(Path(inputs.wks))
     boot = work / "disk" / "boot"
     boot.mkdir(parents=True)
@@ -112,7 +75,6 @@ def prepare(inputs: Inputs) -> None:
     shutil.copy(
         next(Path(inputs.rootfs).glob("boot/config-*")), out / f"{inputs.name}.kernel-config"
     )
-    (out / f"{inputs.name}.cmdline").write_text(inputs.cmdline + "\n")
     with tar.open("rb") as stream:
         digest = hashlib.file_digest(stream, "sha256").hexdigest()
     (out / f"{inputs.name}.rootfs.sha256").write_text(f"{digest}  rootfs.tar\n")

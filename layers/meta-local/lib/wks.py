@@ -20,7 +20,6 @@ class WksError(Exception):
 class Partition:
     """One `part` line."""
 
-    mountpoint: str
     source: str
     fstype: str
     label: str
@@ -78,8 +77,11 @@ def _parse_bootloader(words: list[str]) -> tuple[str, str]:
 
 def _parse_part(words: list[str]) -> Partition:
     given = _part_parser().parse_args(words)
+    if given.mountpoint not in ("", "/"):
+        raise WksError(
+            f"wic would write {given.mountpoint} to /etc/fstab; preinit mounts partitions"
+        )
     return Partition(
-        mountpoint=given.mountpoint,
         source=given.source,
         fstype=given.fstype,
         label=given.label,

@@ -27,3 +27,5 @@ inherit linux-kernel
 KERNEL_NAME_PROVIDED = "ecdaq"
 # "make defconfig KBUILD_DEFCONFIG=defconfig allnoconfig": everything off, then the fragments.
 KERNEL_DEFCONFIG = "defconfig allnoconfig"
+# Isar's default asks for an initramfs generator, too; no machine of ours has an initial RAM disk.
+KERNEL_DEBIAN_DEPENDS = "kmod, linux-base (>= 4.3~)"
