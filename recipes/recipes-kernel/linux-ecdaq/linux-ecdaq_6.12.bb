@@ -21,6 +21,9 @@ SRC_URI = "apt://linux \
 FILESEXTRAPATHS:prepend := "${ECDAQ_TOP}/kernel-config:"
 # One kernel for all machines: what the emulator tests is what a board runs.
 S = "${WORKDIR}/linux"
+# Not quilt, Isar's default: in a source that Debian's own patches are applied to it takes those away, and
+# applies the first of them instead of ours.
+PATCHTOOL = "patch"
 
 inherit linux-kernel
 
