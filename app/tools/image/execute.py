@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import subprocess
 import sys
 import time
 import traceback
@@ -14,6 +15,14 @@ from pathlib import Path
 from graph import Graph, Task
 
 STILL_EVERY_S = 60.0
+# Of each task of a recipe this many kept results stay, those that were used last.
+RESULTS_KEPT = 8
+
+
+def copy_tree(source: Path, target: Path) -> None:
+    """As it is; what holds nothing takes no room: a disk image is mostly that."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    subprocess.run(["cp", "-a", "--reflink=auto", "--sparse=always", source, target], check=True)
 
 
 class BuildError(Exception):
@@ -86,7 +95,8 @@ class Executor:
         kept = self._kept(task)
         assert kept is not None
         shutil.rmtree(kept, ignore_errors=True)
-        shutil.copytree(self._object(task), kept, symlinks=True)
+        copy_tree(self._object(task), kept)
+        os.utime(self._object(task))
 
     def _keep(self, task: Task) -> None:
         kept = self._kept(task)
@@ -96,9 +106,17 @@ class Executor:
         part = target.with_name(target.name + f".part-{os.getpid()}")
         shutil.rmtree(part, ignore_errors=True)
         part.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copytree(kept, part, symlinks=True)
+        copy_tree(kept, part)
         shutil.rmtree(target, ignore_errors=True)
         part.rename(target)
+        os.utime(target)
+        self.make_room(task)
+
+    def make_room(self, task: Task) -> None:
+        """Kept results of `task` that were not used for long go."""
+        kept = self._object(task).parent.glob(f"{task.name}-*")
+        for old in sorted(kept, key=lambda p: p.stat().st_mtime)[:-RESULTS_KEPT]:
+            shutil.rmtree(old, ignore_errors=True)
 
     def _child(self, task: Task) -> int:
         """In a process of its own: BitBake changes environment, folder and descriptors."""
