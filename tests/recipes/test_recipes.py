@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 import rules
 from conftest import MACHINES, TOP
+from execute import copy_tree
 from graph import Graph, Task
 from metadata import Metadata, MetadataError, Recipe
 
@@ -93,10 +94,7 @@ def test_no_registry_is_named() -> None:
 
 
 def test_an_error_in_a_recipe_is_told_with_file_and_line(tmp_path: Path) -> None:
-    top = tmp_path / "tree"
-    for folder in ("layers", "recipes"):
-        (top / folder).parent.mkdir(parents=True, exist_ok=True)
-        copy_tree(TOP / folder, top / folder)
+    top = tree_copy(tmp_path)
     broken = top / "recipes" / "recipes-app" / "ecdaq" / "ecdaq_0.1.0.bb"
     broken.write_text(broken.read_text() + "\nthis is no assignment\n")
     line = len(broken.read_text().splitlines())
@@ -105,9 +103,35 @@ def test_an_error_in_a_recipe_is_told_with_file_and_line(tmp_path: Path) -> None
     assert f"{broken.name}:{line}" in str(caught.value)
 
 
-def copy_tree(source: Path, target: Path) -> None:
-    for path in source.rglob("*"):
-        if path.is_file():
-            place = target / path.relative_to(source)
-            place.parent.mkdir(parents=True, exist_ok=True)
-            place.write_bytes(path.read_bytes())
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("layers/meta-ecdaq/conf/machine/include/ecdaq-cmdline.inc", "panic=5", "panic=6"),
+        ("recipes/recipes-core/ecdaq-image/ecdaq-image.bb", "ssh_host_*_key*", "ssh_host_*"),
+        ("layers/meta-local/classes/image.bbclass", "head -n 1)", "tail -n 1)"),
+    ],
+    ids=["command line", "function of the recipe", "function of the class"],
+)
+def test_a_change_in_what_the_disk_holds_makes_the_image_anew(
+    tmp_path: Path, name: str, old: str, new: str
+) -> None:
+    # Trees of their own: BitBake remembers files by their path.
+    before, same, changed = (tree_copy(tmp_path / name) for name in ("before", "same", "changed"))
+    text = (changed / name).read_text()
+    assert old in text
+    (changed / name).write_text(text.replace(old, new))
+    assert image_hash(same) == image_hash(before)
+    assert image_hash(changed) != image_hash(before)
+
+
+def image_hash(top: Path) -> str:
+    settings = {"MACHINE": "qemuarm64", "DISTRO": "ecdaq", "TMPDIR": "/tmp", "ECDAQ_TOP": str(TOP)}
+    return Graph(Metadata(top, top.parent / "build", settings)).hash(
+        Task("ecdaq-image", "do_image")
+    )
+
+
+def tree_copy(folder: Path) -> Path:
+    for name in ("layers", "recipes", "kernel-config"):
+        copy_tree(TOP / name, folder / "tree" / name)
+    return folder / "tree"

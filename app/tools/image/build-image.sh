@@ -28,7 +28,7 @@ command line, the package list (.manifest), the bill of materials (.spdx.json) a
 
 environment:
   ECDAQ_APT_MIRROR  Debian mirror to take packages from (default: the one this machine's apt uses)
-  XDG_CACHE_HOME    ecdaq/image/ below it keeps everything between runs, about 8 GB (default: ~/.cache)
+  XDG_CACHE_HOME    ecdaq/image/ below it keeps everything between runs, 11 GB at first, up to 20 GB (default: ~/.cache)
   PYTHON            Python 3.11 or newer with venv (default: python3)
 USAGE
 }
