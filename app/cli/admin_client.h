@@ -3,7 +3,7 @@
 #ifndef CLI_ADMIN_CLIENT_H
 #define CLI_ADMIN_CLIENT_H
 
-#include "admin/protocol.h"
+#include "base/admin_protocol.h"
 #include "cli/cli.h"
 
 /**

@@ -11,12 +11,12 @@ set_target_properties(ecdaq_client_shared PROPERTIES OUTPUT_NAME ecdaq LINKER_LA
 target_link_libraries(ecdaq_client_shared PRIVATE m)
 install(TARGETS ecdaq_client ecdaq_client_shared
 	ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
-install(FILES base/board.h base/clock.h base/event.h base/histogram.h base/limits.h base/ring.h
-	base/sample.h base/status.h base/sync0.h base/timemap.h
+install(FILES core/base/board.h core/base/clock.h core/base/event.h core/base/histogram.h core/base/limits.h core/base/ring.h
+	core/base/sample.h core/base/status.h core/base/sync0.h core/base/timemap.h
 	DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq/base)
 # Control programs say <ecdaq/control.h>.
-install(FILES control/control.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq)
-install(FILES image/image.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq/image)
+install(FILES master/control/control.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq)
+install(FILES core/image/image.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq/image)
 
 file(RELATIVE_PATH ECDAQ_PC_TO_PREFIX "/${CMAKE_INSTALL_LIBDIR}/pkgconfig" "/")
 configure_file(cmake/ecdaq.pc.in ecdaq.pc @ONLY)

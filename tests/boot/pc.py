@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The program on the PC: reads samples for some seconds, then switches the LED on, off and on.
 
-pc.py INTERFACE DOMAIN SECONDS; one JSON object on standard output. The kit (app/publish/python) has
-to be on PYTHONPATH.
+pc.py INTERFACE DOMAIN SECONDS; one JSON object on standard output. The kit
+(app/services/publish/python) has to be on PYTHONPATH.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#include "admin/protocol.h"
+#include "base/admin_protocol.h"
 #include "base/bytes.h"
 #include "base/histogram.h"
 #include "fake.h"

@@ -2,9 +2,9 @@
 #include "bench.h"
 
 #include "base/bytes.h"
+#include "devices/catalogue.h"
 #include "harness/test.h"
 #include "player.h"
-#include "sim/catalogue.h"
 #include "wire/datagram.h"
 #include "wire/esc_reg.h"
 #include "wire/sii.h"

@@ -5,7 +5,7 @@
 
 #include "capture.h"
 #include "compare.h"
-#include "sim/segment.h"
+#include "segment/segment.h"
 
 enum { BENCH_SLAVES = 8 };
 

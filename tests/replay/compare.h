@@ -7,7 +7,7 @@
 #include <stdint.h>
 
 #include "capture.h"
-#include "sim/segment.h"
+#include "segment/segment.h"
 
 enum { COMPARE_ROWS = 64 };
 

@@ -9,7 +9,7 @@
 #define TESTS_REPLAY_PLAYER_H
 
 #include "capture.h"
-#include "sim/device.h"
+#include "segment/device.h"
 
 /**
  * The application of @station; the capture's first frame is sent at @start_ns. It looks at AL

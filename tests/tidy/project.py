@@ -9,6 +9,9 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+# Wings (folders of app/) that hold modules; the others are one module each.
+WINGS_OF_MODULES = ("core", "master", "services", "sim")
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -24,10 +27,16 @@ class Source:
         return self.text.splitlines()
 
     @property
-    def module(self) -> str:
+    def wing(self) -> str:
         """The folder below app/, or an empty string."""
         parts = self.path.split("/")
         return parts[1] if len(parts) > 2 and parts[0] == "app" else ""
+
+    @property
+    def module(self) -> str:
+        """The folder below the wing, where the wing has modules; the wing where it has none."""
+        parts = self.path.split("/")
+        return parts[2] if self.wing in WINGS_OF_MODULES and len(parts) > 3 else self.wing
 
     @property
     def is_c(self) -> bool:

@@ -28,58 +28,92 @@ class Case:
 
 
 CASES = [
-    Case(rules.rule_includes, "app/wire/a.c", '#include "bus/bus.h"', '#include "base/bytes.h"'),
-    Case(rules.rule_includes, "app/base/a.c", '#include "wire/al.h"', '#include "clock.h"'),
+    Case(
+        rules.rule_includes, "app/core/wire/a.c", '#include "bus/bus.h"', '#include "base/bytes.h"'
+    ),
+    Case(rules.rule_includes, "app/core/base/a.c", '#include "wire/al.h"', '#include "clock.h"'),
     Case(rules.rule_includes, "app/cli/a.c", '#include "cycle/cycle.h"', '#include "base/ring.h"'),
     Case(rules.rule_includes, "app/cli/a.c", '#include "record/mcap.h"', '#include "record/log.h"'),
-    Case(rules.rule_includes, "app/cli/a.c", '#include "admin/a.h"', '#include "admin/protocol.h"'),
-    Case(rules.rule_includes, "app/sim/a.c", '#include "link/line.h"', '#include "wire/al.h"'),
-    Case(rules.rule_includes, "app/config/a.c", '#include "bus/bus.h"', "#include <yaml.h>"),
-    Case(rules.rule_includes, "app/cycle/a.c", '#include "ethercat.h"', '#include "bus/bus.h"'),
-    Case(rules.rule_includes, "app/cycle/a.c", "#include <oshw.h>", "#include <sched.h>"),
-    Case(rules.rule_includes, "app/record/a.c", "# include <dds/dds.h>", "#include <zstd.h>"),
+    Case(
+        rules.rule_includes,
+        "app/cli/a.c",
+        '#include "admin/a.h"',
+        '#include "base/admin_protocol.h"',
+    ),
+    Case(
+        rules.rule_includes, "app/sim/segment/a.c", '#include "link/line.h"', '#include "wire/al.h"'
+    ),
+    Case(rules.rule_includes, "app/core/config/a.c", '#include "bus/bus.h"', "#include <yaml.h>"),
+    Case(
+        rules.rule_includes, "app/master/cycle/a.c", '#include "ethercat.h"', '#include "bus/bus.h"'
+    ),
+    Case(rules.rule_includes, "app/master/cycle/a.c", "#include <oshw.h>", "#include <sched.h>"),
+    Case(
+        rules.rule_includes, "app/services/record/a.c", "# include <dds/dds.h>", "#include <zstd.h>"
+    ),
     Case(rules.rule_includes, "app/cli/a.c", "#include <gpiod.h>", "#include <poll.h>"),
     Case(rules.rule_known_module, "app/misc/a.c", "int a;", ""),
     Case(rules.rule_banned_calls, "app/cli/a.c", "\tstrcpy(a, b);", "\tsnprintf(a, 4, b);"),
     Case(rules.rule_banned_calls, "app/cli/a.c", "\tn = atoi(s);", "\tn = strtol(s, &e, 10);"),
     Case(rules.rule_banned_calls, "app/cli/a.c", "\tusleep (5);", "/* usleep(5) is banned */"),
-    Case(rules.rule_banned_calls, "app/bus/a.c", '\tprintf("x");', '\tsnprintf(b, 2, "printf(");'),
-    Case(rules.rule_banned_calls, "app/bus/a.c", "\tfprintf(stderr, s);", "\tfprintf(out, s);"),
-    Case(rules.rule_banned_calls, "app/bus/a.c", "\tfputs(s, stderr);", "\tfputs(s, out);"),
-    Case(rules.rule_banned_calls, "app/bus/a.c", "\tsleep(1);", "\tplat->sleep(1);"),
-    Case(rules.rule_banned_calls, "app/bus/a.c", "\tsignal(2, f);", "\tsigaction(2, &a, 0);"),
-    Case(rules.rule_realtime_clock, "app/bus/a.c", "t(CLOCK_REALTIME);", "t(CLOCK_TAI);"),
+    Case(
+        rules.rule_banned_calls,
+        "app/master/bus/a.c",
+        '\tprintf("x");',
+        '\tsnprintf(b, 2, "printf(");',
+    ),
+    Case(
+        rules.rule_banned_calls, "app/master/bus/a.c", "\tfprintf(stderr, s);", "\tfprintf(out, s);"
+    ),
+    Case(rules.rule_banned_calls, "app/master/bus/a.c", "\tfputs(s, stderr);", "\tfputs(s, out);"),
+    Case(rules.rule_banned_calls, "app/master/bus/a.c", "\tsleep(1);", "\tplat->sleep(1);"),
+    Case(
+        rules.rule_banned_calls, "app/master/bus/a.c", "\tsignal(2, f);", "\tsigaction(2, &a, 0);"
+    ),
+    Case(rules.rule_realtime_clock, "app/master/bus/a.c", "t(CLOCK_REALTIME);", "t(CLOCK_TAI);"),
     Case(
         rules.rule_allocation,
-        "app/cycle/a.c",
+        "app/master/cycle/a.c",
         "int cycle_run(void)\n{\n\tp = malloc(4);\n}\n",
         "int cycle_create(void)\n{\n\tp = malloc(4);\n}\n",
     ),
-    Case(rules.rule_unfinished, "app/bus/a.c", "/* FIX" + "ME later */", "/* fixed */"),
+    Case(rules.rule_unfinished, "app/master/bus/a.c", "/* FIX" + "ME later */", "/* fixed */"),
     Case(rules.rule_unfinished, "tests/sim/a.c", "#if  0", "#if 01 == FOO"),
-    Case(rules.rule_bool_parameters, "app/bus/a.h", "int f(int a, bool b);", "bool f(int a);"),
     Case(
-        rules.rule_bool_parameters, "app/bus/a.h", "int f(bool a,\n\tint b);", "struct { bool a; };"
+        rules.rule_bool_parameters, "app/master/bus/a.h", "int f(int a, bool b);", "bool f(int a);"
     ),
-    Case(rules.rule_file_size, "app/bus/a.c", "\n" * 401, "\n" * 400),
+    Case(
+        rules.rule_bool_parameters,
+        "app/master/bus/a.h",
+        "int f(bool a,\n\tint b);",
+        "struct { bool a; };",
+    ),
+    Case(rules.rule_file_size, "app/master/bus/a.c", "\n" * 401, "\n" * 400),
     Case(
         rules.rule_function_size,
-        "app/bus/a.c",
+        "app/master/bus/a.c",
         LONG_FUNCTION,
         LONG_FUNCTION.replace("\tg();\n", "", 1),
     ),
     Case(rules.rule_function_size, "tests/a.py", "def f():\n" + "    g()\n" * 70, "f = 1\n"),
-    Case(rules.rule_spdx, "app/bus/a.c", "int a;\n", SPDX_C + "int a;\n"),
+    Case(rules.rule_spdx, "app/master/bus/a.c", "int a;\n", SPDX_C + "int a;\n"),
     Case(
         rules.rule_spdx, "app/a.sh", "#!/bin/sh\nset\n", "#!/bin/sh\n# SPDX-License-Identifier: MIT"
     ),
     Case(rules.rule_banned_text, "README.md", f"see {HOST}", "see pip.conf"),
     Case(rules.rule_banned_text, "README.md", f"in {PLACE}", "in ./work/main"),
     Case(rules.rule_foreign_code, "app/third_party/soem/soem/a.c", "int a;", ""),
-    Case(rules.rule_foreign_code, "app/bus/a.c", "* under the GNU General Public License", SPDX_C),
+    Case(
+        rules.rule_foreign_code,
+        "app/master/bus/a.c",
+        "* under the GNU General Public License",
+        SPDX_C,
+    ),
     Case(rules.rule_patch_reason, "app/third_party/patches/0001-x.patch", "--- a/x\n+++ b/x\n", ""),
     Case(rules.rule_patch_reason, "app/third_party/patches/fix.patch", "--- a/x\n", ""),
-    Case(rules.rule_test_waits, "tests/unit/bus/a.c", "\tusleep(3);", "\tpoll(&p, 1, 1000);"),
+    Case(
+        rules.rule_test_waits, "tests/unit/master/bus/a.c", "\tusleep(3);", "\tpoll(&p, 1, 1000);"
+    ),
     Case(
         rules.rule_test_waits,
         "tests/live/test_a.py",
@@ -101,6 +135,23 @@ def test_a_rule_finds_the_breach_and_only_that(case: Case) -> None:
         assert not list(case.rule(Source(case.path, case.good)))
 
 
+@pytest.mark.parametrize(
+    ("wing", "module", "allowed"),
+    [
+        ("core", "base", True),
+        ("core", "cycle", False),
+        ("master", "config", True),
+        ("master", "record", False),
+        ("services", "bus", False),
+        ("cli", "record", False),
+        ("sim", "wire", True),
+        ("sim", "config", False),
+    ],
+)
+def test_a_wing_includes_core_and_itself(wing: str, module: str, allowed: bool) -> None:
+    assert rules.wing_may_include(wing, module) == allowed
+
+
 def test_a_patch_with_number_and_reason_is_fine() -> None:
     assert not list(rules.rule_patch_reason(Source("p/0001-count-once.patch", GOOD_PATCH)))
 
@@ -112,16 +163,16 @@ def test_each_rule_is_shown_to_fail(rule: rules.Rule) -> None:
 
 def test_a_source_that_no_list_names_is_found() -> None:
     lines = "set(dir deep)\necdaq_module(bus SOURCES a.c ${dir}/b.c)"
-    built = Source("app/bus/CMakeLists.txt", lines)
-    named = [Source("app/bus/a.c", ""), Source("app/bus/deep/b.c", "")]
+    built = Source("app/master/bus/CMakeLists.txt", lines)
+    named = [Source("app/master/bus/a.c", ""), Source("app/master/bus/deep/b.c", "")]
     assert not list(whole_tree.unlisted_sources([built, *named]))
-    for stray in ("app/bus/c.c", "app/bus/b.c", "app/wire/a.c"):
+    for stray in ("app/master/bus/c.c", "app/master/bus/b.c", "app/core/wire/a.c"):
         assert list(whole_tree.unlisted_sources([built, *named, Source(stray, "")]))
 
 
 def test_a_doubled_test_name_is_found() -> None:
-    one = Source("tests/unit/bus/a.c", "TEST(bus, works)\n")
-    two = Source("tests/unit/bus/b.c", "TEST(bus,  works)\n")
+    one = Source("tests/unit/master/bus/a.c", "TEST(bus, works)\n")
+    two = Source("tests/unit/master/bus/b.c", "TEST(bus,  works)\n")
     assert not list(whole_tree.doubled_test_names([one]))
     assert list(whole_tree.doubled_test_names([one, two]))
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "sim/devices/coe_dictionary.h"
+#include "devices/coe_dictionary.h"
 
 #include <string.h>
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "sim/devices/coe_information.h"
+#include "devices/coe_information.h"
 
 #include <string.h>
 

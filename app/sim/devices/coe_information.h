@@ -6,7 +6,7 @@
 #ifndef SIM_DEVICES_COE_INFORMATION_H
 #define SIM_DEVICES_COE_INFORMATION_H
 
-#include "sim/devices/coe_dictionary.h"
+#include "devices/coe_dictionary.h"
 
 /**
  * Answer one SDO information service: @request and @answer begin with the CoE header, @capacity is

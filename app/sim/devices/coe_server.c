@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-#include "sim/devices/coe_server.h"
+#include "devices/coe_server.h"
 
 #include <string.h>
 
 #include "base/bytes.h"
-#include "sim/devices/coe_information.h"
+#include "devices/coe_information.h"
 
 enum coe_service { COE_SDO_REQUEST = 2, COE_SDO_RESPONSE = 3, COE_SDO_INFORMATION = 8 };
 

@@ -7,7 +7,7 @@
 #ifndef SIM_DEVICES_COE_SERVER_H
 #define SIM_DEVICES_COE_SERVER_H
 
-#include "sim/devices/coe_dictionary.h"
+#include "devices/coe_dictionary.h"
 
 enum { COE_UPLOAD_BYTES = 2048 };
 

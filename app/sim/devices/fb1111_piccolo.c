@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-#include "sim/devices/fb1111_piccolo.h"
+#include "devices/fb1111_piccolo.h"
 
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "devices/pdi_spi.h"
 #include "firmware/fb1111_piccolo/host/sii.h"
 #include "firmware/fb1111_piccolo/piccolo.h"
-#include "sim/devices/pdi_spi.h"
 
 enum {
 	WIRE_NS = 255,       /* two PHYs and 1 m of cable */

@@ -9,8 +9,8 @@
 
 #include <stdint.h>
 
-#include "sim/device.h"
-#include "sim/segment.h"
+#include "segment/device.h"
+#include "segment/segment.h"
 
 enum {
 	FB1111_PICCOLO_INTERRUPT_NS = 500,  /* SYNC0 edge to the first SPI octet, at 90 MHz */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "sim/devices/mailbox.h"
+#include "devices/mailbox.h"
 
 #include <string.h>
 

@@ -10,7 +10,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "sim/esc.h"
+#include "segment/esc.h"
 
 enum { MAILBOX_BYTES = 1486, MAILBOX_HEADER_BYTES = 6 };
 

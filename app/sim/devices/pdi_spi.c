@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "sim/devices/pdi_spi.h"
+#include "devices/pdi_spi.h"
 
 #include <string.h>
 

@@ -13,7 +13,7 @@
 
 #include <stdint.h>
 
-#include "sim/esc.h"
+#include "segment/esc.h"
 
 enum {
 	PDI_SPI_OCTET_TENTH_NS = 7997, /* 799.7 ns an octet, as measured on the board */

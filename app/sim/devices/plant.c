@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "sim/devices/plant.h"
+#include "devices/plant.h"
 
 #include <errno.h>
 #include <math.h>
@@ -8,8 +8,8 @@
 #include <string.h>
 
 #include "base/bytes.h"
-#include "sim/devices/plant_sii.h"
-#include "sim/devices/slave_application.h"
+#include "devices/plant_sii.h"
+#include "devices/slave_application.h"
 #include "wire/al.h"
 #include "wire/esc_reg.h"
 #include "wire/sii.h"

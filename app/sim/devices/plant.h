@@ -12,8 +12,8 @@
 #ifndef SIM_DEVICES_PLANT_H
 #define SIM_DEVICES_PLANT_H
 
-#include "sim/device.h"
-#include "sim/segment.h"
+#include "segment/device.h"
+#include "segment/segment.h"
 
 #define PLANT_TAU_S 0.05
 #define PLANT_GAIN 1.0

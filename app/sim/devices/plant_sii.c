@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-#include "sim/devices/plant_sii.h"
+#include "devices/plant_sii.h"
 
 #include <assert.h>
 #include <string.h>
 
 #include "base/bytes.h"
-#include "sim/devices/slave_application.h"
+#include "devices/slave_application.h"
 #include "wire/sii.h"
 
 enum sii_byte {

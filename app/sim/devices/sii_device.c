@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/device.h"
-#include "sim/devices/slave_application.h"
+#include "devices/slave_application.h"
+#include "segment/device.h"
 #include "wire/al.h"
 #include "wire/esc_reg.h"
 #include "wire/sii.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "sim/devices/slave_application.h"
+#include "devices/slave_application.h"
 
 #include "base/bytes.h"
 #include "wire/al.h"

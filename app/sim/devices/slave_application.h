@@ -10,9 +10,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "sim/devices/coe_server.h"
-#include "sim/devices/mailbox.h"
-#include "sim/esc.h"
+#include "devices/coe_server.h"
+#include "devices/mailbox.h"
+#include "segment/esc.h"
 #include "wire/sii.h"
 
 enum { SLAVE_APPLICATION_PASS_NS = 500000 }; /* its main loop */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "sim/devices/wago_750_354.h"
+#include "devices/wago_750_354.h"
 
 #include <errno.h>
 #include <math.h>
@@ -7,8 +7,8 @@
 #include <string.h>
 
 #include "base/bytes.h"
-#include "sim/devices/slave_application.h"
-#include "sim/devices/wago_text.h"
+#include "devices/slave_application.h"
+#include "devices/wago_text.h"
 #include "wire/al.h"
 #include "wire/esc_reg.h"
 

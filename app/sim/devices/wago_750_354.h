@@ -10,9 +10,9 @@
 
 #include <stdint.h>
 
-#include "sim/device.h"
-#include "sim/devices/wago_node.h"
-#include "sim/segment.h"
+#include "devices/wago_node.h"
+#include "segment/device.h"
+#include "segment/segment.h"
 
 enum {
 	WAGO_KBUS_NS = 250000,      /* one K-bus cycle, start to the new inputs in SM3 */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "sim/devices/wago_node.h"
+#include "devices/wago_node.h"
 
 #include <assert.h>
 #include <errno.h>

@@ -11,7 +11,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "sim/devices/coe_dictionary.h"
+#include "devices/coe_dictionary.h"
 #include "wire/sii.h"
 
 enum wago_limits {

@@ -4,8 +4,8 @@
 #include <string.h>
 
 #include "base/bytes.h"
-#include "sim/devices/slave_application.h"
-#include "sim/devices/wago_node.h"
+#include "devices/slave_application.h"
+#include "devices/wago_node.h"
 
 enum sii_byte {
 	SII_PDI_CONTROL = 0x00,

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "sim/devices/wago_text.h"
+#include "devices/wago_text.h"
 
 #include <errno.h>
 #include <stdarg.h>
@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/devices/wago_750_354.h"
+#include "devices/wago_750_354.h"
 
 #define NAME "wago_750_354"
 #define EXAMPLE NAME "+457+557+430+530"

@@ -14,8 +14,8 @@
 
 #include <stddef.h>
 
-#include "sim/device.h"
-#include "sim/segment.h"
+#include "segment/device.h"
+#include "segment/segment.h"
 
 /** 1 if @name is this coupler's, whatever stands behind it. */
 int wago_750_354_is_name(const char *name);

@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "base/bytes.h"
-#include "sim/segment.h"
+#include "segment/segment.h"
 #include "wire/datagram.h"
 #include "wire/sii.h"
 

@@ -3,9 +3,9 @@
 #include <errno.h>
 
 #include "base/bytes.h"
+#include "devices/fb1111_piccolo.h"
 #include "harness/test.h"
 #include "sim/bus/bus_bench.h"
-#include "sim/devices/fb1111_piccolo.h"
 #include "wire/esc_reg.h"
 
 static int64_t edge_ns[LIMIT_SLAVES];

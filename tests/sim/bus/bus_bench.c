@@ -3,9 +3,9 @@
 
 #include "base/bytes.h"
 #include "base/prng.h"
+#include "devices/catalogue.h"
+#include "devices/fb1111_piccolo.h"
 #include "harness/test.h"
-#include "sim/catalogue.h"
-#include "sim/devices/fb1111_piccolo.h"
 #include "wire/datagram.h"
 #include "wire/esc_reg.h"
 

@@ -10,9 +10,9 @@
 
 #include "bus/bus.h"
 #include "config/config.h"
-#include "sim/fault.h"
-#include "sim/in_process.h"
-#include "sim/segment.h"
+#include "segment/fault.h"
+#include "segment/in_process.h"
+#include "segment/segment.h"
 
 enum { BENCH_SIIS = 8 };
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The example "blink": the LED by process data, a pulse by one-shot SYNC0. */
+#include "devices/fb1111_piccolo.h"
 #include "harness/test.h"
-#include "sim/devices/fb1111_piccolo.h"
 #include "sim/harness/virtual_master.h"
 
 enum { EVERY_CYCLES = 40, RUN_CYCLES = 1000 };

@@ -2,9 +2,9 @@
 /* The example "pi_loop" round the simulated plant: how fast and how exactly it settles. */
 #include <math.h>
 
+#include "devices/plant.h"
 #include "harness/control_probe/probe.h"
 #include "harness/test.h"
-#include "sim/devices/plant.h"
 #include "sim/harness/virtual_master.h"
 
 #define SET 50.0

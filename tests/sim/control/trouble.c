@@ -4,9 +4,9 @@
 #include <signal.h>
 
 #include "base/event.h"
+#include "devices/fb1111_piccolo.h"
 #include "harness/control_probe/probe.h"
 #include "harness/test.h"
-#include "sim/devices/fb1111_piccolo.h"
 #include "sim/harness/rt_guard.h"
 #include "sim/harness/virtual_master.h"
 #include "wire/al.h"

@@ -2,8 +2,8 @@
 #include "sim/harness/virtual_bench.h"
 
 #include "base/prng.h"
+#include "devices/fb1111_piccolo.h"
 #include "harness/test.h"
-#include "sim/devices/fb1111_piccolo.h"
 
 enum {
 	DEFAULT_SLAVES = 2,

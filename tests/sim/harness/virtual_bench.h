@@ -10,8 +10,8 @@
 #include <stdint.h>
 
 #include "base/limits.h"
-#include "sim/in_process.h"
-#include "sim/segment.h"
+#include "segment/in_process.h"
+#include "segment/segment.h"
 
 /* 2026-11-19: TAI that the host's clock starts at. */
 #define VIRTUAL_TAI_START_NS (INT64_C(1795000000) * NS_PER_S)

@@ -9,7 +9,7 @@
 
 #include <stdint.h>
 
-#include "admin/protocol.h"
+#include "base/admin_protocol.h"
 #include "base/ring.h"
 #include "base/sample.h"
 #include "config/config.h"

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 #include "coupler.h"
 
+#include "devices/wago_750_354.h"
+#include "devices/wago_text.h"
 #include "harness/test.h"
-#include "sim/devices/wago_750_354.h"
-#include "sim/devices/wago_text.h"
 
 static double signal_hz;
 

@@ -2,8 +2,8 @@
 /* Outputs and one-shot conversions, through the admin socket as `ecdaq` uses it. */
 #include <errno.h>
 
+#include "devices/fb1111_piccolo.h"
 #include "harness/test.h"
-#include "sim/devices/fb1111_piccolo.h"
 #include "sim/harness/virtual_master.h"
 
 enum { STATUS_ONESHOT = 1, STATUS_ARMED = 2 };

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* SampleV1 and BlockV1 of app/publish/idl/ecdaq.idl, read with Fast-CDR. */
+/* SampleV1 and BlockV1 of app/services/publish/idl/ecdaq.idl, read with Fast-CDR. */
 #pragma once
 
 #include <cstdint>

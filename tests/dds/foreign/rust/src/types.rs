@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-//! SampleV1 and BlockV1 of app/publish/idl/ecdaq.idl, and their lines of CSV.
+//! SampleV1 and BlockV1 of app/services/publish/idl/ecdaq.idl, and their lines of CSV.
 
 use std::io::{Result, Write};
 

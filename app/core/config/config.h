@@ -1,0 +1,207 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The configuration of all programs, one struct filled from one file (ecdaq.yaml) by one option
+ * table (options.c). Every field is documented there, with default, range and unit.
+ */
+#ifndef CONFIG_CONFIG_H
+#define CONFIG_CONFIG_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/limits.h"
+
+enum config_poll { CONFIG_POLL_AUTO, CONFIG_POLL_SPIN, CONFIG_POLL_SLEEP };
+enum config_overrun { CONFIG_OVERRUN_COUNT, CONFIG_OVERRUN_FAIL_SAFE, CONFIG_OVERRUN_STOP };
+enum config_mode { CONFIG_MODE_UNSET, CONFIG_MODE_PERIODIC, CONFIG_MODE_ONESHOT };
+enum config_owner { CONFIG_OWNER_LOCAL, CONFIG_OWNER_PROGRAM, CONFIG_OWNER_REMOTE };
+enum config_edge_clock { CONFIG_EDGE_AUTO, CONFIG_EDGE_MONOTONIC, CONFIG_EDGE_HTE };
+enum config_presence { CONFIG_ANY_SLAVES, CONFIG_EXACT_SLAVES };
+enum config_datagrams { CONFIG_DATAGRAMS_ONE, CONFIG_DATAGRAMS_PER_SLAVE };
+
+enum { CONFIG_LIMIT_SDOS = 256, CONFIG_LIMIT_OUTPUTS = 512, CONFIG_PATH_BYTES = 256 };
+enum { CONFIG_OPTIONS_BYTES = 512 };
+
+/* slaves[]: what is expected at each position, and how it is set up. */
+struct config_slave {
+	char name[32];         /* "" = made from the device name and position */
+	uint32_t vendor;       /* 0 = any */
+	uint32_t product;      /* 0 = any */
+	uint32_t revision;     /* 0 = any */
+	uint32_t alias;        /* 0 = any */
+	enum config_mode mode; /* FB1111-Piccolo: writes 0x8000:01 in PRE-OP */
+	int64_t sync0_shift_ns;
+	char sync0_line[96];      /* GPIO line its SYNC0 is wired to; "" = none */
+	uint32_t assign_activate; /* 0 = from what the slave is: DC slaves 0x0300 */
+	int line;                 /* in the file, for messages */
+};
+
+/* slaves[].sdo[]: written in PRE-OP, in order. */
+struct config_sdo {
+	uint16_t slave_pos;
+	uint16_t index;
+	uint8_t subindex;
+	uint8_t bytes; /* 1, 2, 4, 8 */
+	uint64_t value;
+	int line;
+};
+
+/* outputs[]: by channel name. */
+struct config_output {
+	char channel[LIMIT_NAME_BYTES];
+	enum config_owner owner;
+	double fail_safe; /* physical value */
+	double min;       /* physical */
+	double max;
+	int64_t timeout_ns; /* remote owners; 0 = none */
+	int line;
+};
+
+struct config {
+	/* runtime */
+	char run_dir[CONFIG_PATH_BYTES]; /* ring, events, status, admin socket; "" = default */
+	char group[32];                  /* of the admin socket and the shared files; "" = leave */
+	/* bus */
+	char interface[32];
+	int64_t bus_scan_timeout_ns;
+	int64_t bus_op_timeout_ns;
+	int64_t bus_frame_timeout_ns;
+	int64_t bus_watchdog_ns; /* SM watchdog of the slaves; 0 = leave */
+	uint32_t bus_wkc_miss_limit_cycles;
+	uint32_t bus_monitor; /* 1: BRD of AL status and 0x092C in every cycle */
+	enum config_presence bus_presence;
+	enum config_datagrams bus_datagrams;
+	/* cycle */
+	int64_t cycle_period_ns;
+	double cycle_phase_percent;   /* set point: frame after SYNC0, share of the period */
+	double cycle_receive_percent; /* receive deadline, share of the period */
+	int32_t cycle_cpu;            /* -1 = do not pin */
+	uint32_t cycle_priority;      /* SCHED_FIFO; 0 = do not ask for it */
+	enum config_poll cycle_poll;
+	enum config_overrun cycle_overrun;
+	uint32_t cycle_lock_memory;
+	int32_t cycle_cpu_dma_latency_us; /* -1 = leave */
+	/* dc */
+	uint32_t dc_enable;
+	int64_t dc_lock_limit_ns; /* |filtered phase error| below this */
+	uint32_t dc_lock_cycles;  /* for so many cycles */
+	int64_t dc_unlock_limit_ns;
+	int64_t dc_slew_ns; /* largest correction a cycle */
+	double dc_kp;
+	double dc_ki;
+	int64_t dc_diff_limit_ns; /* |0x092C| before SYNC0 is started */
+	int64_t dc_lock_timeout_ns;
+	uint32_t dc_burst_frames;  /* static drift compensation */
+	int64_t dc_sync0_pulse_ns; /* for documentation and checks: comes from SII */
+	/* control */
+	char control_program[CONFIG_PATH_BYTES];    /* shared object; "" = none */
+	char control_options[CONFIG_OPTIONS_BYTES]; /* "KEY=VALUE, ..."; "" = none */
+	int64_t control_budget_ns;
+	enum config_overrun control_overrun;
+	int64_t control_stuck_ns; /* so long inside one call: the process ends */
+	/* ring */
+	int64_t ring_depth_ns;
+	uint32_t event_depth;
+	/* record */
+	uint32_t record_enable;
+	char record_dir[CONFIG_PATH_BYTES];
+	int64_t record_chunk_period_ns;
+	int64_t record_sync_period_ns;
+	int64_t record_rotate_period_ns;
+	uint64_t record_rotate_bytes;
+	uint64_t record_budget_bytes;  /* oldest files go above this; 0 = none */
+	uint64_t record_reserve_bytes; /* stop with less than this free */
+	int32_t record_compression;    /* zstd level, 0 = none */
+	/* dds */
+	uint32_t dds_enable;
+	char dds_interface[32];
+	uint32_t dds_domain;
+	char dds_tag[64]; /* "" = none */
+	uint32_t dds_multicast;
+	char dds_peers[CONFIG_PATH_BYTES]; /* addresses, comma between; "" = none */
+	uint32_t dds_block_cycles;         /* 0 = no blocks */
+	uint32_t dds_allow_insecure_commands;
+	uint32_t dds_command_rate;            /* commands a second and commander */
+	char dds_security[CONFIG_PATH_BYTES]; /* folder of our keys; "" = no DDS Security */
+	uint32_t dds_ros2_mirror;
+	/* sync0 */
+	uint32_t sync0_enable;
+	char sync0_edges[CONFIG_PATH_BYTES]; /* edge file of ecdaq-sim instead of lines; "" = lines
+					      */
+	int64_t sync0_window_ns;
+	int64_t sync0_lost_ns; /* so long without an edge: lost */
+	uint32_t sync0_buffer; /* events that the kernel queues */
+	enum config_edge_clock sync0_clock;
+	int32_t sync0_cpu; /* -1 = do not pin */
+	char sync0_calibration[CONFIG_PATH_BYTES];
+	double sync0_drift_limit_ppm; /* limits: 0 = not judged */
+	double sync0_rate_limit_ppm;
+	int64_t sync0_jitter_limit_ns;
+	int64_t sync0_phase_limit_ns;
+	int64_t sync0_skew_limit_ns;
+	/* lists */
+	struct config_slave slave[LIMIT_SLAVES];
+	size_t slave_count;
+	struct config_sdo sdo[CONFIG_LIMIT_SDOS];
+	size_t sdo_count;
+	struct config_output output[CONFIG_LIMIT_OUTPUTS];
+	size_t output_count;
+	char path[CONFIG_PATH_BYTES]; /* file it came from, "" = defaults only */
+};
+
+/** Fill @cfg with the defaults. */
+void config_defaults(struct config *cfg);
+
+/**
+ * Read @path over the defaults. 0; or -EINVAL with one line "FILE:LINE: what: why" in @error, or
+ * another -errno with a line. @cfg is untouched on failure. Context: blocking.
+ */
+int config_load(const char *path, struct config *cfg, char *error, size_t error_bytes);
+/** The same from memory; @name stands for the file in messages. */
+int config_parse(const char *name, const char *text, size_t text_len, struct config *cfg,
+		 char *error, size_t error_bytes);
+/**
+ * Set one option by its dotted name as the file would: "cycle.period=500us",
+ * "slaves[0].mode=oneshot" (one past the last makes a new item). Same errors, without FILE:LINE.
+ * How options must fit to each other is not looked at: call config_check() after the last one.
+ */
+int config_set(struct config *cfg, const char *assignment, char *error, size_t error_bytes);
+/**
+ * What a command line asks for: the defaults, the file @path over them (NULL: none), then
+ * @set_count assignments in order. Same errors. config_check() has not been asked for what was set.
+ */
+int config_assemble(const char *path, const char *const *set, size_t set_count, struct config *cfg,
+		    char *error, size_t error_bytes);
+/** Do the options fit to each other? config_load() and config_parse() have asked already. 0 or
+ * -EINVAL. */
+int config_check(const struct config *cfg, char *error, size_t error_bytes);
+
+/** Does the slave convert on command: by its mode, or else by its SDO 0x8000:01? Context: any. */
+int config_is_oneshot(const struct config *cfg, uint16_t slave_pos);
+
+enum { CONFIG_WHY_BYTES = 192 };
+
+/**
+ * A duration as the file has it ("500us", "1.5s"; a plain number is in s), for the command lines of
+ * the programs. 0, or -EINVAL or -ERANGE with the reason in @why (CONFIG_WHY_BYTES), ret untouched.
+ */
+int config_parse_duration(const char *text, int64_t *ret_ns, char *why);
+
+/* What stands in the run directory. */
+#define CONFIG_RUN_SAMPLES "samples"                 /* ring of samples */
+#define CONFIG_RUN_EVENTS "events"                   /* ring of events */
+#define CONFIG_RUN_STATUS "status"                   /* struct status_page */
+#define CONFIG_RUN_RECORD_STATUS "record-status"     /* struct record_status */
+#define CONFIG_RUN_DDS_STATUS "dds-status"           /* struct dds_status */
+#define CONFIG_RUN_COMMANDS_REMOTE "commands-remote" /* socket that gives ecdaq-dds its board */
+#define CONFIG_RUN_SYNC0 "sync0"                     /* ring of struct sync0_result */
+#define CONFIG_RUN_SYNC0_EVENTS "sync0-events"       /* ring of events of ecdaq-sync0 */
+#define CONFIG_RUN_SYNC0_STATUS "sync0-status"       /* struct sync0_status */
+#define CONFIG_RUN_SYNC0_LOCK "sync0-lock"           /* held by the one ecdaq-sync0 */
+#define CONFIG_RUN_ADMIN "admin"                     /* socket, base/admin_protocol.h */
+
+/** Where the run directory is: @cfg->run_dir, else $ECDAQ_RUN_DIR, else /run/ecdaq (root) or
+ * /dev/shm/ecdaq-UID. */
+int config_run_path(const struct config *cfg, const char *file, char *ret_path, size_t path_bytes);
+
+#endif

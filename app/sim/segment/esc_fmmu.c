@@ -1,0 +1,165 @@
+/* SPDX-License-Identifier: MIT */
+/* FMMUs: logical addresses to process RAM and registers, by bytes where possible, else bit by bit.
+ */
+#include "segment/esc_inside.h"
+
+#include <string.h>
+
+enum { FMMU_READ = 1, FMMU_WRITE = 2, LOGICAL_BYTES_MAX = ECAT_DATAGRAM_MAX_BYTES };
+
+void esc_fmmu_configure(struct esc *esc, unsigned n)
+{
+	const uint8_t *r = &esc->reg[ESC_REG_FMMU + n * ESC_FMMU_BYTES];
+	struct esc_fmmu *f = &esc->fmmu[n];
+
+	f->logical_start = get_le32(r);
+	f->len = get_le16(r + 4);
+	f->logical_start_bit = r[6] & 7;
+	f->logical_end_bit = r[7] & 7;
+	f->physical_start = get_le16(r + 8);
+	f->physical_start_bit = r[10] & 7;
+	f->type = r[11] & 3;
+	f->is_active = (r[12] & 1) && f->len > 0 &&
+		       (f->len > 1 || f->logical_end_bit >= f->logical_start_bit);
+	f->is_bytewise =
+		f->logical_start_bit == 0 && f->logical_end_bit == 7 && f->physical_start_bit == 0;
+}
+
+/* Registers can be mapped, too (mailbox status); so a read may do what reading a register does. */
+static int read_physical(struct esc *esc, int64_t t_ns, uint16_t addr, uint8_t *buf, size_t len)
+{
+	if (addr >= ESC_REG_PROCESS_RAM) {
+		return esc_ram_read(esc, ESC_ECAT, addr, buf, len);
+	}
+	return esc_register_read(esc, ESC_ECAT, t_ns, addr, buf, len);
+}
+
+/* Of the registers an FMMU reaches the outputs only (our reading of the data sheet). */
+static int write_physical(struct esc *esc, const struct esc_frame *frame, uint16_t addr,
+			  const uint8_t *buf, size_t len)
+{
+	if (addr >= ESC_REG_PROCESS_RAM) {
+		return esc_ram_write(esc, ESC_ECAT, frame->pu_ns, addr, buf, len);
+	}
+	return addr >= ESC_REG_DIGITAL_OUTPUTS && esc_register_write(esc, frame, addr, buf, len);
+}
+
+/* What of an FMMU lies in a datagram, in bits; the slave's are counted from 8 * physical_start. */
+struct overlap {
+	size_t datagram_bit;
+	size_t physical_bit;
+	size_t bits;
+};
+
+static int overlaps(const struct esc_fmmu *f, uint32_t start, size_t len, struct overlap *ret)
+{
+	uint64_t f_first = (uint64_t)f->logical_start * 8 + f->logical_start_bit;
+	uint64_t f_end = ((uint64_t)f->logical_start + f->len - 1) * 8 + f->logical_end_bit + 1u;
+	uint64_t d_first = (uint64_t)start * 8;
+	uint64_t d_end = d_first + len * 8;
+	uint64_t from = f_first > d_first ? f_first : d_first;
+	uint64_t to = f_end < d_end ? f_end : d_end;
+
+	if (from >= to) {
+		return 0;
+	}
+	*ret = (struct overlap){ .datagram_bit = (size_t)(from - d_first),
+				 .physical_bit = (size_t)(from - f_first) + f->physical_start_bit,
+				 .bits = (size_t)(to - from) };
+	return 1;
+}
+
+static uint16_t physical_address(const struct esc_fmmu *f, const struct overlap *o)
+{
+	return (uint16_t)(f->physical_start + o->physical_bit / 8);
+}
+
+static size_t physical_bytes(const struct overlap *o)
+{
+	return (o->physical_bit % 8 + o->bits + 7) / 8;
+}
+
+static void copy_bits(uint8_t *to, size_t to_bit, const uint8_t *from, size_t from_bit, size_t bits)
+{
+	for (; bits > 0; bits--, to_bit++, from_bit++) {
+		uint8_t mask = (uint8_t)(1u << (to_bit % 8));
+		int value = from[from_bit / 8] >> (from_bit % 8) & 1;
+
+		to[to_bit / 8] = (uint8_t)(value ? to[to_bit / 8] | mask : to[to_bit / 8] & ~mask);
+	}
+}
+
+static int read_mapped(struct esc *esc, int64_t t_ns, const struct esc_fmmu *f,
+		       const struct overlap *o, uint8_t *data)
+{
+	uint8_t physical[LOGICAL_BYTES_MAX + 2] = { 0 };
+
+	if (f->is_bytewise) {
+		return read_physical(esc, t_ns, physical_address(f, o), data + o->datagram_bit / 8,
+				     o->bits / 8);
+	}
+	if (!read_physical(esc, t_ns, physical_address(f, o), physical, physical_bytes(o))) {
+		return 0;
+	}
+	copy_bits(data, o->datagram_bit, physical, o->physical_bit % 8, o->bits);
+	return 1;
+}
+
+/* Bits that are not mapped keep what was written last (our model). */
+static void fetch_last(struct esc *esc, uint16_t addr, uint8_t *buf, size_t len)
+{
+	for (size_t i = 0; i < len; i++) {
+		size_t at = (size_t)addr + i;
+
+		if (at < ESC_REG_PROCESS_RAM) {
+			buf[i] = esc->reg[at];
+		} else if (at < ESC_REG_PROCESS_RAM + ESC_RAM_BYTES) {
+			buf[i] = *esc_ram_last_written(esc, (uint16_t)at);
+		} else {
+			buf[i] = 0;
+		}
+	}
+}
+
+static int write_mapped(struct esc *esc, const struct esc_frame *frame, const struct esc_fmmu *f,
+			const struct overlap *o, const uint8_t *data)
+{
+	uint8_t physical[LOGICAL_BYTES_MAX + 2];
+	uint16_t addr = physical_address(f, o);
+
+	if (f->is_bytewise) {
+		return write_physical(esc, frame, addr, data + o->datagram_bit / 8, o->bits / 8);
+	}
+	fetch_last(esc, addr, physical, physical_bytes(o));
+	copy_bits(physical, o->physical_bit % 8, data, o->datagram_bit, o->bits);
+	return write_physical(esc, frame, addr, physical, physical_bytes(o));
+}
+
+void esc_fmmu_access(struct esc *esc, const struct esc_frame *frame, struct ecat_datagram *dg)
+{
+	uint32_t start = ecat_logical_address(dg);
+	uint8_t came[LOGICAL_BYTES_MAX];
+	int is_read = dg->cmd == ECAT_CMD_LRD || dg->cmd == ECAT_CMD_LRW;
+	int is_write = dg->cmd == ECAT_CMD_LWR || dg->cmd == ECAT_CMD_LRW;
+	int did_read = 0;
+	int did_write = 0;
+
+	/* What is written is what came in, not what an FMMU before has put there. */
+	memcpy(came, dg->data, dg->data_len);
+	for (unsigned n = 0; n < esc->features.fmmu_count; n++) {
+		const struct esc_fmmu *f = &esc->fmmu[n];
+		struct overlap o;
+
+		if (!f->is_active || !overlaps(f, start, dg->data_len, &o)) {
+			continue;
+		}
+		if (is_write && (f->type & FMMU_WRITE)) {
+			did_write |= write_mapped(esc, frame, f, &o, came);
+		}
+		if (is_read && (f->type & FMMU_READ)) {
+			did_read |= read_mapped(esc, frame->pu_ns, f, &o, dg->data);
+		}
+	}
+	put_le16(dg->wkc, (uint16_t)(get_le16(dg->wkc) + did_read +
+				     (dg->cmd == ECAT_CMD_LRW ? 2 : 1) * did_write));
+}

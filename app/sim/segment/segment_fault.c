@@ -1,0 +1,103 @@
+/* SPDX-License-Identifier: MIT */
+/* Cables, power and crystals, as they change while the segment runs. */
+#include "segment/segment_inside.h"
+
+static void lose_upper_end(struct segment *seg, const struct node *n)
+{
+	if (n->parent >= 0) {
+		esc_count_error(&seg->node[n->parent].esc, n->parent_port, ESC_ERROR_LOST_LINK);
+	}
+}
+
+void segment_cut(struct segment *segment, size_t slave, int64_t t_ns)
+{
+	struct node *n = &segment->node[slave];
+
+	segment_advance(segment, t_ns);
+	if (!n->is_cut) {
+		n->is_cut = 1;
+		lose_upper_end(segment, n);
+		esc_count_error(&n->esc, 0, ESC_ERROR_LOST_LINK);
+		segment_lay_ways(segment);
+	}
+}
+
+void segment_heal(struct segment *segment, size_t slave, int64_t t_ns)
+{
+	segment_advance(segment, t_ns);
+	segment->node[slave].is_cut = 0;
+	segment_lay_ways(segment);
+}
+
+void segment_cut_ring(struct segment *segment, int64_t t_ns)
+{
+	segment_advance(segment, t_ns);
+	if (segment->ring_slave != WAY_NOWHERE && !segment->is_ring_cut) {
+		segment->is_ring_cut = 1;
+		esc_count_error(&segment->node[segment->ring_slave].esc, segment->ring_port,
+				ESC_ERROR_LOST_LINK);
+		segment_lay_ways(segment);
+	}
+}
+
+void segment_heal_ring(struct segment *segment, int64_t t_ns)
+{
+	segment_advance(segment, t_ns);
+	segment->is_ring_cut = 0;
+	segment_lay_ways(segment);
+}
+
+/* Everybody who had a cable to it has lost a link. */
+static void lose_lower_ends(struct segment *seg, size_t slave)
+{
+	for (size_t i = 0; i < seg->count; i++) {
+		if (seg->node[i].parent == (int)slave && !seg->node[i].is_cut) {
+			esc_count_error(&seg->node[i].esc, 0, ESC_ERROR_LOST_LINK);
+		}
+	}
+}
+
+void segment_power_off(struct segment *segment, size_t slave, int64_t t_ns)
+{
+	struct node *n = &segment->node[slave];
+
+	segment_advance(segment, t_ns);
+	if (n->has_power) {
+		n->has_power = 0;
+		if (!n->is_cut) {
+			lose_upper_end(segment, n);
+		}
+		lose_lower_ends(segment, slave);
+		segment_lay_ways(segment);
+	}
+}
+
+void segment_power_on(struct segment *segment, size_t slave, int64_t t_ns)
+{
+	segment_advance(segment, t_ns);
+	if (!segment->node[slave].has_power) {
+		segment_start_node(&segment->node[slave], t_ns, 0);
+		segment_lay_ways(segment);
+	}
+}
+
+void segment_drift(struct segment *segment, size_t slave, double ppm, int64_t t_ns)
+{
+	struct node *n = &segment->node[slave];
+
+	segment_advance(segment, t_ns);
+	n->ppm = ppm;
+	if (n->has_power) {
+		esc_clock_drift(&n->esc, t_ns, ppm + n->wandered_ppm);
+		segment_plan(n);
+	}
+}
+
+void segment_reset(struct segment *segment, size_t slave, int64_t t_ns)
+{
+	segment_advance(segment, t_ns);
+	if (segment->node[slave].has_power) {
+		segment_start_node(&segment->node[slave], t_ns, 0);
+		segment_lay_ways(segment);
+	}
+}

@@ -1,0 +1,245 @@
+/* SPDX-License-Identifier: MIT */
+#include "simulator/line_up.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/clock.h"
+#include "base/limits.h"
+#include "base/prng.h"
+#include "devices/catalogue.h"
+#include "devices/fb1111_piccolo.h"
+#include "devices/plant.h"
+#include "devices/wago_node.h"
+#include "devices/wago_text.h"
+#include "wire/sii.h"
+
+enum { NAME_BYTES = 96, PATH_BYTES = 1024, LINE_BYTES = PATH_BYTES + 200 };
+
+#define PPM_LIMIT 1000.0
+
+struct line_up {
+	const struct sim_options *opt;
+	struct prng prng;
+	int count;
+	char name[LIMIT_SLAVES][NAME_BYTES];
+	struct segment_slave_spec spec[LIMIT_SLAVES];
+	uint8_t sii[LIMIT_SLAVES][SEGMENT_SII_BYTES];
+};
+
+static int take_names(struct line_up *l)
+{
+	const char *text = l->opt->slaves;
+
+	while (*text != '\0') {
+		size_t len = strcspn(text, ",");
+
+		if (l->count == LIMIT_SLAVES || len == 0 || len >= NAME_BYTES ||
+		    memchr(text, '/', len) != NULL) {
+			return sim_complain("--slaves: at most 64 names, NAME,NAME,...");
+		}
+		snprintf(l->name[l->count++], NAME_BYTES, "%.*s", (int)len, text);
+		text += len + (text[len] == ',');
+	}
+	return l->count > 0 ? 0 : sim_complain("--slaves: nothing given");
+}
+
+static int take_slaves(struct line_up *l)
+{
+	char *end;
+	long count = strtol(l->opt->slaves, &end, 10);
+
+	if (*end != '\0' || end == l->opt->slaves) {
+		return take_names(l);
+	}
+	if (count < 1 || count > LIMIT_SLAVES) {
+		return sim_complain("--slaves: not 1 to 64");
+	}
+	for (; l->count < (int)count; l->count++) {
+		snprintf(l->name[l->count], NAME_BYTES, "fb1111_piccolo");
+	}
+	return 0;
+}
+
+/* --- EEPROM images --- */
+
+static int read_file(const char *path, uint8_t *buf, size_t capacity, size_t *ret_bytes)
+{
+	FILE *file = fopen(path, "rb");
+	int r = 0;
+
+	if (file == NULL) {
+		return -errno;
+	}
+	errno = 0;
+	*ret_bytes = fread(buf, 1, capacity, file);
+	if (ferror(file)) {
+		r = errno != 0 ? -errno : -EIO;
+	} else if (*ret_bytes == capacity && fgetc(file) != EOF) {
+		r = -EFBIG;
+	}
+	fclose(file);
+	return r;
+}
+
+static int check_image(const char *path, const uint8_t *image, size_t bytes)
+{
+	static struct sii sii;
+	char line[LINE_BYTES];
+	char why[160];
+
+	if (bytes < SII_CATEGORIES_BYTE) {
+		snprintf(line, sizeof(line), "%s: no SII image: %zu bytes, at least %d are needed",
+			 path, bytes, SII_CATEGORIES_BYTE);
+		return sim_complain(line);
+	}
+	if (sii_checksum(image) != image[14]) {
+		fprintf(stderr,
+			"ecdaq-sim: %s: wrong checksum in word 7: this slave will not leave INIT\n",
+			path);
+	}
+	if (sii_parse(image, bytes, &sii, why, sizeof(why)) < 0) {
+		fprintf(stderr, "ecdaq-sim: %s: damaged, simulated as it is: %s\n", path, why);
+	}
+	return 0;
+}
+
+static int read_image(struct line_up *l, int i, size_t *ret_bytes)
+{
+	char path[PATH_BYTES];
+	char line[LINE_BYTES];
+	int r;
+
+	if (l->opt->sii_dir == NULL) {
+		snprintf(line, sizeof(line), "slave '%s': --sii DIR is missing", l->name[i]);
+		return sim_complain(line);
+	}
+	if (snprintf(path, sizeof(path), "%s/%s.bin", l->opt->sii_dir, l->name[i]) >=
+	    (int)sizeof(path)) {
+		return sim_complain("--sii: path too long");
+	}
+	r = read_file(path, l->sii[i], SEGMENT_SII_BYTES, ret_bytes);
+	if (r < 0) {
+		snprintf(line, sizeof(line), "%s: %s", path, strerror(-r));
+		return sim_complain(line);
+	}
+	return check_image(path, l->sii[i], *ret_bytes);
+}
+
+static int make_wago(struct line_up *l, int i)
+{
+	char line[LINE_BYTES];
+	int r = wago_750_354_by_name(i, l->name[i], &l->spec[i]);
+
+	if (r == -EINVAL || r == -E2BIG) {
+		snprintf(line, sizeof(line),
+			 "slave '%s': not wago_750_354, or that with +430, +457, +530, +557 for "
+			 "its modules (at most %d)",
+			 l->name[i], WAGO_MODULES_MAX);
+		return sim_complain(line);
+	}
+	return r < 0 ? sim_complain("no memory") : 0;
+}
+
+static int make_plant(struct line_up *l, int i)
+{
+	char line[LINE_BYTES];
+	int r = plant_by_name(i, l->name[i], &l->spec[i]);
+
+	if (r == -EINVAL) {
+		snprintf(line, sizeof(line),
+			 "slave '%s': not plant[:TAU_MS[:GAIN]], each above 0 and up to 1000000",
+			 l->name[i]);
+		return sim_complain(line);
+	}
+	return r < 0 ? sim_complain("no memory") : 0;
+}
+
+static int make_slave(struct line_up *l, int i)
+{
+	size_t bytes = 0;
+	int r;
+
+	if (wago_750_354_is_name(l->name[i])) {
+		return make_wago(l, i);
+	}
+	if (plant_is_name(l->name[i])) {
+		return make_plant(l, i);
+	}
+
+	if (strcmp(l->name[i], "fb1111_piccolo") == 0) {
+		r = fb1111_piccolo_slave(i, &l->spec[i]);
+	} else if (read_image(l, i, &bytes) < 0) {
+		return -1;
+	} else {
+		r = catalogue_sii_slave(l->sii[i], bytes, i, &l->spec[i]);
+	}
+	return r < 0 ? sim_complain("no memory") : 0;
+}
+
+/* --- crystals --- */
+
+static int take_ppm(const char **text, double *ret_ppm)
+{
+	char *end;
+	double ppm = strtod(*text, &end);
+
+	/* Written so that a NaN is refused, too. */
+	if (end == *text || (*end != ',' && *end != '\0') ||
+	    !(ppm >= -PPM_LIMIT && ppm <= PPM_LIMIT)) {
+		return sim_complain("--ppm: numbers from -1000 to 1000, with commas");
+	}
+	*text = *end == ',' ? end + 1 : end;
+	*ret_ppm = ppm;
+	return 0;
+}
+
+static int set_crystals(struct line_up *l)
+{
+	const char *text = l->opt->ppm != NULL ? l->opt->ppm : "";
+
+	for (int i = 0; i < l->count; i++) {
+		struct segment_slave_spec *s = &l->spec[i];
+
+		s->ppm = (prng_unit(&l->prng) - 0.5) * 100.0;
+		s->clock_start_ns = prng_below(&l->prng, 10 * (uint64_t)NS_PER_S);
+		s->seed = prng_next(&l->prng);
+		s->jitter_ns = l->opt->jitter_ns;
+		s->wander_ppm = l->opt->wander_ppm;
+		s->signal = l->opt->signal;
+		if (*text != '\0' && take_ppm(&text, &s->ppm) < 0) {
+			return -1;
+		}
+	}
+	return *text == '\0' ? 0 : sim_complain("--ppm: more numbers than slaves");
+}
+
+static int make(struct line_up *l, int64_t t_ns, struct segment **ret_segment)
+{
+	if (take_slaves(l) < 0) {
+		return -1;
+	}
+	for (int i = 0; i < l->count; i++) {
+		if (make_slave(l, i) < 0) {
+			return -1;
+		}
+	}
+	if (set_crystals(l) < 0) {
+		return -1;
+	}
+	return segment_create(l->spec, (size_t)l->count, t_ns, ret_segment) < 0
+		       ? sim_complain("the segment cannot be made: no memory")
+		       : 0;
+}
+
+int line_up_create(const struct sim_options *opt, int64_t t_ns, struct segment **ret_segment)
+{
+	static struct line_up l;
+
+	l.opt = opt;
+	l.prng.state = opt->seed;
+	l.count = 0;
+	return make(&l, t_ns, ret_segment);
+}

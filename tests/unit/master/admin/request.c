@@ -1,0 +1,94 @@
+/* SPDX-License-Identifier: MIT */
+#include <errno.h>
+
+#include "admin/command.h"
+#include "harness/test.h"
+#include "unit/master/admin/target.h"
+
+static int parse(const struct admin_request *rq, struct admin_request *ret, char *why)
+{
+	return admin_request_parse(rq, sizeof(*rq), ret, why);
+}
+
+TEST(admin, a_request_of_the_wrong_length_is_refused_and_the_output_untouched)
+{
+	struct admin_request rq = fake_request(ADMIN_PING);
+	struct admin_request got = { .verb = 77 };
+	char why[ADMIN_TEXT_BYTES] = "";
+
+	CHECK_EQ(admin_request_parse(&rq, sizeof(rq) - 1, &got, why), -EMSGSIZE);
+	CHECK_EQ(admin_request_parse(&rq, sizeof(rq) + 1, &got, why), -EMSGSIZE);
+	CHECK_EQ(admin_request_parse(&rq, 0, &got, why), -EMSGSIZE);
+	CHECK_EQ(got.verb, 77);
+	CHECK(why[0] != '\0');
+}
+
+TEST(admin, a_request_without_the_magic_is_not_ours)
+{
+	struct admin_request rq = fake_request(ADMIN_PING);
+	struct admin_request got = { .verb = 77 };
+	char why[ADMIN_TEXT_BYTES];
+
+	rq.magic ^= 1;
+	CHECK_EQ(parse(&rq, &got, why), -EPROTO);
+	CHECK_EQ(got.verb, 77);
+}
+
+TEST(admin, unknown_verbs_and_reserved_bits_are_refused)
+{
+	struct admin_request rq = fake_request(0);
+	struct admin_request got;
+	char why[ADMIN_TEXT_BYTES];
+
+	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+	rq.verb = 99;
+	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+	CHECK_STR(why, "unknown verb 99");
+	rq.verb = ADMIN_PING;
+	rq.reserved = 1;
+	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+}
+
+TEST(admin, a_set_takes_1_to_64_items_with_whole_printable_names)
+{
+	struct admin_request rq = fake_request(ADMIN_SET);
+	struct admin_request got;
+	char why[ADMIN_TEXT_BYTES];
+
+	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+	rq.count = ADMIN_ITEMS + 1;
+	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+	rq.count = UINT32_MAX;
+	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+	rq.count = 0;
+	fake_item(&rq, "a.led", 1);
+	CHECK_EQ(parse(&rq, &got, why), 0);
+	CHECK_EQ(got.item[0].raw, 1);
+	memset(rq.item[0].channel, 'x', sizeof(rq.item[0].channel));
+	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+	snprintf(rq.item[0].channel, sizeof(rq.item[0].channel), "a\nb");
+	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+	rq.item[0].channel[0] = '\0';
+	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+}
+
+TEST(admin, slave_positions_beyond_the_limit_and_empty_writes_are_refused)
+{
+	struct admin_request rq = fake_request(ADMIN_SDO_READ);
+	struct admin_request got;
+	char why[ADMIN_TEXT_BYTES];
+
+	rq.slave_pos = LIMIT_SLAVES;
+	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+	rq.slave_pos = LIMIT_SLAVES - 1;
+	CHECK_EQ(parse(&rq, &got, why), 0);
+	rq.verb = ADMIN_SDO_WRITE;
+	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+	rq.data_len = ADMIN_DATA_BYTES + 1;
+	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+	rq.data_len = ADMIN_DATA_BYTES;
+	CHECK_EQ(parse(&rq, &got, why), 0);
+	rq.verb = ADMIN_ONESHOT;
+	rq.is_relative = 2;
+	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+}

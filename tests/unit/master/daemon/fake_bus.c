@@ -1,0 +1,331 @@
+/* SPDX-License-Identifier: MIT */
+#include "unit/master/daemon/fake_bus.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { IMAGE_BYTES = 3, ROUND_TRIP_NS = 20000 };
+
+struct fake_bus fake_bus;
+
+static const struct slave_info slaves[] = {
+	{ .name = "a",
+	  .device = "fake",
+	  .vendor = 2,
+	  .has_dc = 1,
+	  .is_dc_reference = 1,
+	  .counter_channel = -1,
+	  .input_bits = 16,
+	  .output_bits = 1 },
+};
+
+static const struct channel channels[] = {
+	{ .name = "a.led",
+	  .type = CHANNEL_BOOL,
+	  .direction = CHANNEL_OUTPUT,
+	  .bit_len = 1,
+	  .bit_offset = 0,
+	  .scale = 1.0 },
+	{ .name = "a.adc",
+	  .type = CHANNEL_UINT,
+	  .direction = CHANNEL_INPUT,
+	  .bit_len = 16,
+	  .bit_offset = 8,
+	  .scale = 1.0 },
+};
+
+static const struct exchange_plan plan = {
+	.image_bytes = IMAGE_BYTES,
+	.output_bytes = 1,
+	.chunk_bytes = { IMAGE_BYTES },
+	.chunk_count = 1,
+	.chunk_wkc = { 3 },
+	.wkc_expected = 3,
+	.dc_reference = 0x1001,
+	.slave_count = 1,
+	.monitor = 1,
+};
+
+void fake_bus_init(void)
+{
+	fake_bus = (struct fake_bus){
+		.mono_ns = 1000 * NS_PER_S,
+		.tai_ns = 800000000 * NS_PER_S,
+		.report = { .slaves_op = 1, .slaves_lost = 0, .is_all_op = 1 },
+		.is_link_up = 1,
+	};
+}
+
+/* --- clock --- */
+
+static mono_t now(void *ctx)
+{
+	(void)ctx;
+	return (mono_t){ fake_bus.mono_ns };
+}
+
+static int64_t tai(void *ctx)
+{
+	(void)ctx;
+	return fake_bus.tai_ns + fake_bus.mono_ns;
+}
+
+static int sleep_until(void *ctx, mono_t deadline)
+{
+	(void)ctx;
+	if (deadline.ns > fake_bus.mono_ns) {
+		fake_bus.mono_ns = deadline.ns;
+	}
+	return 0;
+}
+
+struct platform fake_platform(void)
+{
+	return (struct platform){ .now = now, .tai_ns = tai, .sleep_until = sleep_until };
+}
+
+static int send_frame(void *ctx, const uint8_t *frame, size_t len)
+{
+	(void)ctx;
+	(void)frame;
+	(void)len;
+	return 0;
+}
+
+static int receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadline, mono_t *ret_at)
+{
+	(void)frame;
+	(void)capacity;
+	(void)ret_at;
+	sleep_until(ctx, deadline);
+	return -EAGAIN;
+}
+
+static int is_up(void *ctx)
+{
+	(void)ctx;
+	return fake_bus.is_link_up;
+}
+
+static void destroy(void *ctx)
+{
+	(void)ctx;
+	fake_bus.transports--;
+}
+
+struct transport fake_transport(void)
+{
+	fake_bus.transports++;
+	return (struct transport){
+		.send = send_frame, .receive = receive, .is_up = is_up, .destroy = destroy
+	};
+}
+
+/* --- bus/bus.h --- */
+
+struct bus {
+	int unused;
+};
+
+static int step(enum fake_step which, const char *name, char *error)
+{
+	size_t used = strlen(fake_bus.steps);
+
+	snprintf(fake_bus.steps + used, sizeof(fake_bus.steps) - used, "%s ", name);
+	if (fake_bus.fails_at == which) {
+		snprintf(error, BUS_ERROR_BYTES, "%s: does not work", name);
+		return fake_bus.result;
+	}
+	return 0;
+}
+
+int bus_create(const struct config *cfg, struct line *line, struct bus **ret_bus)
+{
+	(void)cfg;
+	(void)line;
+	*ret_bus = calloc(1, sizeof(struct bus));
+	return 0;
+}
+
+void bus_listen(struct bus *bus, void (*emit)(void *ctx, const struct event *ev), void *emit_ctx)
+{
+	(void)bus;
+	(void)emit;
+	(void)emit_ctx;
+}
+
+void bus_destroy(struct bus *bus)
+{
+	free(bus);
+}
+
+int bus_scan(struct bus *bus, char *error)
+{
+	(void)bus;
+	return step(FAKE_SCAN, "scan", error);
+}
+
+int bus_compare(const struct bus *bus, char *error)
+{
+	(void)bus;
+	return step(FAKE_COMPARE, "compare", error);
+}
+
+int bus_map(struct bus *bus, char *error)
+{
+	(void)bus;
+	return step(FAKE_MAP, "map", error);
+}
+
+int bus_dc_setup(struct bus *bus, char *error)
+{
+	(void)bus;
+	return step(FAKE_DC_SETUP, "dc_setup", error);
+}
+
+int bus_sync0_start(struct bus *bus, int64_t dc_now_ns, char *error)
+{
+	(void)bus;
+	(void)dc_now_ns;
+	return step(FAKE_SYNC0, "sync0", error);
+}
+
+int bus_request_state(struct bus *bus, enum al_state state, span_t timeout, char *error)
+{
+	(void)bus;
+	(void)timeout;
+	return state == AL_OP ? step(FAKE_OP, "op", error) : step(FAKE_SAFEOP, "safeop", error);
+}
+
+int bus_stop(struct bus *bus, char *error)
+{
+	(void)bus;
+	return step(FAKE_STOP, "stop", error);
+}
+
+int bus_watch(struct bus *bus, struct status_page *page,
+	      void (*emit)(void *ctx, const struct event *ev), void *emit_ctx,
+	      struct bus_watch_report *ret_report)
+{
+	(void)bus;
+	(void)page;
+	(void)emit;
+	(void)emit_ctx;
+	*ret_report = fake_bus.report;
+	return 0;
+}
+
+void bus_lead_back(struct bus *bus, void (*emit)(void *ctx, const struct event *ev), void *emit_ctx)
+{
+	(void)bus;
+	(void)emit;
+	(void)emit_ctx;
+	if (fake_bus.led_back != NULL) {
+		fake_bus.led_back(fake_bus.led_back_ctx);
+	}
+}
+
+const struct slave_info *bus_slaves(const struct bus *bus, size_t *ret_count)
+{
+	(void)bus;
+	*ret_count = 1;
+	return slaves;
+}
+
+const struct channel *bus_channels(const struct bus *bus, size_t *ret_count)
+{
+	(void)bus;
+	*ret_count = sizeof(channels) / sizeof(channels[0]);
+	return channels;
+}
+
+const struct exchange_plan *bus_plan(const struct bus *bus)
+{
+	(void)bus;
+	return &plan;
+}
+
+int bus_sdo_read(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t subindex,
+		 uint8_t *ret_data, size_t *len, uint32_t *ret_abort)
+{
+	(void)bus;
+	(void)slave_pos;
+	(void)index;
+	*ret_abort = 0;
+	ret_data[0] = subindex;
+	*len = 1;
+	return 0;
+}
+
+int bus_sdo_write(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t subindex,
+		  const uint8_t *data, size_t len, uint32_t *ret_abort)
+{
+	(void)bus;
+	(void)slave_pos;
+	(void)index;
+	(void)subindex;
+	(void)data;
+	(void)len;
+	*ret_abort = 0x06020000;
+	return -EIO;
+}
+
+/* --- bus/exchange.h --- */
+
+struct exchange {
+	int unused;
+};
+
+int exchange_create(const struct exchange_plan *wanted, struct line *line,
+		    struct exchange **ret_exchange)
+{
+	(void)wanted;
+	(void)line;
+	*ret_exchange = calloc(1, sizeof(struct exchange));
+	return 0;
+}
+
+void exchange_destroy(struct exchange *ex)
+{
+	free(ex);
+}
+
+struct exchange_result exchange_run(struct exchange *ex, uint8_t *image, mono_t deadline)
+{
+	struct exchange_result res = {
+		.status = EXCHANGE_OK,
+		.wkc = 3,
+		.wkc_expected = 3,
+		.al_status = AL_OP,
+		.al_wkc = 1,
+		.dc_diff_ns = 5,
+		.sent = { fake_bus.mono_ns },
+		.round_trip = { ROUND_TRIP_NS },
+		.doubled = fake_bus.is_doubled ? 1 : 0,
+	};
+
+	(void)ex;
+	fake_bus.exchanges++;
+	fake_bus.led = image[0] & 1;
+	if (fake_bus.lost_every != 0 && fake_bus.exchanges % fake_bus.lost_every == 0) {
+		res.status = EXCHANGE_NO_FRAME;
+		res.round_trip.ns = -1;
+		fake_bus.mono_ns = deadline.ns;
+		return res;
+	}
+	res.dc_time_ns = 100 * NS_PER_S + fake_bus.mono_ns + fake_bus.mono_ns / 20000;
+	if (fake_bus.is_dc_running_away) {
+		res.dc_time_ns += fake_bus.mono_ns / 20;
+	}
+	fake_bus.mono_ns += ROUND_TRIP_NS;
+	return res;
+}
+
+int exchange_ride(struct exchange *ex, mono_t deadline)
+{
+	(void)ex;
+	(void)deadline;
+	return 0;
+}

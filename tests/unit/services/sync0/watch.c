@@ -1,0 +1,332 @@
+/* SPDX-License-Identifier: MIT */
+/* The live check on a ring and a file of edges that the test writes, on a clock of the test's own.
+ */
+#include "sync0/watch.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/clock.h"
+#include "base/status.h"
+#include "base/sync0.h"
+#include "harness/test.h"
+#include "unit/services/sync0/fake_master.h"
+
+enum { STEP_CYCLES = 100, FOREVER = 1 << 30 };
+
+struct watch_bench {
+	char dir[64];
+	struct config cfg;
+	struct fake_master fake;
+	struct watch *watch;
+	FILE *edges; /* NULL: the file is not there */
+	int64_t now_ns;
+	int64_t silent_from; /* cycle from which on the second slave has no pulse */
+	char why[WATCH_WHY_BYTES];
+};
+
+static struct watch_bench b;
+
+static mono_t bench_now(void *ctx)
+{
+	(void)ctx;
+	return (mono_t){ b.now_ns };
+}
+
+static int64_t bench_tai_ns(void *ctx)
+{
+	(void)ctx;
+	return b.now_ns;
+}
+
+static const char *path_of(const char *name)
+{
+	static char path[128];
+
+	snprintf(path, sizeof(path), "%s/%s", b.dir, name);
+	return path;
+}
+
+static void set(const char *assignment)
+{
+	char error[256] = "";
+
+	CHECK_EQ(config_set(&b.cfg, assignment, error, sizeof(error)), 0);
+}
+
+static void open_edges(void)
+{
+	b.edges = fopen(path_of("edges"), "we");
+	CHECK(b.edges != NULL);
+}
+
+static int try_watch(struct watch **ret_watch)
+{
+	const struct watch_spec spec = {
+		.cfg = &b.cfg,
+		.dev_dir = "/nonexistent",
+		.platform = { .now = bench_now, .tai_ns = bench_tai_ns },
+	};
+
+	return watch_create(&spec, ret_watch, b.why);
+}
+
+/* A run directory with nothing in it, and a configuration that names it. */
+static void begin(void)
+{
+	b = (struct watch_bench){ .dir = "/dev/shm/ecdaq-watch-XXXXXX", .silent_from = FOREVER };
+	CHECK(mkdtemp(b.dir) != NULL);
+	b.now_ns = FAKE_MONO0_NS;
+	config_defaults(&b.cfg);
+	snprintf(b.cfg.run_dir, sizeof(b.cfg.run_dir), "%s", b.dir);
+	snprintf(b.cfg.sync0_edges, sizeof(b.cfg.sync0_edges), "%s", path_of("edges"));
+	set("sync0.window=100ms");
+	set("sync0.lost=10ms");
+}
+
+static void start(int64_t period_ns)
+{
+	open_edges();
+	fake_master_start(&b.fake, b.dir, period_ns);
+	CHECK_EQ(try_watch(&b.watch), 0);
+}
+
+static void end(void)
+{
+	static const char *const names[] = { "edges",        "samples",      "sync0",
+					     "sync0-events", "sync0-status", "sync0-lock" };
+
+	if (b.watch != NULL) {
+		watch_finish(b.watch);
+		watch_destroy(b.watch);
+	}
+	fake_master_stop(&b.fake);
+	if (b.edges != NULL) {
+		fclose(b.edges);
+	}
+	for (size_t i = 0; i < sizeof(names) / sizeof(names[0]); i++) {
+		unlink(path_of(names[i]));
+	}
+	CHECK_EQ(rmdir(b.dir), 0);
+}
+
+static void write_cycle(uint64_t shot_ns)
+{
+	int64_t edge_ns = fake_mono_ns(b.fake.dc_ns);
+
+	for (int slave = 0; b.edges != NULL && slave < FAKE_SLAVES; slave++) {
+		if (slave == 0 || b.fake.cycle < b.silent_from) {
+			fprintf(b.edges, "%d %lld 0\n", slave, (long long)edge_ns);
+		}
+	}
+	fake_master_push(&b.fake, shot_ns);
+	b.now_ns = fake_mono_ns(b.fake.dc_ns);
+}
+
+static void run_with(int64_t cycles, uint64_t shot_ns)
+{
+	for (int64_t i = 1; i <= cycles; i++) {
+		write_cycle(shot_ns);
+		if (i % STEP_CYCLES == 0) {
+			if (b.edges != NULL) {
+				fflush(b.edges);
+			}
+			watch_step(b.watch);
+		}
+	}
+}
+
+/* The check is not run meanwhile. */
+static void stall(int64_t cycles)
+{
+	for (int64_t i = 0; i < cycles; i++) {
+		write_cycle(0);
+	}
+}
+
+static void run(int64_t cycles)
+{
+	run_with(cycles, 0);
+}
+
+/* A copy of what others see. */
+static struct sync0_status *page(void)
+{
+	static struct sync0_status copy;
+	const struct sync0_status *seen =
+		status_open(path_of("sync0-status"), SYNC0_STATUS_MAGIC, sizeof(*seen));
+
+	CHECK(seen != NULL);
+	memcpy(&copy, seen, sizeof(copy));
+	status_unmap(seen, sizeof(*seen));
+	return &copy;
+}
+
+TEST(sync0_watch, windows_and_alarms_are_counted_over_restarts_of_the_master)
+{
+	uint64_t windows;
+
+	begin();
+	start(NS_PER_MS);
+	b.silent_from = 1000;
+	run(2000);
+	windows = page()->windows;
+	CHECK(windows >= 10);
+	CHECK_EQ(page()->state, SYNC0_RUNNING);
+	CHECK(page()->alarms >= 1);
+	CHECK_EQ(page()->line[1].is_lost, 1);
+	fake_master_stop(&b.fake);
+	watch_step(b.watch);
+	CHECK_EQ(page()->state, SYNC0_WAITING);
+	CHECK_EQ(page()->line[1].is_lost, 0);
+	CHECK(page()->windows >= windows);
+	b.silent_from = FOREVER;
+	fake_master_start(&b.fake, b.dir, NS_PER_MS);
+	run(1000);
+	CHECK(page()->windows >= windows + 5);
+	CHECK(page()->alarms >= 1);
+	CHECK_EQ(page()->line[1].is_lost, 0);
+	end();
+}
+
+TEST(sync0_watch, a_period_that_is_not_that_of_the_configuration_is_followed)
+{
+	begin();
+	start(10 * NS_PER_MS);
+	run(1000);
+	CHECK(page()->windows >= 5);
+	CHECK_EQ(page()->window_ns, NS_PER_S);
+	CHECK(strstr(page()->message, "100 cycles of the master: 1000 ms are taken") != NULL);
+	CHECK_EQ(page()->alarms, 0);
+	CHECK_EQ(page()->line[0].missing, 0);
+	end();
+}
+
+TEST(sync0_watch, a_second_one_in_the_same_directory_is_refused)
+{
+	struct watch *second = NULL;
+
+	begin();
+	start(NS_PER_MS);
+	CHECK_EQ(try_watch(&second), -EBUSY);
+	CHECK(second == NULL);
+	CHECK(strstr(b.why, "another ecdaq-sync0 is running here (pid ") != NULL);
+	run(500);
+	CHECK(page()->windows >= 1);
+	watch_destroy(b.watch);
+	CHECK_EQ(try_watch(&b.watch), 0);
+	end();
+}
+
+TEST(sync0_watch, a_run_directory_that_is_made_later_or_anew_is_taken)
+{
+	begin();
+	CHECK_EQ(rmdir(b.dir), 0);
+	CHECK_EQ(try_watch(&b.watch), 0);
+	watch_step(b.watch);
+	CHECK_EQ(mkdir(b.dir, 0700), 0);
+	watch_step(b.watch);
+	CHECK_EQ(page()->state, SYNC0_NO_LINE);
+	unlink(path_of("sync0-lock"));
+	unlink(path_of("sync0-status"));
+	watch_step(b.watch);
+	CHECK_EQ(page()->state, SYNC0_NO_LINE);
+	end();
+}
+
+TEST(sync0_watch, pulses_before_the_file_of_edges_is_there_are_not_missed)
+{
+	begin();
+	fake_master_start(&b.fake, b.dir, NS_PER_MS);
+	CHECK_EQ(try_watch(&b.watch), 0);
+	run(3000);
+	CHECK_EQ(page()->state, SYNC0_NO_LINE);
+	CHECK_EQ(page()->line[0].is_open, 0);
+	CHECK(strstr(page()->message, "edges: No such file or directory") != NULL);
+	open_edges();
+	run(5000);
+	CHECK_EQ(page()->state, SYNC0_RUNNING);
+	CHECK_EQ(page()->line[0].is_open, 1);
+	CHECK_STR(page()->message, "");
+	CHECK(page()->line[1].edges >= 2000);
+	CHECK_EQ(page()->line[1].missing, 0);
+	CHECK_EQ(page()->alarms, 0);
+	end();
+}
+
+TEST(sync0_watch, a_time_that_is_still_to_come_is_no_edge)
+{
+	begin();
+	start(NS_PER_MS);
+	run(500);
+	fprintf(b.edges, "1 %lld 0\n", (long long)(b.now_ns + 3600 * NS_PER_S));
+	run(1000);
+	CHECK(page()->windows >= 8);
+	CHECK(page()->line[1].edges >= 800);
+	CHECK_EQ(page()->alarms, 0);
+	end();
+}
+
+TEST(sync0_watch, with_one_shot_slaves_alone_it_runs_and_tells_of_each)
+{
+	int64_t at_ns;
+
+	begin();
+	set("slaves[0].mode=oneshot");
+	set("slaves[1].mode=oneshot");
+	b.silent_from = 0;
+	start(NS_PER_MS);
+	fclose(b.edges);
+	b.edges = NULL;
+	run(3000);
+	CHECK_EQ(page()->state, SYNC0_RUNNING);
+	at_ns = b.fake.dc_ns + 100 * NS_PER_MS;
+	run_with(300, (uint64_t)at_ns);
+	run_with(2500, (uint64_t)at_ns);
+	CHECK_EQ(page()->line[1].shots, 1);
+	CHECK_EQ(page()->line[1].shots_lost, 1);
+	CHECK_EQ(page()->alarms, 1);
+	end();
+}
+
+TEST(sync0_watch, a_pulse_that_nobody_asked_for_is_counted)
+{
+	begin();
+	set("slaves[0].mode=periodic");
+	set("slaves[1].mode=oneshot");
+	b.silent_from = 0;
+	start(NS_PER_MS);
+	run(1000);
+	fprintf(b.edges, "1 %lld 0\n", (long long)fake_mono_ns(b.fake.dc_ns) - 300);
+	run(3000);
+	CHECK_EQ(page()->line[1].extra, 1);
+	CHECK_EQ(page()->line[1].shots, 0);
+	CHECK_EQ(page()->line[0].extra, 0);
+	end();
+}
+
+TEST(sync0_watch, pulses_that_came_while_it_was_held_up_are_not_missed)
+{
+	uint64_t windows;
+
+	begin();
+	start(NS_PER_MS);
+	run(1000);
+	windows = page()->windows;
+	stall(900); /* they wait in the queue */
+	run(1000);
+	CHECK(page()->windows >= windows + 17);
+	CHECK_EQ(page()->line[1].missing, 0);
+	stall(30000); /* nobody knows what came */
+	run(2000);
+	CHECK(page()->windows >= windows + 27);
+	CHECK_EQ(page()->line[0].missing, 0);
+	CHECK_EQ(page()->line[1].missing, 0);
+	CHECK_EQ(page()->alarms, 0);
+	CHECK_EQ(page()->state, SYNC0_RUNNING);
+	end();
+}
