@@ -9,7 +9,7 @@
 
 #include "config/config.h"
 
-/* Part of the interface (doc/cli.md): numbers do not change. */
+/* Part of the interface (doc/reference/cli.md): numbers do not change. */
 enum cli_exit {
 	CLI_OK = 0,
 	CLI_FAILED = 1,     /* what was asked for could not be done */

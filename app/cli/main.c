@@ -59,7 +59,7 @@ static const struct verb verbs[] = {
 	{ "log", "...", "Recordings: list, info, check, recover, export (see ecdaq log --help).",
 	  NULL, verb_log },
 	{ "security", "init|add-appliance|add-subscriber|add-commander|check [NAME|DIR]",
-	  "The keys of DDS Security (app/doc/dds.md).",
+	  "The keys of DDS Security (app/doc/reference/dds.md).",
 	  "ecdaq security init makes a store with the appliance's keys, add-subscriber NAME and\n"
 	  "add-commander NAME those of a participant; check DIR looks at one participant's "
 	  "folder.\n"

@@ -39,7 +39,7 @@ void report_release(const struct report *report);
 void report_write_screen(const struct report *report, FILE *out);
 /** A few lines for the end of a run. */
 void report_write_summary(const struct report *report, FILE *out);
-/** One JSON object, without the end of the line; doc/cli.md lists its keys. */
+/** One JSON object, without the end of the line; doc/reference/cli.md lists its keys. */
 void report_write_json(const struct report *report, struct json *js);
 
 /** "OP", "SAFE-OP+ERROR". */

@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# Measures what app/doc/dds.md says of DDS, on this machine, and prints it.
+# Measures what app/doc/reference/dds.md says of DDS, on this machine, and prints it.
 set -eu
 
 root=$(CDPATH='' cd -- "$(dirname -- "$0")/../.." && pwd)

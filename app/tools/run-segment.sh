@@ -131,7 +131,7 @@ start_dds()
 
 	[ "$dds" = yes ] || return 0
 	if [ ! -x "$bin/ecdaq-dds" ]; then
-		note "no DDS: ecdaq-dds is not there (app/doc/dds.md says what it needs to be built)"
+		note "no DDS: ecdaq-dds is not there (app/doc/reference/dds.md says what it needs to be built)"
 		return 0
 	fi
 	if [ -z "$config" ] || ! grep -q '^dds:' "$config"; then

@@ -3,7 +3,7 @@
 by its journal alone, and the recordings open.
 
 In guest time, so that the moments are spread over the guest's second and not over the host's load.
-ECDAQ_POWER_CUTS: how many (3; the table in app/doc/image.md is of 20). ECDAQ_POWER_CUT_SEED.
+ECDAQ_POWER_CUTS: how many (3; the table in app/doc/how-to/image.md is of 20). ECDAQ_POWER_CUT_SEED.
 """
 
 from __future__ import annotations

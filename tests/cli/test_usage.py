@@ -51,7 +51,7 @@ def test_every_verb_has_help(verb: str) -> None:
 
 
 def test_the_manual_names_every_verb_and_every_option() -> None:
-    manual = (ROOT / "app/doc/cli.md").read_text()
+    manual = (ROOT / "app/doc/reference/cli.md").read_text()
     for verb in VERBS:
         assert f"`ecdaq {verb}" in manual, verb
         for word in works(ecdaq(None, verb, "--help")).split():

@@ -26,7 +26,7 @@ const struct option_section option_sections[] = {
 	{ "ring", "Shared memory between ecdaqd and its readers." },
 	{ "record", "Recording to local storage (ecdaq-record)." },
 	{ "dds", "Data and commands over DDS (ecdaq-dds)." },
-	{ "sync0", "SYNC0 checked on GPIO lines (ecdaq-sync0); doc/sync0.md." },
+	{ "sync0", "SYNC0 checked on GPIO lines (ecdaq-sync0); doc/reference/sync0.md." },
 };
 
 const size_t option_section_count = sizeof(option_sections) / sizeof(option_sections[0]);

@@ -6,9 +6,9 @@
 
 #include <stdio.h>
 
-/** Markdown: doc/options.md. Context: blocking. */
+/** Markdown: doc/reference/options.md. Context: blocking. */
 void pages_write_reference(FILE *out);
-/** YAML with every option at its default: doc/ecdaq.sample.yaml. Context: blocking. */
+/** YAML with every option at its default: doc/reference/ecdaq.sample.yaml. Context: blocking. */
 void pages_write_sample(FILE *out);
 
 #endif

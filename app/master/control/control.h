@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Control programs: your own code in the cycle of ecdaqd, on named channels. Installed as
- * <ecdaq/control.h>; app/doc/control.md tells how to write, build and run one.
+ * <ecdaq/control.h>; app/doc/reference/control.md tells how to write, build and run one.
  *
  * A program is a shared object with one symbol, ecdaq_program:
  *

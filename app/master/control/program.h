@@ -3,7 +3,7 @@
  * The other side of control.h: load the user's program, let it find its channels, call it once a
  * cycle, and hold what it sets on a command board, from which the cycle takes its outputs like
  * those of any other writer. What happens when it takes too long, fails or crashes is told in
- * app/doc/control.md and ADR 0032.
+ * app/doc/reference/control.md and ADR 0033.
  */
 #ifndef CONTROL_PROGRAM_H
 #define CONTROL_PROGRAM_H

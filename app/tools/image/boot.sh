@@ -27,7 +27,7 @@ and end it with `sudo poweroff` there, or Ctrl-a x here. The disk keeps what was
   --lan         the guest's network port is a tap of this host, ecdaqlan: 192.168.77.1 here,
                 192.168.77.2 there; its SSH port is there, and samples come over DDS, domain 0
   --wire        the segment is on this host, and its SYNC0 pins are wired to lines 0 and 1 of the
-                guest's GPIO chip, which ecdaq-sync0 watches (app/doc/sync0.md); faults by
+                guest's GPIO chip, which ecdaq-sync0 watches (app/doc/reference/sync0.md); faults by
                 app/tools/tell-segment.py --control build/image/boot/control
   --icount      the guest's clock counts instructions: slower, and a 1 ms cycle holds in guest time
 USAGE

@@ -29,7 +29,7 @@ def plugin_folder() -> Path:
                 return found
     raise LinkError(
         "this cyclonedds was built without DDS Security, as that of PyPI is; a program in C with "
-        "Debian's Cyclone DDS can join (app/doc/dds.md)"
+        "Debian's Cyclone DDS can join (app/doc/reference/dds.md)"
     )
 
 
