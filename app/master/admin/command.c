@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "admin/command_inside.h"
+#include "admin/command_internal.h"
 #include "image/image.h"
 
 void admin_reply_refuse(struct admin_reply *reply, int result, const char *format, ...)

@@ -4,7 +4,7 @@
 #include <inttypes.h>
 #include <string.h>
 
-#include "admin/command_inside.h"
+#include "admin/command_internal.h"
 
 /* Of a slave with a one-shot mode: the DC time at which its SYNC0 shall fire (DESIGN 5). */
 #define ONESHOT_ENTRY "oneshot_time"

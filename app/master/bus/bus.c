@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "bus/internal.h"
+#include "bus/bus_internal.h"
 
 static void bind_soem(struct bus *bus)
 {

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "bus/internal.h"
+#include "bus/bus_internal.h"
 #include "bus/names.h"
 
 #define PIECE_BITS 64u

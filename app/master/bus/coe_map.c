@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "bus/internal.h"
+#include "bus/bus_internal.h"
 
 enum {
 	OBJECT_SM_TYPE = 0x1c00,

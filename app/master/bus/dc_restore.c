@@ -4,7 +4,7 @@
 #include <errno.h>
 
 #include "base/bytes.h"
-#include "bus/internal.h"
+#include "bus/bus_internal.h"
 #include "bus/registers.h"
 
 int bus_reference_time(struct bus *bus, int64_t *ret_ns)

@@ -10,8 +10,8 @@
 #include <string.h>
 
 #include "base/bytes.h"
+#include "bus/bus_internal.h"
 #include "bus/channels.h"
-#include "bus/internal.h"
 #include "bus/plan.h"
 #include "bus/registers.h"
 

@@ -5,7 +5,7 @@
  */
 #include <errno.h>
 
-#include "bus/internal.h"
+#include "bus/bus_internal.h"
 #include "wire/esc_reg.h"
 
 enum {

@@ -7,7 +7,7 @@
 #include <errno.h>
 
 #include "base/bytes.h"
-#include "bus/internal.h"
+#include "bus/bus_internal.h"
 #include "bus/registers.h"
 
 enum { SII_WORD_VENDOR = 0x08, SII_WORD_PRODUCT = 0x0a, EEPROM_TIMEOUT_US = 20000, GOOD_LOOKS = 4 };

@@ -10,7 +10,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "bus/internal.h"
+#include "bus/bus_internal.h"
 #include "wire/datagram.h"
 #include "wire/esc_reg.h"
 

@@ -9,8 +9,8 @@
 #include <string.h>
 
 #include "base/bytes.h"
+#include "bus/bus_internal.h"
 #include "bus/compare.h"
-#include "bus/internal.h"
 #include "bus/names.h"
 #include "bus/registers.h"
 

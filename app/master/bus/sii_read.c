@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "base/bytes.h"
-#include "bus/internal.h"
+#include "bus/bus_internal.h"
 
 static int is_same_device(const struct slave_info *a, const struct slave_info *b)
 {

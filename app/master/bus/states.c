@@ -6,7 +6,7 @@
 #include <errno.h>
 
 #include "base/bytes.h"
-#include "bus/internal.h"
+#include "bus/bus_internal.h"
 #include "bus/registers.h"
 
 enum { AL_BYTES = 6, POLL_MS = 2, ACKNOWLEDGE_NS = 500000000 };

@@ -9,7 +9,7 @@
 #include <string.h>
 
 #include "base/bytes.h"
-#include "bus/internal.h"
+#include "bus/bus_internal.h"
 #include "bus/registers.h"
 
 enum {

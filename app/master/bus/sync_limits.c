@@ -7,7 +7,7 @@
 #include <errno.h>
 #include <inttypes.h>
 
-#include "bus/internal.h"
+#include "bus/bus_internal.h"
 
 enum {
 	OBJECT_OUTPUT_SYNC = 0x1c32,

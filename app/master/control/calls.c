@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "control/inside.h"
+#include "control/control_internal.h"
 #include "image/image.h"
 
 #define COUNT(field)                                                                               \

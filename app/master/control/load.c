@@ -8,7 +8,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include "control/inside.h"
+#include "control/control_internal.h"
 
 #define SYMBOL "ecdaq_program"
 

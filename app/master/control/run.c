@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "base/histogram.h"
-#include "control/inside.h"
+#include "control/control_internal.h"
 
 #define ADD(field, n)                                                                              \
 	atomic_store_explicit(&(field),                                                            \

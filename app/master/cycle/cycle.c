@@ -7,7 +7,7 @@
 #include <sys/resource.h>
 
 #include "control/program.h"
-#include "cycle/cycle_inside.h"
+#include "cycle/cycle_internal.h"
 
 enum {
 	STACK_BYTES = 64 * 1024,    /* touched before the first cycle */

@@ -3,7 +3,7 @@
 #include <errno.h>
 
 #include "control/program.h"
-#include "cycle/cycle_inside.h"
+#include "cycle/cycle_internal.h"
 
 /* So many more frames carry the fail-safe values of all outputs before the cycle ends. */
 enum { LAST_CYCLES = 4 };

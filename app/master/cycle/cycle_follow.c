@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "cycle/cycle_inside.h"
+#include "cycle/cycle_internal.h"
 
 #include <errno.h>
 

@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "daemon/session.h"
-#include "daemon/session_inside.h"
+#include "daemon/session_internal.h"
 
 enum {
 	FILE_MODE = 0640,

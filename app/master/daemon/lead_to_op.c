@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "daemon/session.h"
-#include "daemon/session_inside.h"
+#include "daemon/session_internal.h"
 
 /* In a row with a frame, before OP is asked for (T07). */
 enum { FLOWING_CYCLES = 10 };

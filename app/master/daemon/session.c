@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "daemon/session_inside.h"
+#include "daemon/session_internal.h"
 
 #define ZERO(field) atomic_store_explicit(&(field), 0, memory_order_relaxed)
 

@@ -3,7 +3,7 @@
 #include <errno.h>
 
 #include "daemon/session.h"
-#include "daemon/session_inside.h"
+#include "daemon/session_internal.h"
 
 /* So many cycles carry the fail-safe outputs before the slaves are asked to leave OP. */
 enum { SAFE_CYCLES = 4 };

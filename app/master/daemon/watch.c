@@ -4,7 +4,7 @@
 #include <stdio.h>
 
 #include "daemon/session.h"
-#include "daemon/session_inside.h"
+#include "daemon/session_internal.h"
 
 /* Not one frame back for so long: the cable at the master, or the first slave, is gone. */
 #define SILENCE_NS (50 * NS_PER_MS)

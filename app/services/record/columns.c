@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "base/bytes.h"
-#include "record/columns_inside.h"
+#include "record/columns_internal.h"
 #include "record/messages.h"
 
 enum { GOOD_FIELD = 3, FIRST_FIELD = 3 }; /* cycle, dc_time_ns, flags, good: see layout_text.c */

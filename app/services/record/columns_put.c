@@ -3,7 +3,7 @@
 #include <inttypes.h>
 #include <string.h>
 
-#include "record/columns_inside.h"
+#include "record/columns_internal.h"
 #include "record/json.h"
 
 /* As RFC 4180 has it. */

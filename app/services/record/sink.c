@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "record/sink_inside.h"
+#include "record/sink_internal.h"
 
 #include <errno.h>
 #include <inttypes.h>

@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "record/sink_inside.h"
+#include "record/sink_internal.h"
 
 /* Own events carry no ring sequence. */
 static int put_own_event(struct sink *s, const struct event *ev, int64_t utc_ns)

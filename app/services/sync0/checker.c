@@ -5,7 +5,7 @@
 #include <stdlib.h>
 
 #include "base/clock.h"
-#include "sync0/checker_inside.h"
+#include "sync0/checker_internal.h"
 
 enum {
 	GRACE_CYCLES = 64, /* a window stays open so long: held edges, late samples */

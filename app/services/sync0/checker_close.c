@@ -2,7 +2,7 @@
 /* What is said of a window when it is full, and of shots when they are due. */
 #include <stdlib.h>
 
-#include "sync0/checker_inside.h"
+#include "sync0/checker_internal.h"
 
 enum { MISSING_TOLD = 16, ALIKE_SHARE = 16 };
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The way of an edge: its line's track gives it a cycle, the cycle's window takes it. */
-#include "sync0/checker_inside.h"
+#include "sync0/checker_internal.h"
 
 enum {
 	BACK_EDGES = 3,

@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "base/clock.h"
-#include "sync0/watch_inside.h"
+#include "sync0/watch_internal.h"
 
 enum { STEP_MS = 20, TEXT_BYTES = WATCH_WHY_BYTES };
 

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "base/clock.h"
-#include "sync0/watch_inside.h"
+#include "sync0/watch_internal.h"
 
 /* Behind the start: listening has begun for sure. */
 #define SETTLE_NS (NS_PER_S / 10)

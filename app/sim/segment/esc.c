@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "segment/esc_inside.h"
+#include "segment/esc_internal.h"
 #include "wire/al.h"
 
 const struct esc_features esc_et1100 = {

@@ -4,7 +4,7 @@
  * deviations in units of 2^-48 (3.6e-15), the local time has 48 bits behind the ns. What registers
  * and the SYNC unit see is its tick of 10 ns.
  */
-#include "segment/esc_inside.h"
+#include "segment/esc_internal.h"
 
 enum { RATE_BITS = 48, TICK_NS = 10 };
 

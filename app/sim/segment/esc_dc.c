@@ -8,7 +8,7 @@
  */
 #include <math.h>
 
-#include "segment/esc_inside.h"
+#include "segment/esc_internal.h"
 
 #define LOOP_GAIN (1.0 / 48.0) /* natural frequency times the interval of the frames */
 #define INTERVAL_MIN_NS 5e3

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The SII interface 0x0500 to 0x050f over the EEPROM's contents (data sheet, ESI EEPROM). */
-#include "segment/esc_inside.h"
+#include "segment/esc_internal.h"
 #include "wire/sii.h"
 
 #include <string.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* FMMUs: logical addresses to process RAM and registers, by bytes where possible, else bit by bit.
  */
-#include "segment/esc_inside.h"
+#include "segment/esc_internal.h"
 
 #include <string.h>
 

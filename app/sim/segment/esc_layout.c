@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Which bytes of the register file an ESC has, and which of them the master may write (data sheet).
  */
-#include "segment/esc_inside.h"
+#include "segment/esc_internal.h"
 
 #include <string.h>
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The application's side of the chip: what reading acknowledges and what it may write. */
-#include "segment/esc_inside.h"
+#include "segment/esc_internal.h"
 
 #include <string.h>
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The register file 0x0000 to 0x0fff: what reading shows and what writing does. */
-#include "segment/esc_inside.h"
+#include "segment/esc_internal.h"
 
 #include <string.h>
 

@@ -5,7 +5,7 @@
  * it. So either side always sees a whole, newest buffer. Mailbox mode is a handshake over one
  * buffer.
  */
-#include "segment/esc_inside.h"
+#include "segment/esc_internal.h"
 
 #include <string.h>
 

@@ -5,7 +5,7 @@
  * with 64 (T10). SYNC1 follows a SYNC0 by 0x09a4, and not again before it has come. Start and cycle
  * times are taken over on activation.
  */
-#include "segment/esc_inside.h"
+#include "segment/esc_internal.h"
 
 enum sync_bits {
 	ACTIVATE_CYCLIC = 0x01,

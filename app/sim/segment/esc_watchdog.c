@@ -4,7 +4,7 @@
  * master writes. PDI: fed by every access of the application; a chip without a microcontroller
  * at its PDI has none.
  */
-#include "segment/esc_inside.h"
+#include "segment/esc_internal.h"
 
 enum { PDI_SPI = 0x05, PDI_FIRST_BUS = 0x08 };
 

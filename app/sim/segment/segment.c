@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "segment/segment_inside.h"
+#include "segment/segment_internal.h"
 
 enum { WANDER_STEP_NS = 50000000, WANDER_STEPS = 40 };
 

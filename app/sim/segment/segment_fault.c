@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Cables, power and crystals, as they change while the segment runs. */
-#include "segment/segment_inside.h"
+#include "segment/segment_internal.h"
 
 static void lose_upper_end(struct segment *seg, const struct node *n)
 {

@@ -2,7 +2,7 @@
 /* A frame on its way: slave by slave, each at its own time, datagram by datagram. */
 #include <errno.h>
 
-#include "segment/segment_inside.h"
+#include "segment/segment_internal.h"
 #include "wire/datagram.h"
 
 enum {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Between load.c, calls.c and run.c; not for others. */
-#ifndef CONTROL_INSIDE_H
-#define CONTROL_INSIDE_H
+#ifndef CONTROL_INTERNAL_H
+#define CONTROL_INTERNAL_H
 
 #include <stdatomic.h>
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Inside of the sink: what its two halves share (sink.c: states and time; sink_file.c: the file).
  */
-#ifndef RECORD_SINK_INSIDE_H
-#define RECORD_SINK_INSIDE_H
+#ifndef RECORD_SINK_INTERNAL_H
+#define RECORD_SINK_INTERNAL_H
 
 #include "base/clock.h"
 #include "record/sink.h"

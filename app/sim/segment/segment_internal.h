@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Between the files of the segment; not for others. */
-#ifndef SIM_SEGMENT_INSIDE_H
-#define SIM_SEGMENT_INSIDE_H
+#ifndef SIM_SEGMENT_INTERNAL_H
+#define SIM_SEGMENT_INTERNAL_H
 
 #include "base/prng.h"
 #include "segment/segment.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Between the files of the checker; not for others. */
-#ifndef SYNC0_CHECKER_INSIDE_H
-#define SYNC0_CHECKER_INSIDE_H
+#ifndef SYNC0_CHECKER_INTERNAL_H
+#define SYNC0_CHECKER_INTERNAL_H
 
 #include "sync0/alarm.h"
 #include "sync0/checker.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* What session.c, bring_up.c, take_down.c and watch.c share; nobody else includes it. */
-#ifndef DAEMON_SESSION_INSIDE_H
-#define DAEMON_SESSION_INSIDE_H
+#ifndef DAEMON_SESSION_INTERNAL_H
+#define DAEMON_SESSION_INTERNAL_H
 
 #include <stdatomic.h>
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Between the files of the watch; not for others. */
-#ifndef SYNC0_WATCH_INSIDE_H
-#define SYNC0_WATCH_INSIDE_H
+#ifndef SYNC0_WATCH_INTERNAL_H
+#define SYNC0_WATCH_INTERNAL_H
 
 #include "base/limits.h"
 #include "sync0/calibration.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Between the files of the admin commands; not for others. Context: service thread. */
-#ifndef ADMIN_COMMAND_INSIDE_H
-#define ADMIN_COMMAND_INSIDE_H
+#ifndef ADMIN_COMMAND_INTERNAL_H
+#define ADMIN_COMMAND_INTERNAL_H
 
 #include "admin/command.h"
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Inside of the table: what columns.c gathers and columns_put.c prints. */
-#ifndef RECORD_COLUMNS_INSIDE_H
-#define RECORD_COLUMNS_INSIDE_H
+#ifndef RECORD_COLUMNS_INTERNAL_H
+#define RECORD_COLUMNS_INTERNAL_H
 
 #include "record/columns.h"
 #include "record/ros2msg.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Between the files of the cycle; not for others. */
-#ifndef CYCLE_CYCLE_INSIDE_H
-#define CYCLE_CYCLE_INSIDE_H
+#ifndef CYCLE_CYCLE_INTERNAL_H
+#define CYCLE_CYCLE_INTERNAL_H
 
 #include <stdatomic.h>
 
