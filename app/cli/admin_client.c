@@ -10,20 +10,20 @@
 
 enum { REPLY_TIMEOUT_S = 20 }; /* an SDO may take its own time-outs */
 
-static enum cli_exit fail_connect(const struct cli *cli, const char *path, int err)
+static enum exit_code fail_connect(const struct cli *cli, const char *path, int err)
 {
 	switch (err) {
 	case ENOENT:
 	case ENOTDIR:
 	case ECONNREFUSED:
-		return cli_fail(cli, CLI_NO_DAEMON,
+		return cli_fail(cli, EXIT_CODE_NO_DAEMON,
 				"admin socket: %s: nobody listens: is ecdaqd running?", path);
 	case EACCES:
 	case EPERM:
-		return cli_fail(cli, CLI_PERMISSION,
+		return cli_fail(cli, EXIT_CODE_PERMISSION,
 				"admin socket: no permission on %s: be root or in its group", path);
 	default:
-		return cli_fail(cli, CLI_FAILED, "admin socket: %s: %s", path, strerror(err));
+		return cli_fail(cli, EXIT_CODE_FAILED, "admin socket: %s: %s", path, strerror(err));
 	}
 }
 
@@ -79,15 +79,15 @@ static int exchange(int fd, const struct admin_request *request, struct admin_re
 	return 0;
 }
 
-enum cli_exit admin_ask(struct cli *cli, struct admin_request *request,
-			struct admin_reply *ret_reply)
+enum exit_code admin_ask(struct cli *cli, struct admin_request *request,
+			 struct admin_reply *ret_reply)
 {
 	char path[CONFIG_PATH_BYTES];
-	enum cli_exit result = cli_path(cli, CONFIG_RUN_ADMIN, path);
+	enum exit_code result = cli_path(cli, CONFIG_RUN_ADMIN, path);
 	int fd;
 	int r;
 
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	fd = connect_to(path);
@@ -98,31 +98,32 @@ enum cli_exit admin_ask(struct cli *cli, struct admin_request *request,
 	r = exchange(fd, request, ret_reply);
 	close(fd);
 	if (r == -EAGAIN) {
-		return cli_fail(cli, CLI_FAILED, "ecdaqd: no answer within %d s", REPLY_TIMEOUT_S);
+		return cli_fail(cli, EXIT_CODE_FAILED, "ecdaqd: no answer within %d s",
+				REPLY_TIMEOUT_S);
 	}
 	if (r == -EPROTO) {
-		return cli_fail(cli, CLI_FAILED,
+		return cli_fail(cli, EXIT_CODE_FAILED,
 				"ecdaqd: its answer is of another version of ecdaq");
 	}
 	if (r == -ECONNRESET || r == -EPIPE) {
-		return cli_fail(cli, CLI_NO_DAEMON, "ecdaqd: hung up without an answer");
+		return cli_fail(cli, EXIT_CODE_NO_DAEMON, "ecdaqd: hung up without an answer");
 	}
-	return r < 0 ? cli_fail(cli, CLI_FAILED, "ecdaqd: %s", strerror(-r)) : CLI_OK;
+	return r < 0 ? cli_fail(cli, EXIT_CODE_FAILED, "ecdaqd: %s", strerror(-r)) : EXIT_CODE_OK;
 }
 
-enum cli_exit admin_judge(const struct cli *cli, const struct admin_reply *reply)
+enum exit_code admin_judge(const struct cli *cli, const struct admin_reply *reply)
 {
 	if (reply->result >= 0) {
-		return CLI_OK;
+		return EXIT_CODE_OK;
 	}
-	return cli_fail(cli, CLI_REFUSED, "refused: %s",
+	return cli_fail(cli, EXIT_CODE_REFUSED, "refused: %s",
 			reply->text[0] != '\0' ? reply->text : strerror(-reply->result));
 }
 
-enum cli_exit admin_do(struct cli *cli, struct admin_request *request,
-		       struct admin_reply *ret_reply)
+enum exit_code admin_do(struct cli *cli, struct admin_request *request,
+			struct admin_reply *ret_reply)
 {
-	enum cli_exit result = admin_ask(cli, request, ret_reply);
+	enum exit_code result = admin_ask(cli, request, ret_reply);
 
-	return result == CLI_OK ? admin_judge(cli, ret_reply) : result;
+	return result == EXIT_CODE_OK ? admin_judge(cli, ret_reply) : result;
 }

@@ -7,17 +7,17 @@
 #include "cli/cli.h"
 
 /**
- * Send @request (its magic is filled in) and wait for the reply. CLI_OK when there is one, whatever
- * it says; else the code of a failure that was said.
+ * Send @request (its magic is filled in) and wait for the reply. EXIT_CODE_OK when there is one,
+ * whatever it says; else the code of a failure that was said.
  */
-enum cli_exit admin_ask(struct cli *cli, struct admin_request *request,
-			struct admin_reply *ret_reply);
+enum exit_code admin_ask(struct cli *cli, struct admin_request *request,
+			 struct admin_reply *ret_reply);
 
-/** CLI_OK if @reply grants what was asked; else say why not: CLI_REFUSED. */
-enum cli_exit admin_judge(const struct cli *cli, const struct admin_reply *reply);
+/** EXIT_CODE_OK if @reply grants what was asked; else say why not: EXIT_CODE_REFUSED. */
+enum exit_code admin_judge(const struct cli *cli, const struct admin_reply *reply);
 
 /** Both in one. */
-enum cli_exit admin_do(struct cli *cli, struct admin_request *request,
-		       struct admin_reply *ret_reply);
+enum exit_code admin_do(struct cli *cli, struct admin_request *request,
+			struct admin_reply *ret_reply);
 
 #endif

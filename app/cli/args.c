@@ -40,7 +40,7 @@ int args_take_global(struct cli *cli, int argc, char **argv, int index)
 			return 1;
 		}
 		if (index + 1 >= argc) {
-			cli_fail(cli, CLI_USAGE, "--%s: wants a value", globals[i].name);
+			cli_fail(cli, EXIT_CODE_USAGE, "--%s: wants a value", globals[i].name);
 			return -1;
 		}
 		*globals[i].target = argv[index + 1];
@@ -96,8 +96,8 @@ static int parse_dc_time(const char *text, int64_t *ret)
 	return 0;
 }
 
-static enum cli_exit store(const struct cli *cli, const struct args_option *option,
-			   const char *value)
+static enum exit_code store(const struct cli *cli, const struct args_option *option,
+			    const char *value)
 {
 	char why[CONFIG_WHY_BYTES];
 	int64_t ns;
@@ -105,40 +105,40 @@ static enum cli_exit store(const struct cli *cli, const struct args_option *opti
 	switch (option->kind) {
 	case ARGS_FLAG:
 		*(int *)option->target = 1;
-		return CLI_OK;
+		return EXIT_CODE_OK;
 	case ARGS_TEXT:
 		*(const char **)option->target = value;
-		return CLI_OK;
+		return EXIT_CODE_OK;
 	case ARGS_COUNT:
 		if (parse_count(value, option->target) < 0) {
-			return cli_fail(cli, CLI_USAGE, "--%s: \"%s\" is no count above 0",
+			return cli_fail(cli, EXIT_CODE_USAGE, "--%s: \"%s\" is no count above 0",
 					option->name, value);
 		}
-		return CLI_OK;
+		return EXIT_CODE_OK;
 	case ARGS_NUMBER:
 		if (parse_number(value, option->target) < 0) {
-			return cli_fail(cli, CLI_USAGE, "--%s: \"%s\" is no number above 0",
+			return cli_fail(cli, EXIT_CODE_USAGE, "--%s: \"%s\" is no number above 0",
 					option->name, value);
 		}
-		return CLI_OK;
+		return EXIT_CODE_OK;
 	case ARGS_DURATION:
 		if (config_parse_duration(value, &ns, why) < 0) {
-			return cli_fail(cli, CLI_USAGE, "--%s: %s", option->name, why);
+			return cli_fail(cli, EXIT_CODE_USAGE, "--%s: %s", option->name, why);
 		}
 		if (ns <= 0) {
-			return cli_fail(cli, CLI_USAGE, "--%s: %s is not above 0", option->name,
-					value);
-		}
-		*(int64_t *)option->target = ns;
-		return CLI_OK;
-	case ARGS_DC_TIME:
-		if (parse_dc_time(value, option->target) < 0) {
-			return cli_fail(cli, CLI_USAGE, "--%s: \"%s\" is no DC time in ns",
+			return cli_fail(cli, EXIT_CODE_USAGE, "--%s: %s is not above 0",
 					option->name, value);
 		}
-		return CLI_OK;
+		*(int64_t *)option->target = ns;
+		return EXIT_CODE_OK;
+	case ARGS_DC_TIME:
+		if (parse_dc_time(value, option->target) < 0) {
+			return cli_fail(cli, EXIT_CODE_USAGE, "--%s: \"%s\" is no DC time in ns",
+					option->name, value);
+		}
+		return EXIT_CODE_OK;
 	}
-	return CLI_USAGE;
+	return EXIT_CODE_USAGE;
 }
 
 static void help_option(const struct args_option *option)
@@ -191,21 +191,23 @@ static int take_option(const struct cli *cli, const struct args *args, int argc,
 		}
 		if (option->kind == ARGS_FLAG) {
 			if (value != NULL) {
-				cli_fail(cli, CLI_USAGE, "--%s: takes no value", option->name);
+				cli_fail(cli, EXIT_CODE_USAGE, "--%s: takes no value",
+					 option->name);
 				return -1;
 			}
-			return store(cli, option, NULL) == CLI_OK ? 1 : -1;
+			return store(cli, option, NULL) == EXIT_CODE_OK ? 1 : -1;
 		}
 		if (value != NULL) {
-			return store(cli, option, value) == CLI_OK ? 1 : -1;
+			return store(cli, option, value) == EXIT_CODE_OK ? 1 : -1;
 		}
 		if (index + 1 >= argc) {
-			cli_fail(cli, CLI_USAGE, "--%s: wants a value", option->name);
+			cli_fail(cli, EXIT_CODE_USAGE, "--%s: wants a value", option->name);
 			return -1;
 		}
-		return store(cli, option, argv[index + 1]) == CLI_OK ? 2 : -1;
+		return store(cli, option, argv[index + 1]) == EXIT_CODE_OK ? 2 : -1;
 	}
-	cli_fail(cli, CLI_USAGE, "%s: unknown option (see ecdaq %s --help)", word, cli->verb->name);
+	cli_fail(cli, EXIT_CODE_USAGE, "%s: unknown option (see ecdaq %s --help)", word,
+		 cli->verb->name);
 	return -1;
 }
 
@@ -216,15 +218,15 @@ static int is_operand(const char *word)
 }
 
 static enum args_result check_operands(const struct cli *cli, const struct args *args,
-				       enum cli_exit *ret_exit)
+				       enum exit_code *ret_exit)
 {
 	if (args->operand_count < args->operands_min) {
-		*ret_exit = cli_fail(cli, CLI_USAGE, "wants %s (see ecdaq %s --help)",
+		*ret_exit = cli_fail(cli, EXIT_CODE_USAGE, "wants %s (see ecdaq %s --help)",
 				     cli->verb->operands, cli->verb->name);
 		return ARGS_DONE;
 	}
 	if (args->operand_count > args->operands_max) {
-		*ret_exit = cli_fail(cli, CLI_USAGE, "%s: one word too many",
+		*ret_exit = cli_fail(cli, EXIT_CODE_USAGE, "%s: one word too many",
 				     args->operands[args->operands_max]);
 		return ARGS_DONE;
 	}
@@ -232,11 +234,11 @@ static enum args_result check_operands(const struct cli *cli, const struct args 
 }
 
 enum args_result args_parse(struct cli *cli, struct args *args, int argc, char **argv,
-			    enum cli_exit *ret_exit)
+			    enum exit_code *ret_exit)
 {
 	int is_over = 0; /* "--" was seen */
 
-	*ret_exit = CLI_USAGE;
+	*ret_exit = EXIT_CODE_USAGE;
 	args->operands = argv;
 	args->operand_count = 0;
 	for (int i = 0; i < argc;) {
@@ -253,7 +255,7 @@ enum args_result args_parse(struct cli *cli, struct args *args, int argc, char *
 		}
 		if (strcmp(argv[i], "--help") == 0) {
 			help(cli, args);
-			*ret_exit = CLI_OK;
+			*ret_exit = EXIT_CODE_OK;
 			return ARGS_DONE;
 		}
 		taken = args_take_global(cli, argc, argv, i);

@@ -46,7 +46,7 @@ enum args_result { ARGS_GO, ARGS_DONE };
  * was answered or a mistake was said, with the exit code in @ret_exit.
  */
 enum args_result args_parse(struct cli *cli, struct args *args, int argc, char **argv,
-			    enum cli_exit *ret_exit);
+			    enum exit_code *ret_exit);
 
 /** Take a global option at @argv[@index]. Words taken; 0 if it is none; -1 if a mistake was said.
  */

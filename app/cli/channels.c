@@ -46,7 +46,7 @@ static void write_json(struct json *js, const struct channel *ch, const struct s
 	json_object_end(js);
 }
 
-enum cli_exit verb_channels(struct cli *cli, int argc, char **argv)
+enum exit_code verb_channels(struct cli *cli, int argc, char **argv)
 {
 	int is_json = 0;
 	const struct args_option options[] = {
@@ -54,14 +54,14 @@ enum cli_exit verb_channels(struct cli *cli, int argc, char **argv)
 	};
 	struct args args = { .options = options, .option_count = 1 };
 	struct samples samples;
-	enum cli_exit result;
+	enum exit_code result;
 	struct json js;
 
 	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
 		return result;
 	}
 	result = samples_open(cli, &samples);
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	json_init(&js, stdout);
@@ -82,5 +82,5 @@ enum cli_exit verb_channels(struct cli *cli, int argc, char **argv)
 		json_end_line(&js);
 	}
 	samples_close(&samples);
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }

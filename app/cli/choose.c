@@ -22,7 +22,7 @@ static size_t likeness(const char *name, const char *candidate)
 	return head + tail;
 }
 
-enum cli_exit choose_fail(const struct cli *cli, const struct samples *samples, const char *name)
+enum exit_code choose_fail(const struct cli *cli, const struct samples *samples, const char *name)
 {
 	const char *guess = NULL;
 	size_t best = strlen(name) / 2;
@@ -36,29 +36,29 @@ enum cli_exit choose_fail(const struct cli *cli, const struct samples *samples, 
 		}
 	}
 	if (guess != NULL) {
-		return cli_fail(cli, CLI_FAILED, "%s: no such channel; did you mean %s?", name,
-				guess);
+		return cli_fail(cli, EXIT_CODE_FAILED, "%s: no such channel; did you mean %s?",
+				name, guess);
 	}
-	return cli_fail(cli, CLI_FAILED, "%s: no such channel (see ecdaq channels)", name);
+	return cli_fail(cli, EXIT_CODE_FAILED, "%s: no such channel (see ecdaq channels)", name);
 }
 
-static enum cli_exit add(const struct cli *cli, struct choice *choice, uint32_t channel)
+static enum exit_code add(const struct cli *cli, struct choice *choice, uint32_t channel)
 {
 	for (unsigned i = 0; i < choice->count; i++) {
 		if (choice->channel[i] == channel) {
-			return CLI_OK;
+			return EXIT_CODE_OK;
 		}
 	}
 	if (choice->count == CHOOSE_LIMIT) {
-		return cli_fail(cli, CLI_FAILED, "more than CHOOSE_LIMIT = %d channels",
+		return cli_fail(cli, EXIT_CODE_FAILED, "more than CHOOSE_LIMIT = %d channels",
 				CHOOSE_LIMIT);
 	}
 	choice->channel[choice->count++] = channel;
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }
 
-enum cli_exit choose_channels(const struct cli *cli, const struct samples *samples,
-			      char *const *names, int name_count, struct choice *ret_choice)
+enum exit_code choose_channels(const struct cli *cli, const struct samples *samples,
+			       char *const *names, int name_count, struct choice *ret_choice)
 {
 	struct choice choice = { .count = 0 };
 
@@ -66,14 +66,14 @@ enum cli_exit choose_channels(const struct cli *cli, const struct samples *sampl
 		int matches = 0;
 
 		for (uint32_t i = 0; i < samples->meta->channel_count; i++) {
-			enum cli_exit result;
+			enum exit_code result;
 
 			if (fnmatch(names[n], samples->channels[i].name, 0) != 0) {
 				continue;
 			}
 			matches++;
 			result = add(cli, &choice, i);
-			if (result != CLI_OK) {
+			if (result != EXIT_CODE_OK) {
 				return result;
 			}
 		}
@@ -82,5 +82,5 @@ enum cli_exit choose_channels(const struct cli *cli, const struct samples *sampl
 		}
 	}
 	*ret_choice = choice;
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }

@@ -15,13 +15,13 @@ struct choice {
 };
 
 /**
- * The channels that the words @names name, in that order; * and ? match. CLI_OK, or the code of a
- * failure that was said.
+ * The channels that the words @names name, in that order; * and ? match. EXIT_CODE_OK, or the code
+ * of a failure that was said.
  */
-enum cli_exit choose_channels(const struct cli *cli, const struct samples *samples,
-			      char *const *names, int name_count, struct choice *ret_choice);
+enum exit_code choose_channels(const struct cli *cli, const struct samples *samples,
+			       char *const *names, int name_count, struct choice *ret_choice);
 
-/** Say that there is no channel @name, with a guess. Returns CLI_FAILED. */
-enum cli_exit choose_fail(const struct cli *cli, const struct samples *samples, const char *name);
+/** Say that there is no channel @name, with a guess. Returns EXIT_CODE_FAILED. */
+enum exit_code choose_fail(const struct cli *cli, const struct samples *samples, const char *name);
 
 #endif

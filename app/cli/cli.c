@@ -8,7 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum cli_exit cli_fail(const struct cli *cli, enum cli_exit code, const char *format, ...)
+enum exit_code cli_fail(const struct cli *cli, enum exit_code code, const char *format, ...)
 {
 	char text[1024];
 	va_list args;
@@ -28,18 +28,18 @@ enum cli_exit cli_fail(const struct cli *cli, enum cli_exit code, const char *fo
 	return code;
 }
 
-enum cli_exit cli_exit_of(int errno_value)
+enum exit_code cli_exit_of(int errno_value)
 {
 	switch (errno_value) {
 	case EACCES:
 	case EPERM:
-		return CLI_PERMISSION;
+		return EXIT_CODE_PERMISSION;
 	case ENOENT:
 	case ENOTDIR:
 	case ECONNREFUSED:
-		return CLI_NO_DAEMON;
+		return EXIT_CODE_NO_DAEMON;
 	default:
-		return CLI_FAILED;
+		return EXIT_CODE_FAILED;
 	}
 }
 
@@ -56,7 +56,7 @@ static void prefer_the_system(char *dir)
 	}
 }
 
-static enum cli_exit find_dir(struct cli *cli)
+static enum exit_code find_dir(struct cli *cli)
 {
 	const char *env = getenv("ECDAQ_RUN_DIR");
 	struct config cfg;
@@ -64,38 +64,38 @@ static enum cli_exit find_dir(struct cli *cli)
 
 	config_defaults(&cfg);
 	if (cli->config != NULL && config_load(cli->config, &cfg, error, sizeof(error)) < 0) {
-		return cli_fail(cli, CLI_USAGE, "--config: %s", error);
+		return cli_fail(cli, EXIT_CODE_CONFIG, "--config: %s", error);
 	}
 	if (cli->run_dir != NULL) {
 		if (snprintf(cfg.run_dir, sizeof(cfg.run_dir), "%s", cli->run_dir) >=
 		    (int)sizeof(cfg.run_dir)) {
-			return cli_fail(cli, CLI_USAGE, "--run-dir: the path is too long");
+			return cli_fail(cli, EXIT_CODE_USAGE, "--run-dir: the path is too long");
 		}
 	}
 	if (config_run_path(&cfg, "", cli->dir, sizeof(cli->dir)) < 0) {
-		return cli_fail(cli, CLI_USAGE, "run directory: the path is too long");
+		return cli_fail(cli, EXIT_CODE_USAGE, "run directory: the path is too long");
 	}
 	if (cfg.run_dir[0] == '\0' && (env == NULL || env[0] == '\0')) {
 		prefer_the_system(cli->dir);
 	}
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }
 
-enum cli_exit cli_path(struct cli *cli, const char *file, char *ret_path)
+enum exit_code cli_path(struct cli *cli, const char *file, char *ret_path)
 {
 	char path[2 * CONFIG_PATH_BYTES];
-	enum cli_exit result;
+	enum exit_code result;
 
 	if (cli->dir[0] == '\0') {
 		result = find_dir(cli);
-		if (result != CLI_OK) {
+		if (result != EXIT_CODE_OK) {
 			return result;
 		}
 	}
 	snprintf(path, sizeof(path), "%s%s", cli->dir, file);
 	if (strlen(path) >= CONFIG_PATH_BYTES) {
-		return cli_fail(cli, CLI_USAGE, "run directory: the path is too long");
+		return cli_fail(cli, EXIT_CODE_USAGE, "run directory: the path is too long");
 	}
 	memcpy(ret_path, path, strlen(path) + 1);
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }

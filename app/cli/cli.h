@@ -8,16 +8,7 @@
 #define CLI_CLI_H
 
 #include "config/config.h"
-
-/* Part of the interface (doc/reference/cli.md): numbers do not change. */
-enum cli_exit {
-	CLI_OK = 0,
-	CLI_FAILED = 1,     /* what was asked for could not be done */
-	CLI_USAGE = 2,      /* the command line cannot be understood */
-	CLI_NO_DAEMON = 3,  /* no ecdaqd, or nothing of it to read */
-	CLI_REFUSED = 4,    /* ecdaqd or a slave refused the command */
-	CLI_PERMISSION = 5, /* a right is missing */
-};
+#include "program/exit_code.h"
 
 struct verb;
 
@@ -34,38 +25,39 @@ struct verb {
 	const char *operands; /* "CHANNEL..." */
 	const char *summary;  /* one line */
 	const char *detail;   /* more lines for --help; NULL */
-	enum cli_exit (*run)(struct cli *cli, int argc, char **argv);
+	enum exit_code (*run)(struct cli *cli, int argc, char **argv);
 };
 
 /** Say "ecdaq: VERB: ..." on standard error, as one printable line. Returns @code. */
-enum cli_exit cli_fail(const struct cli *cli, enum cli_exit code, const char *format, ...)
+enum exit_code cli_fail(const struct cli *cli, enum exit_code code, const char *format, ...)
 	__attribute__((format(printf, 3, 4)));
 
-/** CLI_PERMISSION for EACCES and EPERM, CLI_NO_DAEMON for what is not there, else CLI_FAILED. */
-enum cli_exit cli_exit_of(int errno_value);
+/** EXIT_CODE_PERMISSION for EACCES and EPERM, EXIT_CODE_NO_DAEMON for what is not there, else
+ * EXIT_CODE_FAILED. */
+enum exit_code cli_exit_of(int errno_value);
 
 /**
- * The path of @file (CONFIG_RUN_...) in the run directory, CONFIG_PATH_BYTES long. CLI_OK, or the
- * code of a failure that was said.
+ * The path of @file (CONFIG_RUN_...) in the run directory, CONFIG_PATH_BYTES long. EXIT_CODE_OK, or
+ * the code of a failure that was said.
  */
-enum cli_exit cli_path(struct cli *cli, const char *file, char *ret_path);
+enum exit_code cli_path(struct cli *cli, const char *file, char *ret_path);
 
 /* The verbs, one file each. */
-enum cli_exit verb_channels(struct cli *cli, int argc, char **argv);
-enum cli_exit verb_clear(struct cli *cli, int argc, char **argv);
-enum cli_exit verb_doctor(struct cli *cli, int argc, char **argv);
-enum cli_exit verb_events(struct cli *cli, int argc, char **argv);
-enum cli_exit verb_histogram(struct cli *cli, int argc, char **argv);
-enum cli_exit verb_log(struct cli *cli, int argc, char **argv);
-enum cli_exit verb_oneshot(struct cli *cli, int argc, char **argv);
-enum cli_exit verb_sdo(struct cli *cli, int argc, char **argv);
-enum cli_exit verb_security(struct cli *cli, int argc, char **argv);
-enum cli_exit verb_set(struct cli *cli, int argc, char **argv);
-enum cli_exit verb_slaves(struct cli *cli, int argc, char **argv);
-enum cli_exit verb_status(struct cli *cli, int argc, char **argv);
-enum cli_exit verb_stop(struct cli *cli, int argc, char **argv);
-enum cli_exit verb_sync0(struct cli *cli, int argc, char **argv);
-enum cli_exit verb_top(struct cli *cli, int argc, char **argv);
-enum cli_exit verb_watch(struct cli *cli, int argc, char **argv);
+enum exit_code verb_channels(struct cli *cli, int argc, char **argv);
+enum exit_code verb_clear(struct cli *cli, int argc, char **argv);
+enum exit_code verb_doctor(struct cli *cli, int argc, char **argv);
+enum exit_code verb_events(struct cli *cli, int argc, char **argv);
+enum exit_code verb_histogram(struct cli *cli, int argc, char **argv);
+enum exit_code verb_log(struct cli *cli, int argc, char **argv);
+enum exit_code verb_oneshot(struct cli *cli, int argc, char **argv);
+enum exit_code verb_sdo(struct cli *cli, int argc, char **argv);
+enum exit_code verb_security(struct cli *cli, int argc, char **argv);
+enum exit_code verb_set(struct cli *cli, int argc, char **argv);
+enum exit_code verb_slaves(struct cli *cli, int argc, char **argv);
+enum exit_code verb_status(struct cli *cli, int argc, char **argv);
+enum exit_code verb_stop(struct cli *cli, int argc, char **argv);
+enum exit_code verb_sync0(struct cli *cli, int argc, char **argv);
+enum exit_code verb_top(struct cli *cli, int argc, char **argv);
+enum exit_code verb_watch(struct cli *cli, int argc, char **argv);
 
 #endif

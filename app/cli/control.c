@@ -8,12 +8,12 @@
 #include "cli/screen.h"
 #include "cli/source.h"
 
-enum cli_exit verb_clear(struct cli *cli, int argc, char **argv)
+enum exit_code verb_clear(struct cli *cli, int argc, char **argv)
 {
 	struct args args = { .options = NULL };
 	struct admin_request request = { .verb = ADMIN_CLEAR };
 	struct admin_reply reply;
-	enum cli_exit result;
+	enum exit_code result;
 
 	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
 		return result;
@@ -22,7 +22,7 @@ enum cli_exit verb_clear(struct cli *cli, int argc, char **argv)
 }
 
 /* Until the process with @pid is gone, or @wait_ns have passed. */
-static enum cli_exit wait_for_end(const struct cli *cli, int64_t pid, int64_t wait_ns)
+static enum exit_code wait_for_end(const struct cli *cli, int64_t pid, int64_t wait_ns)
 {
 	const int64_t step_ns = 20 * NS_PER_MS;
 	char why[32];
@@ -30,14 +30,14 @@ static enum cli_exit wait_for_end(const struct cli *cli, int64_t pid, int64_t wa
 	for (int64_t waited_ns = 0; source_is_alive(pid); waited_ns += step_ns) {
 		if (waited_ns >= wait_ns || screen_is_over()) {
 			snprintf(why, sizeof(why), "%.3g s", (double)waited_ns / 1e9);
-			return cli_fail(cli, CLI_FAILED, "ecdaqd: still there after %s", why);
+			return cli_fail(cli, EXIT_CODE_FAILED, "ecdaqd: still there after %s", why);
 		}
 		screen_wait(step_ns);
 	}
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }
 
-enum cli_exit verb_stop(struct cli *cli, int argc, char **argv)
+enum exit_code verb_stop(struct cli *cli, int argc, char **argv)
 {
 	int64_t wait_ns = 0;
 	const struct args_option options[] = {
@@ -48,7 +48,7 @@ enum cli_exit verb_stop(struct cli *cli, int argc, char **argv)
 	struct admin_request request = { .verb = ADMIN_STOP };
 	const struct status_page *page;
 	struct admin_reply reply;
-	enum cli_exit result;
+	enum exit_code result;
 	int64_t pid = 0;
 
 	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
@@ -56,14 +56,14 @@ enum cli_exit verb_stop(struct cli *cli, int argc, char **argv)
 	}
 	if (wait_ns > 0) {
 		result = source_status(cli, &page);
-		if (result != CLI_OK) {
+		if (result != EXIT_CODE_OK) {
 			return result;
 		}
 		pid = page->pid;
 		source_status_close(page);
 	}
 	result = admin_do(cli, &request, &reply);
-	if (result == CLI_OK && wait_ns > 0) {
+	if (result == EXIT_CODE_OK && wait_ns > 0) {
 		screen_catch_signals();
 		result = wait_for_end(cli, pid, wait_ns);
 	}

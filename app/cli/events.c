@@ -141,7 +141,7 @@ static void open_sync0(struct events *events)
 		ring_reader_destroy(events->sync0);
 		events->sync0 = NULL;
 	}
-	if (cli_path(events->cli, CONFIG_RUN_SYNC0_EVENTS, path) != CLI_OK ||
+	if (cli_path(events->cli, CONFIG_RUN_SYNC0_EVENTS, path) != EXIT_CODE_OK ||
 	    ring_reader_open(path, &events->sync0) < 0) {
 		events->sync0 = NULL;
 		return;
@@ -159,7 +159,7 @@ static void open_sync0(struct events *events)
 	ring_seek(events->sync0, oldest);
 }
 
-static enum cli_exit run(struct events *events)
+static enum exit_code run(struct events *events)
 {
 	uint64_t lost = 0;
 	struct event ev;
@@ -176,38 +176,38 @@ static enum cli_exit run(struct events *events)
 		case RING_EMPTY:
 			print_sync0_until(events, INT64_MAX);
 			if (!events->is_follow || ring_is_orphaned(events->reader)) {
-				return CLI_OK;
+				return EXIT_CODE_OK;
 			}
 			fflush(stdout);
 			open_sync0(events);
 			screen_wait(20 * NS_PER_MS);
 			if (screen_is_over() || ferror(stdout)) {
-				return CLI_OK;
+				return EXIT_CODE_OK;
 			}
 			break;
 		case RING_CLOSED:
 			print_sync0_until(events, INT64_MAX);
-			return CLI_OK;
+			return EXIT_CODE_OK;
 		}
 	}
 }
 
-static enum cli_exit open_ring(struct events *events)
+static enum exit_code open_ring(struct events *events)
 {
 	char path[CONFIG_PATH_BYTES];
-	enum cli_exit result = cli_path(events->cli, CONFIG_RUN_EVENTS, path);
+	enum exit_code result = cli_path(events->cli, CONFIG_RUN_EVENTS, path);
 	int r;
 
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	r = ring_reader_open(path, &events->reader);
 	if (r == -ENOENT || r == -ENOTDIR) {
-		return cli_fail(events->cli, CLI_NO_DAEMON,
+		return cli_fail(events->cli, EXIT_CODE_NO_DAEMON,
 				"events: %s is not there: is ecdaqd running?", path);
 	}
 	if (r == -EACCES || r == -EPERM) {
-		return cli_fail(events->cli, CLI_PERMISSION,
+		return cli_fail(events->cli, EXIT_CODE_PERMISSION,
 				"events: no permission to read %s: be root or in its group", path);
 	}
 	if (r == 0 && (strcmp(ring_kind(events->reader), "event") != 0 ||
@@ -216,29 +216,29 @@ static enum cli_exit open_ring(struct events *events)
 		r = -EPROTO;
 	}
 	if (r == -EPROTO) {
-		return cli_fail(events->cli, CLI_FAILED,
+		return cli_fail(events->cli, EXIT_CODE_FAILED,
 				"events: %s is of another version of ecdaq, or damaged", path);
 	}
-	return r < 0 ? cli_fail(events->cli, CLI_FAILED, "events: %s: %s", path, strerror(-r))
-		     : CLI_OK;
+	return r < 0 ? cli_fail(events->cli, EXIT_CODE_FAILED, "events: %s: %s", path, strerror(-r))
+		     : EXIT_CODE_OK;
 }
 
-static enum cli_exit parse_level(struct events *events)
+static enum exit_code parse_level(struct events *events)
 {
 	if (events->level == NULL) {
-		return CLI_OK;
+		return EXIT_CODE_OK;
 	}
 	for (int level = EVENT_INFO; level <= EVENT_ERROR; level++) {
 		if (strcmp(event_severity_to_str((enum event_severity)level), events->level) == 0) {
 			events->severity = (enum event_severity)level;
-			return CLI_OK;
+			return EXIT_CODE_OK;
 		}
 	}
-	return cli_fail(events->cli, CLI_USAGE,
+	return cli_fail(events->cli, EXIT_CODE_USAGE,
 			"--level: %s: is none of info, notice, warning, error", events->level);
 }
 
-enum cli_exit verb_events(struct cli *cli, int argc, char **argv)
+enum exit_code verb_events(struct cli *cli, int argc, char **argv)
 {
 	struct events events = { .cli = cli };
 	const struct args_option options[] = {
@@ -249,18 +249,18 @@ enum cli_exit verb_events(struct cli *cli, int argc, char **argv)
 		{ "json", 0, ARGS_FLAG, &events.is_json, NULL, "a JSON object an event" },
 	};
 	struct args args = { .options = options, .option_count = 4 };
-	enum cli_exit result;
+	enum exit_code result;
 	uint64_t oldest;
 
 	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
 		return result;
 	}
 	result = parse_level(&events);
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	result = open_ring(&events);
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	oldest = ring_oldest(events.reader);

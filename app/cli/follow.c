@@ -6,20 +6,20 @@
 #include "base/clock.h"
 #include "cli/screen.h"
 
-enum cli_exit follow_open(struct cli *cli, struct follow *ret_follow)
+enum exit_code follow_open(struct cli *cli, struct follow *ret_follow)
 {
 	struct follow follow = { .cli = cli, .idle_ns = 5 * NS_PER_MS };
 	char path[CONFIG_PATH_BYTES];
-	enum cli_exit result = samples_open(cli, &follow.samples);
+	enum exit_code result = samples_open(cli, &follow.samples);
 
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
-	if (cli_path(cli, CONFIG_RUN_STATUS, path) == CLI_OK) {
+	if (cli_path(cli, CONFIG_RUN_STATUS, path) == EXIT_CODE_OK) {
 		follow.page = status_open(path, STATUS_MAGIC, sizeof(*follow.page));
 	}
 	*ret_follow = follow;
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }
 
 void follow_close(struct follow *follow)

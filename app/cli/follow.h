@@ -25,8 +25,8 @@ enum follow_news {
 	FOLLOW_OVER,    /* the user wants to stop */
 };
 
-/** Stand at the newest sample. CLI_OK, or the code of a failure that was said. */
-enum cli_exit follow_open(struct cli *cli, struct follow *ret_follow);
+/** Stand at the newest sample. EXIT_CODE_OK, or the code of a failure that was said. */
+enum exit_code follow_open(struct cli *cli, struct follow *ret_follow);
 void follow_close(struct follow *follow);
 
 enum follow_news follow_next(struct follow *follow, uint64_t *ret_lost);

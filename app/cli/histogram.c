@@ -132,7 +132,7 @@ static void print_json(const struct histogram *h, const char *name)
 	json_end_line(&js);
 }
 
-enum cli_exit verb_histogram(struct cli *cli, int argc, char **argv)
+enum exit_code verb_histogram(struct cli *cli, int argc, char **argv)
 {
 	int is_json = 0;
 	const struct args_option options[] = {
@@ -143,18 +143,18 @@ enum cli_exit verb_histogram(struct cli *cli, int argc, char **argv)
 	};
 	const struct status_page *page;
 	const struct histogram *h;
-	enum cli_exit result;
+	enum exit_code result;
 
 	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
 		return result;
 	}
 	result = source_status(cli, &page);
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	h = find(page, args.operands[0]);
 	if (h == NULL) {
-		result = cli_fail(cli, CLI_USAGE,
+		result = cli_fail(cli, EXIT_CODE_USAGE,
 				  "%s: is none of wake, round-trip, phase, work, control",
 				  args.operands[0]);
 	} else if (is_json) {

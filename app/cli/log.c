@@ -9,7 +9,7 @@
 
 #include "record/log.h"
 
-enum cli_exit verb_log(struct cli *cli, int argc, char **argv)
+enum exit_code verb_log(struct cli *cli, int argc, char **argv)
 {
 	char config[CONFIG_PATH_BYTES + 16];
 	char **words = calloc((size_t)argc + 3, sizeof(*words));
@@ -17,7 +17,7 @@ enum cli_exit verb_log(struct cli *cli, int argc, char **argv)
 	int result;
 
 	if (words == NULL) {
-		return cli_fail(cli, CLI_FAILED, "out of memory");
+		return cli_fail(cli, EXIT_CODE_FAILED, "out of memory");
 	}
 	/* argv[-1] is the verb itself: log_main() takes it for the program's name. */
 	for (int i = -1; i < argc; i++) {
@@ -30,16 +30,16 @@ enum cli_exit verb_log(struct cli *cli, int argc, char **argv)
 	}
 	result = log_main(count, words);
 	free(words);
-	return (enum cli_exit)result;
+	return (enum exit_code)result;
 }
 
 #else
 
-enum cli_exit verb_log(struct cli *cli, int argc, char **argv)
+enum exit_code verb_log(struct cli *cli, int argc, char **argv)
 {
 	(void)argc;
 	(void)argv;
-	return cli_fail(cli, CLI_FAILED, "this ecdaq was built without the recorder");
+	return cli_fail(cli, EXIT_CODE_FAILED, "this ecdaq was built without the recorder");
 }
 
 #endif

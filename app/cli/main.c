@@ -6,15 +6,16 @@
 
 #include "cli/args.h"
 #include "cli/cli.h"
+#include "program/exit_code.h"
 
-static enum cli_exit verb_version(struct cli *cli, int argc, char **argv)
+static enum exit_code verb_version(struct cli *cli, int argc, char **argv)
 {
 	struct args args = { .options = NULL };
-	enum cli_exit result;
+	enum exit_code result;
 
 	if (args_parse(cli, &args, argc, argv, &result) == ARGS_GO) {
 		puts("ecdaq " ECDAQ_VERSION);
-		result = CLI_OK;
+		result = EXIT_CODE_OK;
 	}
 	return result;
 }
@@ -92,10 +93,10 @@ static void help(void)
 	     "  --help          this; after a verb: its options\n"
 	     "  --version       the version of this program\n"
 	     "\n"
-	     "Every reading verb takes --json: one JSON value a line.\n"
-	     "\n"
-	     "exit codes: 0 ok, 1 failed, 2 command line, 3 no ecdaqd or nothing of it to read,\n"
-	     "4 refused by ecdaqd or a slave, 5 no permission");
+	     "Every reading verb takes --json: one JSON value a line.\n");
+	exit_code_help(stdout, EXIT_CODE_COMMON | EXIT_CODE_BIT(CONFIG) |
+				       EXIT_CODE_BIT(PERMISSION) | EXIT_CODE_BIT(NO_DAEMON) |
+				       EXIT_CODE_BIT(REFUSED));
 }
 
 static const struct verb *find_verb(const char *name)
@@ -109,10 +110,10 @@ static const struct verb *find_verb(const char *name)
 }
 
 /* What was written must have arrived: a full disk is a failure. */
-static enum cli_exit finish(const struct cli *cli, enum cli_exit result)
+static enum exit_code finish(const struct cli *cli, enum exit_code result)
 {
-	if ((fflush(stdout) != 0 || ferror(stdout)) && result == CLI_OK) {
-		return cli_fail(cli, CLI_FAILED, "standard output: %s", strerror(errno));
+	if ((fflush(stdout) != 0 || ferror(stdout)) && result == EXIT_CODE_OK) {
+		return cli_fail(cli, EXIT_CODE_FAILED, "standard output: %s", strerror(errno));
 	}
 	return result;
 }
@@ -126,28 +127,28 @@ int main(int argc, char **argv)
 		int taken = args_take_global(&cli, argc, argv, i);
 
 		if (taken < 0) {
-			return CLI_USAGE;
+			return EXIT_CODE_USAGE;
 		}
 		if (strcmp(argv[i], "--help") == 0 || strcmp(argv[i], "-h") == 0) {
 			help();
-			return (int)finish(&cli, CLI_OK);
+			return (int)finish(&cli, EXIT_CODE_OK);
 		}
 		if (strcmp(argv[i], "--version") == 0) {
 			puts("ecdaq " ECDAQ_VERSION);
-			return (int)finish(&cli, CLI_OK);
+			return (int)finish(&cli, EXIT_CODE_OK);
 		}
 		if (taken == 0) {
-			return (int)cli_fail(&cli, CLI_USAGE,
+			return (int)cli_fail(&cli, EXIT_CODE_USAGE,
 					     "%s: unknown option (see ecdaq --help)", argv[i]);
 		}
 		i += taken;
 	}
 	if (i == argc) {
-		return (int)cli_fail(&cli, CLI_USAGE, "wants a verb (see ecdaq --help)");
+		return (int)cli_fail(&cli, EXIT_CODE_USAGE, "wants a verb (see ecdaq --help)");
 	}
 	cli.verb = find_verb(argv[i]);
 	if (cli.verb == NULL) {
-		return (int)cli_fail(&cli, CLI_USAGE, "%s: no such verb (see ecdaq --help)",
+		return (int)cli_fail(&cli, EXIT_CODE_USAGE, "%s: no such verb (see ecdaq --help)",
 				     argv[i]);
 	}
 	return (int)finish(&cli, cli.verb->run(&cli, argc - i - 1, argv + i + 1));

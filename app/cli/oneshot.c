@@ -72,21 +72,22 @@ static void add(struct oneshot *one, uint16_t pos)
 	};
 }
 
-static enum cli_exit choose(struct oneshot *one, const char *word)
+static enum exit_code choose(struct oneshot *one, const char *word)
 {
 	const struct samples *samples = &one->follow.samples;
-	enum cli_exit result;
+	enum exit_code result;
 	uint16_t pos;
 
 	if (strcmp(word, "all") != 0) {
 		if (one->follow.page == NULL) {
-			return cli_fail(one->cli, CLI_NO_DAEMON, "status: cannot be read");
+			return cli_fail(one->cli, EXIT_CODE_NO_DAEMON, "status: cannot be read");
 		}
 		result = source_find_slave(one->cli, one->follow.page, word, &pos);
-		if (result == CLI_OK && pos >= samples->meta->slave_count) {
-			return cli_fail(one->cli, CLI_FAILED, "%s: has no process data yet", word);
+		if (result == EXIT_CODE_OK && pos >= samples->meta->slave_count) {
+			return cli_fail(one->cli, EXIT_CODE_FAILED, "%s: has no process data yet",
+					word);
 		}
-		if (result == CLI_OK) {
+		if (result == EXIT_CODE_OK) {
 			add(one, pos);
 		}
 		return result;
@@ -98,13 +99,14 @@ static enum cli_exit choose(struct oneshot *one, const char *word)
 		}
 	}
 	if (one->count == 0) {
-		return cli_fail(one->cli, CLI_FAILED, "all: no slave has an output " ENTRY_TIME);
+		return cli_fail(one->cli, EXIT_CODE_FAILED,
+				"all: no slave has an output " ENTRY_TIME);
 	}
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }
 
 /* One request: all of them are armed in the same cycle, or none is. */
-static enum cli_exit arm(struct oneshot *one)
+static enum exit_code arm(struct oneshot *one)
 {
 	struct admin_request request = {
 		.verb = ADMIN_ONESHOT,
@@ -113,9 +115,9 @@ static enum cli_exit arm(struct oneshot *one)
 		.dc_time_ns = one->has_at ? one->at_ns : one->in_ns,
 	};
 	struct admin_reply reply;
-	enum cli_exit result = admin_do(one->cli, &request, &reply);
+	enum exit_code result = admin_do(one->cli, &request, &reply);
 
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	one->at_ns = reply.dc_time_ns;
@@ -123,7 +125,7 @@ static enum cli_exit arm(struct oneshot *one)
 		one->shot[i].at_ns = reply.dc_time_ns;
 		one->shot[i].cycle = reply.cycle;
 	}
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }
 
 /* Does the sample just read hold the conversion? */
@@ -158,7 +160,7 @@ static unsigned open_shots(const struct oneshot *one)
 	return open;
 }
 
-static enum cli_exit wait_for_all(struct oneshot *one)
+static enum exit_code wait_for_all(struct oneshot *one)
 {
 	uint64_t lost;
 
@@ -171,7 +173,7 @@ static enum cli_exit wait_for_all(struct oneshot *one)
 			}
 			if (samples_header(&one->follow.samples).dc_time_ns >
 			    one->at_ns + WAIT_SLACK_NS) {
-				return CLI_OK;
+				return EXIT_CODE_OK;
 			}
 			break;
 		case FOLLOW_LOST:
@@ -179,13 +181,13 @@ static enum cli_exit wait_for_all(struct oneshot *one)
 			break;
 		case FOLLOW_NEW_BUS:
 		case FOLLOW_ENDED:
-			return cli_fail(one->cli, CLI_FAILED,
+			return cli_fail(one->cli, EXIT_CODE_FAILED,
 					"the bus was stopped before the conversion");
 		case FOLLOW_OVER:
-			return cli_fail(one->cli, CLI_FAILED, "not waited for");
+			return cli_fail(one->cli, EXIT_CODE_FAILED, "not waited for");
 		}
 	}
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }
 
 static void say_text(const struct oneshot *one, const struct shot *shot)
@@ -232,25 +234,25 @@ static void say_json(const struct oneshot *one)
 	json_end_line(&js);
 }
 
-static enum cli_exit run(struct oneshot *one, const char *word)
+static enum exit_code run(struct oneshot *one, const char *word)
 {
-	enum cli_exit result = choose(one, word);
+	enum exit_code result = choose(one, word);
 
-	for (unsigned i = 0; result == CLI_OK && one->is_wait && i < one->count; i++) {
+	for (unsigned i = 0; result == EXIT_CODE_OK && one->is_wait && i < one->count; i++) {
 		if (one->shot[i].sample_time < 0 || one->shot[i].adc < 0) {
-			return cli_fail(one->cli, CLI_FAILED,
+			return cli_fail(one->cli, EXIT_CODE_FAILED,
 					"--wait: %s has no inputs " ENTRY_ADC
 					" and " ENTRY_SAMPLE_TIME,
 					one->shot[i].name);
 		}
 	}
-	if (result == CLI_OK) {
+	if (result == EXIT_CODE_OK) {
 		result = arm(one);
 	}
-	if (result == CLI_OK && one->is_wait) {
+	if (result == EXIT_CODE_OK && one->is_wait) {
 		result = wait_for_all(one);
 	}
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	if (one->is_json) {
@@ -261,14 +263,14 @@ static enum cli_exit run(struct oneshot *one, const char *word)
 			say_text(one, &one->shot[i]);
 		}
 		if (one->is_wait && !one->shot[i].is_done) {
-			result = cli_fail(one->cli, CLI_FAILED, "%s: no conversion came",
+			result = cli_fail(one->cli, EXIT_CODE_FAILED, "%s: no conversion came",
 					  one->shot[i].name);
 		}
 	}
 	return result;
 }
 
-enum cli_exit verb_oneshot(struct cli *cli, int argc, char **argv)
+enum exit_code verb_oneshot(struct cli *cli, int argc, char **argv)
 {
 	struct oneshot one = { .cli = cli, .at_ns = INT64_MIN };
 	const struct args_option options[] = {
@@ -282,17 +284,17 @@ enum cli_exit verb_oneshot(struct cli *cli, int argc, char **argv)
 	struct args args = {
 		.options = options, .option_count = 4, .operands_min = 1, .operands_max = 1
 	};
-	enum cli_exit result;
+	enum exit_code result;
 
 	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
 		return result;
 	}
 	one.has_at = one.at_ns != INT64_MIN;
 	if (one.has_at == (one.in_ns > 0)) {
-		return cli_fail(cli, CLI_USAGE, "wants --at or --in");
+		return cli_fail(cli, EXIT_CODE_USAGE, "wants --at or --in");
 	}
 	result = follow_open(cli, &one.follow);
-	if (result == CLI_OK) {
+	if (result == EXIT_CODE_OK) {
 		result = run(&one, args.operands[0]);
 		follow_close(&one.follow);
 	}

@@ -47,17 +47,17 @@ static int parse_object(const char *text, uint16_t *ret_index, uint8_t *ret_subi
 }
 
 /* Ask, and say an abort in the words of ETG.1000.6. */
-static enum cli_exit ask(struct sdo *sdo)
+static enum exit_code ask(struct sdo *sdo)
 {
-	enum cli_exit result = admin_ask(sdo->cli, &sdo->request, &sdo->reply);
+	enum exit_code result = admin_ask(sdo->cli, &sdo->request, &sdo->reply);
 
-	if (result == CLI_OK && sdo->reply.result < 0 && sdo->reply.sdo_abort != 0) {
-		return cli_fail(sdo->cli, CLI_REFUSED,
+	if (result == EXIT_CODE_OK && sdo->reply.result < 0 && sdo->reply.sdo_abort != 0) {
+		return cli_fail(sdo->cli, EXIT_CODE_REFUSED,
 				"slave %u: 0x%04x:%02x: SDO abort 0x%08x: %s",
 				sdo->request.slave_pos, sdo->request.index, sdo->request.subindex,
 				sdo->reply.sdo_abort, sdo_abort_to_str(sdo->reply.sdo_abort));
 	}
-	return result == CLI_OK ? admin_judge(sdo->cli, &sdo->reply) : result;
+	return result == EXIT_CODE_OK ? admin_judge(sdo->cli, &sdo->reply) : result;
 }
 
 /* The type that data of @len bytes are shown in when none was given; -1: none fits. */
@@ -167,57 +167,58 @@ static void show(const struct sdo *sdo, int type)
 	json_end_line(&js);
 }
 
-static enum cli_exit find_type(const struct sdo *sdo, int *ret_type)
+static enum exit_code find_type(const struct sdo *sdo, int *ret_type)
 {
 	*ret_type = -1;
 	if (sdo->type == NULL) {
-		return CLI_OK;
+		return EXIT_CODE_OK;
 	}
 	if (strcasecmp(sdo->type, "STRING") == 0) {
 		*ret_type = SDO_TYPES;
-		return CLI_OK;
+		return EXIT_CODE_OK;
 	}
 	*ret_type = sdo_type_find(sdo->type);
 	return *ret_type >= 0
-		       ? CLI_OK
-		       : cli_fail(sdo->cli, CLI_USAGE,
+		       ? EXIT_CODE_OK
+		       : cli_fail(sdo->cli, EXIT_CODE_USAGE,
 				  "--type: %s: is none of " SDO_TYPE_WORDS "|STRING", sdo->type);
 }
 
-static enum cli_exit read_object(struct sdo *sdo, int type)
+static enum exit_code read_object(struct sdo *sdo, int type)
 {
-	enum cli_exit result;
+	enum exit_code result;
 
 	sdo->request.verb = ADMIN_SDO_READ;
 	result = ask(sdo);
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	if (type < 0) {
 		type = type_by_length(sdo->reply.data_len);
 	} else if (type != SDO_TYPES &&
 		   sdo_type_bytes((enum sdo_type)type) != sdo->reply.data_len) {
-		return cli_fail(sdo->cli, CLI_FAILED, "--type: the object has %u bytes, %s has %u",
-				sdo->reply.data_len, sdo_type_to_str((enum sdo_type)type),
+		return cli_fail(sdo->cli, EXIT_CODE_FAILED,
+				"--type: the object has %u bytes, %s has %u", sdo->reply.data_len,
+				sdo_type_to_str((enum sdo_type)type),
 				sdo_type_bytes((enum sdo_type)type));
 	}
 	show(sdo, type);
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }
 
-static enum cli_exit write_object(struct sdo *sdo, int type, const char *value)
+static enum exit_code write_object(struct sdo *sdo, int type, const char *value)
 {
 	uint8_t bytes[8];
 	uint64_t bits;
 	int r;
 
 	if (type < 0 || type == SDO_TYPES) {
-		return cli_fail(sdo->cli, CLI_USAGE,
+		return cli_fail(sdo->cli, EXIT_CODE_USAGE,
 				"--type: writing wants one of " SDO_TYPE_WORDS);
 	}
 	r = sdo_value_parse((enum sdo_type)type, value, &bits);
 	if (r < 0) {
-		return cli_fail(sdo->cli, CLI_USAGE, "%s: %s %s", value,
+		return cli_fail(sdo->cli, EXIT_CODE_USAGE, "%s: %s %s", value,
 				r == -ERANGE ? "does not fit into" : "is no",
 				sdo_type_to_str((enum sdo_type)type));
 	}
@@ -228,42 +229,43 @@ static enum cli_exit write_object(struct sdo *sdo, int type, const char *value)
 	return ask(sdo);
 }
 
-static enum cli_exit run(struct sdo *sdo, const struct args *args)
+static enum exit_code run(struct sdo *sdo, const struct args *args)
 {
 	const struct status_page *page;
 	int is_write = strcmp(args->operands[0], "write") == 0;
-	enum cli_exit result;
+	enum exit_code result;
 	int type;
 
 	if (!is_write && strcmp(args->operands[0], "read") != 0) {
-		return cli_fail(sdo->cli, CLI_USAGE, "%s: wants read or write", args->operands[0]);
+		return cli_fail(sdo->cli, EXIT_CODE_USAGE, "%s: wants read or write",
+				args->operands[0]);
 	}
 	if (args->operand_count != (is_write ? 4 : 3)) {
-		return cli_fail(sdo->cli, CLI_USAGE,
+		return cli_fail(sdo->cli, EXIT_CODE_USAGE,
 				is_write ? "write: wants SLAVE INDEX:SUB VALUE"
 					 : "read: wants SLAVE INDEX:SUB");
 	}
 	if (parse_object(args->operands[2], &sdo->request.index, &sdo->request.subindex) < 0) {
-		return cli_fail(sdo->cli, CLI_USAGE, "%s: wants INDEX:SUB such as 0x1018:1",
+		return cli_fail(sdo->cli, EXIT_CODE_USAGE, "%s: wants INDEX:SUB such as 0x1018:1",
 				args->operands[2]);
 	}
 	result = find_type(sdo, &type);
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	result = source_status(sdo->cli, &page);
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	result = source_find_slave(sdo->cli, page, args->operands[1], &sdo->request.slave_pos);
 	source_status_close(page);
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	return is_write ? write_object(sdo, type, args->operands[3]) : read_object(sdo, type);
 }
 
-enum cli_exit verb_sdo(struct cli *cli, int argc, char **argv)
+enum exit_code verb_sdo(struct cli *cli, int argc, char **argv)
 {
 	struct sdo sdo = { .cli = cli };
 	const struct args_option options[] = {
@@ -273,7 +275,7 @@ enum cli_exit verb_sdo(struct cli *cli, int argc, char **argv)
 	struct args args = {
 		.options = options, .option_count = 2, .operands_min = 3, .operands_max = 4
 	};
-	enum cli_exit result;
+	enum exit_code result;
 
 	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
 		return result;

@@ -17,13 +17,13 @@ struct security {
 	const char *name; /* of a participant, or a folder; NULL: none given */
 };
 
-static enum cli_exit exit_of(const struct security *s, int r, const char *error)
+static enum exit_code exit_of(const struct security *s, int r, const char *error)
 {
-	enum cli_exit code = r == -EACCES || r == -EPERM ? CLI_PERMISSION
-			     : r == -EINVAL              ? CLI_USAGE
-							 : CLI_FAILED;
+	enum exit_code code = r == -EACCES || r == -EPERM ? EXIT_CODE_PERMISSION
+			      : r == -EINVAL              ? EXIT_CODE_USAGE
+							  : EXIT_CODE_FAILED;
 
-	return r < 0 ? cli_fail(s->cli, code, "%s", error) : CLI_OK;
+	return r < 0 ? cli_fail(s->cli, code, "%s", error) : EXIT_CODE_OK;
 }
 
 static void tell_appliance(const struct security *s)
@@ -32,12 +32,12 @@ static void tell_appliance(const struct security *s)
 	       s->dir);
 }
 
-static enum cli_exit init(const struct security *s)
+static enum exit_code init(const struct security *s)
 {
 	char error[KEYSTORE_ERROR_BYTES];
-	enum cli_exit result = exit_of(s, keystore_init(s->dir, (unsigned)s->days, error), error);
+	enum exit_code result = exit_of(s, keystore_init(s->dir, (unsigned)s->days, error), error);
 
-	if (result == CLI_OK) {
+	if (result == EXIT_CODE_OK) {
 		tell_appliance(s);
 		printf("%s/ca: whoever has it lets people in: keep it away from both\n", s->dir);
 	}
@@ -45,53 +45,53 @@ static enum cli_exit init(const struct security *s)
 }
 
 /* To renew its keys or what they allow: with those of everybody else left as they are. */
-static enum cli_exit add_appliance(const struct security *s)
+static enum exit_code add_appliance(const struct security *s)
 {
 	char error[KEYSTORE_ERROR_BYTES];
-	enum cli_exit result = exit_of(
+	enum exit_code result = exit_of(
 		s, keystore_add(s->dir, "appliance", KEYSTORE_APPLIANCE, (unsigned)s->days, error),
 		error);
 
-	if (result == CLI_OK) {
+	if (result == EXIT_CODE_OK) {
 		tell_appliance(s);
 	}
 	return result;
 }
 
-static enum cli_exit add(const struct security *s, enum keystore_role role)
+static enum exit_code add(const struct security *s, enum keystore_role role)
 {
 	char error[KEYSTORE_ERROR_BYTES];
-	enum cli_exit result =
+	enum exit_code result =
 		exit_of(s, keystore_add(s->dir, s->name, role, (unsigned)s->days, error), error);
 
-	if (result == CLI_OK) {
+	if (result == EXIT_CODE_OK) {
 		printf("%s/%s: for this %s, and for nobody else\n", s->dir, s->name,
 		       role == KEYSTORE_COMMANDER ? "commander" : "subscriber");
 	}
 	return result;
 }
 
-static enum cli_exit add_subscriber(const struct security *s)
+static enum exit_code add_subscriber(const struct security *s)
 {
 	return add(s, KEYSTORE_SUBSCRIBER);
 }
 
-static enum cli_exit add_commander(const struct security *s)
+static enum exit_code add_commander(const struct security *s)
 {
 	return add(s, KEYSTORE_COMMANDER);
 }
 
-static enum cli_exit check(const struct security *s)
+static enum exit_code check(const struct security *s)
 {
 	struct keystore_identity identity;
 	char error[KEYSTORE_ERROR_BYTES];
 	char until[16];
 	struct tm parts;
 	time_t expires;
-	enum cli_exit result =
+	enum exit_code result =
 		exit_of(s, keystore_check(s->name, (int64_t)time(NULL), &identity, error), error);
 
-	if (result == CLI_OK) {
+	if (result == EXIT_CODE_OK) {
 		expires = (time_t)identity.expires_s;
 		gmtime_r(&expires, &parts);
 		strftime(until, sizeof(until), "%Y-%m-%d", &parts);
@@ -103,7 +103,7 @@ static enum cli_exit check(const struct security *s)
 static const struct subject {
 	const char *verb;
 	const char *operand; /* NULL: none */
-	enum cli_exit (*run)(const struct security *s);
+	enum exit_code (*run)(const struct security *s);
 } subjects[] = {
 	{ "init", NULL, init },
 	{ "add-appliance", NULL, add_appliance },
@@ -112,7 +112,7 @@ static const struct subject {
 	{ "check", "DIR", check },
 };
 
-static enum cli_exit run(struct security *s, const struct args *args)
+static enum exit_code run(struct security *s, const struct args *args)
 {
 	for (size_t i = 0; i < sizeof(subjects) / sizeof(subjects[0]); i++) {
 		const struct subject *subject = &subjects[i];
@@ -121,19 +121,19 @@ static enum cli_exit run(struct security *s, const struct args *args)
 			continue;
 		}
 		if ((args->operand_count == 2) != (subject->operand != NULL)) {
-			return cli_fail(s->cli, CLI_USAGE, "%s: wants %s", subject->verb,
+			return cli_fail(s->cli, EXIT_CODE_USAGE, "%s: wants %s", subject->verb,
 					subject->operand != NULL ? subject->operand : "no word");
 		}
 		s->name = args->operand_count == 2 ? args->operands[1] : NULL;
 		return subject->run(s);
 	}
-	return cli_fail(s->cli, CLI_USAGE,
+	return cli_fail(s->cli, EXIT_CODE_USAGE,
 			"%s: wants init, add-appliance, add-subscriber, "
 			"add-commander or check",
 			args->operands[0]);
 }
 
-enum cli_exit verb_security(struct cli *cli, int argc, char **argv)
+enum exit_code verb_security(struct cli *cli, int argc, char **argv)
 {
 	struct security security = { .cli = cli, .dir = "security", .days = DAYS };
 	const struct args_option options[] = {
@@ -144,13 +144,13 @@ enum cli_exit verb_security(struct cli *cli, int argc, char **argv)
 	struct args args = {
 		.options = options, .option_count = 2, .operands_min = 1, .operands_max = 2
 	};
-	enum cli_exit result;
+	enum exit_code result;
 
 	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
 		return result;
 	}
 	if (security.days > DAYS_MAX) {
-		return cli_fail(cli, CLI_USAGE, "--days: at most %d", DAYS_MAX);
+		return cli_fail(cli, EXIT_CODE_USAGE, "--days: at most %d", DAYS_MAX);
 	}
 	return run(&security, &args);
 }

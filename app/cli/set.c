@@ -38,7 +38,7 @@ static int is_scaled(const struct channel *ch)
 }
 
 /* "piccolo0.led=1" into @item. */
-static enum cli_exit take_word(struct setting *setting, const char *word, struct admin_item *item)
+static enum exit_code take_word(struct setting *setting, const char *word, struct admin_item *item)
 {
 	const struct cli *cli = setting->cli;
 	const char *equals = strchr(word, '=');
@@ -50,7 +50,7 @@ static enum cli_exit take_word(struct setting *setting, const char *word, struct
 
 	if (equals == NULL || equals == word || equals[1] == '\0' ||
 	    equals - word >= (ptrdiff_t)sizeof(name)) {
-		return cli_fail(cli, CLI_USAGE, "%s: wants OUTPUT=VALUE", word);
+		return cli_fail(cli, EXIT_CODE_USAGE, "%s: wants OUTPUT=VALUE", word);
 	}
 	snprintf(name, sizeof(name), "%.*s", (int)(equals - word), word);
 	index = image_channel_find(setting->samples.channels, setting->samples.meta->channel_count,
@@ -60,17 +60,17 @@ static enum cli_exit take_word(struct setting *setting, const char *word, struct
 	}
 	ch = &setting->samples.channels[index];
 	if (ch->direction != CHANNEL_OUTPUT) {
-		return cli_fail(cli, CLI_FAILED, "%s: is an input", name);
+		return cli_fail(cli, EXIT_CODE_FAILED, "%s: is an input", name);
 	}
 	r = is_scaled(ch) && !setting->is_raw ? parse_physical(ch, equals + 1, &item->raw)
 					      : image_raw_parse(ch, equals + 1, &item->raw);
 	if (r < 0) {
 		image_type_format(ch, type, sizeof(type));
-		return cli_fail(cli, CLI_FAILED, "%s: %s %s %s", name, equals + 1,
+		return cli_fail(cli, EXIT_CODE_FAILED, "%s: %s %s %s", name, equals + 1,
 				r == -ERANGE ? "does not fit into" : "is no value of type", type);
 	}
 	memcpy(item->channel, ch->name, sizeof(item->channel));
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }
 
 static void say_text(const struct setting *setting, uint64_t cycle)
@@ -103,24 +103,24 @@ static void say_json(const struct setting *setting, uint64_t cycle)
 	json_end_line(&js);
 }
 
-static enum cli_exit run(struct setting *setting, const struct args *args)
+static enum exit_code run(struct setting *setting, const struct args *args)
 {
 	struct admin_reply reply;
-	enum cli_exit result;
+	enum exit_code result;
 
 	if (args->operand_count > ADMIN_ITEMS) {
-		return cli_fail(setting->cli, CLI_USAGE,
+		return cli_fail(setting->cli, EXIT_CODE_USAGE,
 				"more than ADMIN_ITEMS = %d outputs at once", ADMIN_ITEMS);
 	}
 	for (int i = 0; i < args->operand_count; i++) {
 		result = take_word(setting, args->operands[i], &setting->request.item[i]);
-		if (result != CLI_OK) {
+		if (result != EXIT_CODE_OK) {
 			return result;
 		}
 	}
 	setting->request.count = (uint32_t)args->operand_count;
 	result = admin_do(setting->cli, &setting->request, &reply);
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	if (setting->is_json) {
@@ -128,10 +128,10 @@ static enum cli_exit run(struct setting *setting, const struct args *args)
 	} else {
 		say_text(setting, reply.cycle);
 	}
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }
 
-enum cli_exit verb_set(struct cli *cli, int argc, char **argv)
+enum exit_code verb_set(struct cli *cli, int argc, char **argv)
 {
 	struct setting setting = { .cli = cli, .request = { .verb = ADMIN_SET } };
 	const struct args_option options[] = {
@@ -141,13 +141,13 @@ enum cli_exit verb_set(struct cli *cli, int argc, char **argv)
 	struct args args = {
 		.options = options, .option_count = 2, .operands_min = 1, .operands_max = 4096
 	};
-	enum cli_exit result;
+	enum exit_code result;
 
 	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
 		return result;
 	}
 	result = samples_open(cli, &setting.samples);
-	if (result == CLI_OK) {
+	if (result == EXIT_CODE_OK) {
 		result = run(&setting, &args);
 		samples_close(&setting.samples);
 	}

@@ -74,7 +74,7 @@ static void show_more(const struct status_page *page, uint32_t index)
 	}
 }
 
-enum cli_exit verb_slaves(struct cli *cli, int argc, char **argv)
+enum exit_code verb_slaves(struct cli *cli, int argc, char **argv)
 {
 	int is_json = 0;
 	int is_verbose = 0;
@@ -85,14 +85,14 @@ enum cli_exit verb_slaves(struct cli *cli, int argc, char **argv)
 	};
 	struct args args = { .options = options, .option_count = 2 };
 	const struct status_page *page;
-	enum cli_exit result;
+	enum exit_code result;
 	struct json js;
 
 	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
 		return result;
 	}
 	result = source_status(cli, &page);
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	json_init(&js, stdout);
@@ -114,5 +114,5 @@ enum cli_exit verb_slaves(struct cli *cli, int argc, char **argv)
 		json_end_line(&js);
 	}
 	source_status_close(page);
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }

@@ -10,33 +10,33 @@
 #include "image/image.h"
 
 /* Say why @path cannot be read. */
-static enum cli_exit fail_open(const struct cli *cli, const char *what, const char *path, int err)
+static enum exit_code fail_open(const struct cli *cli, const char *what, const char *path, int err)
 {
 	switch (err) {
 	case ENOENT:
 	case ENOTDIR:
-		return cli_fail(cli, CLI_NO_DAEMON, "%s: %s is not there: is ecdaqd running?", what,
-				path);
+		return cli_fail(cli, EXIT_CODE_NO_DAEMON, "%s: %s is not there: is ecdaqd running?",
+				what, path);
 	case EACCES:
 	case EPERM:
-		return cli_fail(cli, CLI_PERMISSION,
+		return cli_fail(cli, EXIT_CODE_PERMISSION,
 				"%s: no permission to read %s: be root or in its group", what,
 				path);
 	case EPROTO:
-		return cli_fail(cli, CLI_FAILED,
+		return cli_fail(cli, EXIT_CODE_FAILED,
 				"%s: %s is of another version of ecdaq, or damaged", what, path);
 	default:
-		return cli_fail(cli, CLI_FAILED, "%s: %s: %s", what, path, strerror(err));
+		return cli_fail(cli, EXIT_CODE_FAILED, "%s: %s: %s", what, path, strerror(err));
 	}
 }
 
-enum cli_exit source_status(struct cli *cli, const struct status_page **ret_page)
+enum exit_code source_status(struct cli *cli, const struct status_page **ret_page)
 {
 	const struct status_page *page;
 	char path[CONFIG_PATH_BYTES];
-	enum cli_exit result = cli_path(cli, CONFIG_RUN_STATUS, path);
+	enum exit_code result = cli_path(cli, CONFIG_RUN_STATUS, path);
 
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	page = status_open(path, STATUS_MAGIC, sizeof(*page));
@@ -44,14 +44,14 @@ enum cli_exit source_status(struct cli *cli, const struct status_page **ret_page
 		return fail_open(cli, "status", path, errno);
 	}
 	*ret_page = page;
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }
 
 const struct record_status *source_record(struct cli *cli)
 {
 	char path[CONFIG_PATH_BYTES];
 
-	if (cli_path(cli, CONFIG_RUN_RECORD_STATUS, path) != CLI_OK) {
+	if (cli_path(cli, CONFIG_RUN_RECORD_STATUS, path) != EXIT_CODE_OK) {
 		return NULL;
 	}
 	return status_open(path, RECORD_STATUS_MAGIC, sizeof(struct record_status));
@@ -87,7 +87,7 @@ const struct dds_status *source_dds(struct cli *cli)
 	const struct dds_status *dds;
 	char path[CONFIG_PATH_BYTES];
 
-	if (cli_path(cli, CONFIG_RUN_DDS_STATUS, path) != CLI_OK) {
+	if (cli_path(cli, CONFIG_RUN_DDS_STATUS, path) != EXIT_CODE_OK) {
 		return NULL;
 	}
 	dds = status_open(path, DDS_STATUS_MAGIC, sizeof(*dds));
@@ -141,7 +141,7 @@ int samples_try(struct cli *cli, struct samples *ret_samples)
 	size_t bytes;
 	int r;
 
-	if (cli_path(cli, CONFIG_RUN_SAMPLES, path) != CLI_OK) {
+	if (cli_path(cli, CONFIG_RUN_SAMPLES, path) != EXIT_CODE_OK) {
 		return -ENAMETOOLONG;
 	}
 	r = ring_reader_open(path, &samples.reader);
@@ -161,17 +161,17 @@ int samples_try(struct cli *cli, struct samples *ret_samples)
 	return 0;
 }
 
-enum cli_exit samples_open(struct cli *cli, struct samples *ret_samples)
+enum exit_code samples_open(struct cli *cli, struct samples *ret_samples)
 {
 	char path[CONFIG_PATH_BYTES];
-	enum cli_exit result = cli_path(cli, CONFIG_RUN_SAMPLES, path);
+	enum exit_code result = cli_path(cli, CONFIG_RUN_SAMPLES, path);
 	int r;
 
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	r = samples_try(cli, ret_samples);
-	return r < 0 ? fail_open(cli, "samples", path, -r) : CLI_OK;
+	return r < 0 ? fail_open(cli, "samples", path, -r) : EXIT_CODE_OK;
 }
 
 void samples_close(struct samples *samples)
@@ -240,8 +240,8 @@ struct slave_info source_slave(const struct status_page *page, uint32_t index)
 	return info;
 }
 
-enum cli_exit source_find_slave(const struct cli *cli, const struct status_page *page,
-				const char *text, uint16_t *ret_pos)
+enum exit_code source_find_slave(const struct cli *cli, const struct status_page *page,
+				 const char *text, uint16_t *ret_pos)
 {
 	uint32_t count = source_slave_count(page);
 	unsigned long pos;
@@ -250,19 +250,19 @@ enum cli_exit source_find_slave(const struct cli *cli, const struct status_page 
 	for (uint32_t i = 0; i < count; i++) {
 		if (strcmp(source_slave(page, i).name, text) == 0) {
 			*ret_pos = (uint16_t)i;
-			return CLI_OK;
+			return EXIT_CODE_OK;
 		}
 	}
 	errno = 0;
 	pos = strtoul(text, &end, 10);
 	if (text[0] < '0' || text[0] > '9' || *end != '\0' || errno != 0) {
-		return cli_fail(cli, CLI_FAILED, "%s: no slave of this name (see ecdaq slaves)",
-				text);
+		return cli_fail(cli, EXIT_CODE_FAILED,
+				"%s: no slave of this name (see ecdaq slaves)", text);
 	}
 	if (pos >= count) {
-		return cli_fail(cli, CLI_FAILED, "%s: no slave at this position, there are %u",
-				text, count);
+		return cli_fail(cli, EXIT_CODE_FAILED,
+				"%s: no slave at this position, there are %u", text, count);
 	}
 	*ret_pos = (uint16_t)pos;
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }

@@ -15,8 +15,8 @@
 #include "base/status.h"
 #include "cli/cli.h"
 
-/** Map ecdaqd's status page. CLI_OK, or the code of a failure that was said. */
-enum cli_exit source_status(struct cli *cli, const struct status_page **ret_page);
+/** Map ecdaqd's status page. EXIT_CODE_OK, or the code of a failure that was said. */
+enum exit_code source_status(struct cli *cli, const struct status_page **ret_page);
 /** The recorder's page, or NULL: it may not have been started. Nothing is said. */
 const struct record_status *source_record(struct cli *cli);
 /** The same of ecdaq-dds. */
@@ -37,8 +37,8 @@ struct samples {
 	uint8_t *payload; /* one slot: a sample_header, then the image */
 };
 
-/** CLI_OK, or the code of a failure that was said. Release with samples_close(). */
-enum cli_exit samples_open(struct cli *cli, struct samples *ret_samples);
+/** EXIT_CODE_OK, or the code of a failure that was said. Release with samples_close(). */
+enum exit_code samples_open(struct cli *cli, struct samples *ret_samples);
 /** The same without a word; 0 or -errno. */
 int samples_try(struct cli *cli, struct samples *ret_samples);
 void samples_close(struct samples *samples);
@@ -60,7 +60,7 @@ struct slave_info source_slave(const struct status_page *page, uint32_t index);
 uint32_t source_slave_count(const struct status_page *page);
 
 /** The position that @text names, "piccolo0" or "1", or the code of a failure that was said. */
-enum cli_exit source_find_slave(const struct cli *cli, const struct status_page *page,
-				const char *text, uint16_t *ret_pos);
+enum exit_code source_find_slave(const struct cli *cli, const struct status_page *page,
+				 const char *text, uint16_t *ret_pos);
 
 #endif

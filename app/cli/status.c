@@ -4,7 +4,7 @@
 #include "cli/report.h"
 #include "cli/source.h"
 
-enum cli_exit verb_status(struct cli *cli, int argc, char **argv)
+enum exit_code verb_status(struct cli *cli, int argc, char **argv)
 {
 	int is_json = 0;
 	int is_summary = 0;
@@ -19,13 +19,13 @@ enum cli_exit verb_status(struct cli *cli, int argc, char **argv)
 	const struct record_status *record;
 	struct report report;
 	struct json js;
-	enum cli_exit result;
+	enum exit_code result;
 
 	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
 		return result;
 	}
 	result = source_status(cli, &page);
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	record = source_record(cli);
@@ -43,5 +43,5 @@ enum cli_exit verb_status(struct cli *cli, int argc, char **argv)
 	report_release(&report);
 	source_record_close(record);
 	source_status_close(page);
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }

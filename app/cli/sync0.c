@@ -41,7 +41,8 @@ static void read_results(struct cli *cli, struct view *view)
 	uint64_t oldest;
 	uint64_t lost;
 
-	if (cli_path(cli, CONFIG_RUN_SYNC0, path) != CLI_OK || ring_reader_open(path, &ring) < 0) {
+	if (cli_path(cli, CONFIG_RUN_SYNC0, path) != EXIT_CODE_OK ||
+	    ring_reader_open(path, &ring) < 0) {
 		return;
 	}
 	if (strcmp(ring_kind(ring), "sync0") == 0 && ring_payload_bytes(ring) == sizeof(r)) {
@@ -255,7 +256,7 @@ static void write_bars(const struct view *view)
 }
 
 /* ecdaq-sync0 beside this program: it alone may see the lines. Returns only when that failed. */
-static enum cli_exit run_calibration(const struct cli *cli)
+static enum exit_code run_calibration(const struct cli *cli)
 {
 	char program[PROGRAM_PATH_BYTES];
 	char *words[PROGRAM_ARGUMENTS];
@@ -264,7 +265,7 @@ static enum cli_exit run_calibration(const struct cli *cli)
 	char *slash;
 
 	if (len <= 0) {
-		return cli_fail(cli, CLI_FAILED, "/proc/self/exe: %s", strerror(errno));
+		return cli_fail(cli, EXIT_CODE_FAILED, "/proc/self/exe: %s", strerror(errno));
 	}
 	program[len] = '\0';
 	slash = strrchr(program, '/');
@@ -277,15 +278,15 @@ static enum cli_exit run_calibration(const struct cli *cli)
 	}
 	words[n] = NULL;
 	execv(program, words);
-	return cli_fail(cli, CLI_FAILED, "%s: %s", program, strerror(errno));
+	return cli_fail(cli, EXIT_CODE_FAILED, "%s: %s", program, strerror(errno));
 }
 
-static enum cli_exit show(struct cli *cli, int is_json, int is_histogram)
+static enum exit_code show(struct cli *cli, int is_json, int is_histogram)
 {
 	struct view view = { .page = NULL };
-	enum cli_exit result = sync0_source_open(cli, &view.page);
+	enum exit_code result = sync0_source_open(cli, &view.page);
 
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	view.is_running = source_is_alive(view.page->pid);
@@ -299,10 +300,10 @@ static enum cli_exit show(struct cli *cli, int is_json, int is_histogram)
 		write_table(&view);
 	}
 	sync0_source_close(view.page);
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }
 
-enum cli_exit verb_sync0(struct cli *cli, int argc, char **argv)
+enum exit_code verb_sync0(struct cli *cli, int argc, char **argv)
 {
 	int is_json = 0;
 	int is_histogram = 0;
@@ -312,22 +313,22 @@ enum cli_exit verb_sync0(struct cli *cli, int argc, char **argv)
 		  "the periods of each line as bars" },
 	};
 	struct args args = { .options = options, .option_count = 2, .operands_max = 1 };
-	enum cli_exit result;
+	enum exit_code result;
 
 	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
 		return result;
 	}
 	if (is_json && is_histogram) {
-		return cli_fail(cli, CLI_USAGE, "--json and --histogram: one of them");
+		return cli_fail(cli, EXIT_CODE_USAGE, "--json and --histogram: one of them");
 	}
 	if (args.operand_count == 0) {
 		return show(cli, is_json, is_histogram);
 	}
 	if (strcmp(args.operands[0], "calibrate") != 0) {
-		return cli_fail(cli, CLI_USAGE, "%s: is not calibrate", args.operands[0]);
+		return cli_fail(cli, EXIT_CODE_USAGE, "%s: is not calibrate", args.operands[0]);
 	}
 	if (is_json || is_histogram) {
-		return cli_fail(cli, CLI_USAGE, "calibrate has no --json and no --histogram");
+		return cli_fail(cli, EXIT_CODE_USAGE, "calibrate has no --json and no --histogram");
 	}
 	return run_calibration(cli);
 }

@@ -31,21 +31,21 @@ static const struct sync0_status *open_page(const char *path)
 	return page;
 }
 
-enum cli_exit sync0_source_open(struct cli *cli, const struct sync0_status **ret_page)
+enum exit_code sync0_source_open(struct cli *cli, const struct sync0_status **ret_page)
 {
 	char path[CONFIG_PATH_BYTES];
-	enum cli_exit result = cli_path(cli, CONFIG_RUN_SYNC0_STATUS, path);
+	enum exit_code result = cli_path(cli, CONFIG_RUN_SYNC0_STATUS, path);
 
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	*ret_page = open_page(path);
 	if (*ret_page != NULL) {
-		return CLI_OK;
+		return EXIT_CODE_OK;
 	}
 	if (errno == ENOENT || errno == ENOTDIR) {
-		return cli_fail(cli, CLI_NO_DAEMON, "%s is not there: is ecdaq-sync0 running?",
-				path);
+		return cli_fail(cli, EXIT_CODE_NO_DAEMON,
+				"%s is not there: is ecdaq-sync0 running?", path);
 	}
 	return cli_fail(cli, cli_exit_of(errno), "%s: %s", path,
 			errno == EPROTO ? "is of another version of ecdaq, or damaged"
@@ -56,7 +56,8 @@ const struct sync0_status *sync0_source_try(struct cli *cli)
 {
 	char path[CONFIG_PATH_BYTES];
 
-	return cli_path(cli, CONFIG_RUN_SYNC0_STATUS, path) == CLI_OK ? open_page(path) : NULL;
+	return cli_path(cli, CONFIG_RUN_SYNC0_STATUS, path) == EXIT_CODE_OK ? open_page(path)
+									    : NULL;
 }
 
 void sync0_source_close(const struct sync0_status *page)

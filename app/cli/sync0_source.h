@@ -6,8 +6,8 @@
 #include "base/sync0.h"
 #include "cli/cli.h"
 
-/** CLI_OK, or the code of a failure that was said. */
-enum cli_exit sync0_source_open(struct cli *cli, const struct sync0_status **ret_page);
+/** EXIT_CODE_OK, or the code of a failure that was said. */
+enum exit_code sync0_source_open(struct cli *cli, const struct sync0_status **ret_page);
 /** The same without a word: NULL if there is none. */
 const struct sync0_status *sync0_source_try(struct cli *cli);
 void sync0_source_close(const struct sync0_status *page);

@@ -33,7 +33,7 @@ static int is_replaced(struct top *top, const struct status_page *page)
 	char path[CONFIG_PATH_BYTES];
 	int is_other;
 
-	if (cli_path(top->cli, CONFIG_RUN_STATUS, path) != CLI_OK) {
+	if (cli_path(top->cli, CONFIG_RUN_STATUS, path) != EXIT_CODE_OK) {
 		return 0;
 	}
 	other = status_open(path, STATUS_MAGIC, sizeof(*other));
@@ -104,7 +104,7 @@ static void show(struct top *top, const struct report *report)
 	top->looks++;
 }
 
-static enum cli_exit follow(struct top *top, const struct status_page *page)
+static enum exit_code follow(struct top *top, const struct status_page *page)
 {
 	const struct record_status *record;
 	struct report report;
@@ -130,7 +130,7 @@ static enum cli_exit follow(struct top *top, const struct status_page *page)
 		report_release(&report);
 		source_record_close(record);
 	}
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }
 
 /* Is there a page that cannot change any more, or none? */
@@ -140,7 +140,7 @@ static int is_worth_waiting(struct top *top)
 	char path[CONFIG_PATH_BYTES];
 	int is_alive;
 
-	if (cli_path(top->cli, CONFIG_RUN_STATUS, path) != CLI_OK) {
+	if (cli_path(top->cli, CONFIG_RUN_STATUS, path) != EXIT_CODE_OK) {
 		return 0;
 	}
 	page = status_open(path, STATUS_MAGIC, sizeof(*page));
@@ -170,7 +170,7 @@ static void wait_for_page(struct top *top)
 	}
 }
 
-enum cli_exit verb_top(struct cli *cli, int argc, char **argv)
+enum exit_code verb_top(struct cli *cli, int argc, char **argv)
 {
 	struct top top = {
 		.cli = cli,
@@ -190,7 +190,7 @@ enum cli_exit verb_top(struct cli *cli, int argc, char **argv)
 	};
 	struct args args = { .options = options, .option_count = 4 };
 	const struct status_page *page;
-	enum cli_exit result;
+	enum exit_code result;
 
 	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
 		return result;
@@ -199,10 +199,10 @@ enum cli_exit verb_top(struct cli *cli, int argc, char **argv)
 	screen_catch_signals();
 	wait_for_page(&top);
 	if (screen_is_over()) {
-		return CLI_OK;
+		return EXIT_CODE_OK;
 	}
 	result = source_status(cli, &page);
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	if (top.is_live) {

@@ -140,7 +140,7 @@ static void draw_if_due(struct watch *watch)
 	}
 }
 
-static enum cli_exit begin_plot(struct watch *watch)
+static enum exit_code begin_plot(struct watch *watch)
 {
 	struct plot_spec spec = {
 		.panels = watch->choice.count,
@@ -159,7 +159,7 @@ static enum cli_exit begin_plot(struct watch *watch)
 	plot_destroy(watch->plot);
 	watch->plot = plot_create(&spec);
 	if (watch->plot == NULL) {
-		return cli_fail(watch->cli, CLI_FAILED, "out of memory");
+		return cli_fail(watch->cli, EXIT_CODE_FAILED, "out of memory");
 	}
 	/* A live picture starts full: the ring knows what was. */
 	if (watch->is_live) {
@@ -169,7 +169,7 @@ static enum cli_exit begin_plot(struct watch *watch)
 		ring_seek(reader, newest - oldest < back ? oldest : newest - back);
 		watch->follow.idle_ns = 20 * NS_PER_MS;
 	}
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }
 
 /* --- both --- */
@@ -183,14 +183,14 @@ static struct lines lines_of(const struct watch *watch)
 	};
 }
 
-static enum cli_exit look_up(struct watch *watch)
+static enum exit_code look_up(struct watch *watch)
 {
 	const struct sample_meta *meta = watch->follow.samples.meta;
-	enum cli_exit result =
+	enum exit_code result =
 		choose_channels(watch->cli, &watch->follow.samples, watch->args.operands,
 				watch->args.operand_count, &watch->choice);
 
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	if (watch->rate_hz > 0 && meta->period_ns > 0) {
@@ -200,7 +200,7 @@ static enum cli_exit look_up(struct watch *watch)
 	}
 	watch->next_cycle = 0;
 	watch->needs_head = !watch->is_plot && !watch->is_json;
-	return watch->is_plot ? begin_plot(watch) : CLI_OK;
+	return watch->is_plot ? begin_plot(watch) : EXIT_CODE_OK;
 }
 
 static void take(struct watch *watch)
@@ -231,24 +231,24 @@ static void take(struct watch *watch)
 }
 
 /* What the end of ecdaqd means: bad if it came before all that was asked for. */
-static enum cli_exit ended(const struct watch *watch)
+static enum exit_code ended(const struct watch *watch)
 {
 	if (watch->count > 0) {
-		return cli_fail(watch->cli, CLI_NO_DAEMON,
+		return cli_fail(watch->cli, EXIT_CODE_NO_DAEMON,
 				"ecdaqd has ended after %" PRIu64 " of %" PRIu64 " samples",
 				watch->shown, watch->count);
 	}
 	if (watch->shown == 0) {
-		return cli_fail(watch->cli, CLI_NO_DAEMON,
+		return cli_fail(watch->cli, EXIT_CODE_NO_DAEMON,
 				"ecdaqd has ended: nothing comes any more");
 	}
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }
 
-static enum cli_exit run(struct watch *watch)
+static enum exit_code run(struct watch *watch)
 {
 	uint64_t lost = 0;
-	enum cli_exit result;
+	enum exit_code result;
 
 	while (watch->count == 0 || watch->shown < watch->count) {
 		switch (follow_next(&watch->follow, &lost)) {
@@ -263,33 +263,33 @@ static enum cli_exit run(struct watch *watch)
 			fflush(stdout);
 			draw_if_due(watch);
 			if (ferror(stdout)) {
-				return CLI_OK; /* main() says why */
+				return EXIT_CODE_OK; /* main() says why */
 			}
 			break;
 		case FOLLOW_NEW_BUS:
 			result = look_up(watch);
-			if (result != CLI_OK) {
+			if (result != EXIT_CODE_OK) {
 				return result;
 			}
 			break;
 		case FOLLOW_ENDED:
 			return ended(watch);
 		case FOLLOW_OVER:
-			return CLI_OK;
+			return EXIT_CODE_OK;
 		}
 	}
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }
 
-static enum cli_exit begin(struct watch *watch)
+static enum exit_code begin(struct watch *watch)
 {
-	enum cli_exit result = follow_open(watch->cli, &watch->follow);
+	enum exit_code result = follow_open(watch->cli, &watch->follow);
 
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	result = look_up(watch);
-	if (result == CLI_OK) {
+	if (result == EXIT_CODE_OK) {
 		screen_catch_signals();
 		if (watch->is_live) {
 			screen_begin();
@@ -306,7 +306,7 @@ static enum cli_exit begin(struct watch *watch)
 	return result;
 }
 
-enum cli_exit verb_watch(struct cli *cli, int argc, char **argv)
+enum exit_code verb_watch(struct cli *cli, int argc, char **argv)
 {
 	struct watch watch = { .cli = cli, .every = 1, .window_ns = 5 * NS_PER_S };
 	const struct args_option options[] = {
@@ -321,7 +321,7 @@ enum cli_exit verb_watch(struct cli *cli, int argc, char **argv)
 		  "raw counts, not in the channel's unit" },
 		{ "json", 0, ARGS_FLAG, &watch.is_json, NULL, "a JSON object a sample" },
 	};
-	enum cli_exit result;
+	enum exit_code result;
 
 	watch.args = (struct args){
 		.options = options,
@@ -333,10 +333,10 @@ enum cli_exit verb_watch(struct cli *cli, int argc, char **argv)
 		return result;
 	}
 	if (watch.is_plot && watch.is_json) {
-		return cli_fail(cli, CLI_USAGE, "--plot and --json: one or the other");
+		return cli_fail(cli, EXIT_CODE_USAGE, "--plot and --json: one or the other");
 	}
 	if (watch.rate_hz > 0 && watch.every > 1) {
-		return cli_fail(cli, CLI_USAGE, "--rate and --every: one or the other");
+		return cli_fail(cli, EXIT_CODE_USAGE, "--rate and --every: one or the other");
 	}
 	watch.is_live = watch.is_plot && screen_is_terminal();
 	return begin(&watch);

@@ -19,7 +19,9 @@ ECDAQ = BIN / "ecdaq"
 FAKE = BUILD / "tests" / "cli" / "test_fake_daemon"
 NOBODY = 65534
 
-OK, FAILED, USAGE, NO_DAEMON, REFUSED, PERMISSION = range(6)
+# app/core/program/exit_code.h
+OK, FAILED, USAGE, CONFIG, PERMISSION, BUSY = 0, 1, 2, 3, 4, 6
+NO_DAEMON, REFUSED, CHECK_FAILED, DISABLED = 16, 17, 18, 19
 
 Result = subprocess.CompletedProcess[str]
 

@@ -14,10 +14,20 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ecdaq import BIN, FAILED, NO_DAEMON, USAGE, ecdaq, environment, fails, works
+from ecdaq import (
+    BIN,
+    CHECK_FAILED,
+    CONFIG,
+    FAILED,
+    NO_DAEMON,
+    USAGE,
+    ecdaq,
+    environment,
+    fails,
+    works,
+)
 
 CHECK = BIN / "ecdaq-sync0"
-CONFIG, PERMISSION, BAD, BUSY = 3, 4, 5, 6
 PERIOD = 1_000_000
 START = 7_000_000_000_000
 
@@ -82,7 +92,7 @@ def test_a_calibrated_skew_is_found_and_fails(tmp_path: Path) -> None:
     assert found and abs(int(found[1]) - 200) <= int(found[2]) < 20
     late = write(tmp_path / "late", edges(12000, skew=15000))
     got = check("--replay", late, "--json", "--set", saved)
-    assert got.returncode == BAD
+    assert got.returncode == CHECK_FAILED
     (skewed,) = [m for m in windows(got.stdout) if m["slave"] == 2]
     assert skewed["skew"] == "FAIL"
     assert abs(int(str(skewed["skew_ns"])) - 15000) <= int(str(skewed["skew_error_ns"]))
@@ -93,7 +103,7 @@ def test_a_missing_pulse_is_named_by_slave_and_cycle(tmp_path: Path) -> None:
     gap = (2, START + 5000 * PERIOD)
     kept = [e for e in edges(12000) if not (e[0] == 2 and abs(e[1] - gap[1]) < PERIOD / 2)]
     got = check("--replay", write(tmp_path / "e", kept))
-    assert got.returncode == BAD
+    assert got.returncode == CHECK_FAILED
     assert "! slave 2, line 2: cycle 5000: SYNC0 missing, 1 in a row" in got.stdout
 
 
@@ -111,7 +121,7 @@ def test_recorded_shots_are_judged_by_their_commands(tmp_path: Path) -> None:
     file = tmp_path / "dump"
     file.write_text("\n".join(shots(12000, due=[2000, 5000, 11500], came=[2000, 11500])) + "\n")
     got = check("--replay", str(file), "--json")
-    assert got.returncode == BAD, got.stderr
+    assert got.returncode == CHECK_FAILED, got.stderr
     said = [json.loads(line) for line in got.stdout.splitlines()]
     told = [(m["event"], m["value"] - 845 * 10**15) for m in said if "event" in m]
     lost = ("sync0_shot_lost", 5000 * PERIOD)

@@ -17,7 +17,7 @@ def values(unit: str, key: str) -> list[str]:
 
 
 def exit_code(name: str) -> str:
-    text = (TOP / "app/master/daemon/exit_code.h").read_text()
+    text = (TOP / "app/core/program/exit_code.h").read_text()
     return re.findall(rf"EXIT_CODE_{name} = (\d+),", text)[0]
 
 

@@ -24,12 +24,13 @@ WING_TABLE: dict[str, set[str]] = {
     "examples": {"core"},
 }
 # What each module of a wing may include of the other modules, and always its own.
-READERS = {"base", "image", "config"}
+READERS = {"base", "image", "config", "program"}
 MODULES: dict[str, dict[str, set[str]]] = {
     "core": {
         "base": set(),
         "wire": {"base"},
         "config": {"base"},
+        "program": {"base", "config"},
         "image": {"base", "wire"},
     },
     "master": {
@@ -38,7 +39,8 @@ MODULES: dict[str, dict[str, set[str]]] = {
         "bus": {"base", "wire", "config", "image", "link"},
         "cycle": {"base", "wire", "config", "image", "link", "bus", "control"},
         "admin": {"base", "wire", "config", "image", "cycle"},
-        "daemon": {"base", "wire", "config", "image", "link", "bus", "control", "cycle", "admin"},
+        "daemon": {"base", "wire", "config", "image", "link", "bus", "control", "cycle", "admin"}
+        | {"program"},
     },
     "services": {
         "record": READERS,

@@ -68,21 +68,21 @@ struct doctor {
 };
 
 /* An ecdaqd that runs; one that has ended is none. One of here has no part in another machine. */
-static enum cli_exit find_daemon(struct doctor *d)
+static enum exit_code find_daemon(struct doctor *d)
 {
 	struct patient *p = &d->patient;
 	int is_copy = d->root[0] != '\0';
 	const struct status_page *page;
 	char path[CONFIG_PATH_BYTES];
-	enum cli_exit result;
+	enum exit_code result;
 
 	if (is_copy && d->cli->run_dir == NULL) {
 		p->pid = target_find_daemon(&p->sight);
 		p->page_err = p->pid == 0 ? 0 : -ENOENT;
-		return CLI_OK;
+		return EXIT_CODE_OK;
 	}
 	result = cli_path(d->cli, CONFIG_RUN_STATUS, path);
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	page = status_open(path, STATUS_MAGIC, sizeof(*page));
@@ -95,25 +95,25 @@ static enum cli_exit find_daemon(struct doctor *d)
 	} else if (page != NULL) {
 		source_status_close(page);
 	}
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }
 
 /* What --config names, else that of ecdaqd itself. */
-static enum cli_exit load_config(struct doctor *d)
+static enum exit_code load_config(struct doctor *d)
 {
 	const char *path = d->cli->config;
 	char error[512];
 
 	if (path == NULL) {
 		target_load(&d->patient.sight, d->patient.pid, &d->cfg, d->config_name);
-		return CLI_OK;
+		return EXIT_CODE_OK;
 	}
 	config_defaults(&d->cfg);
 	if (config_load(path, &d->cfg, error, sizeof(error)) < 0) {
-		return cli_fail(d->cli, CLI_USAGE, "--config: %s", error);
+		return cli_fail(d->cli, EXIT_CODE_USAGE, "--config: %s", error);
 	}
 	snprintf(d->config_name, sizeof(d->config_name), "%s", path);
-	return CLI_OK;
+	return EXIT_CODE_OK;
 }
 
 static void keep_cycle(void *ctx, const struct thread *thread)
@@ -248,7 +248,7 @@ static void say_json(const struct doctor *d)
 }
 
 /* The names of the checks that make the exit code, in one line. */
-static enum cli_exit verdict(const struct doctor *d)
+static enum exit_code verdict(const struct doctor *d)
 {
 	enum finding_level least = d->is_strict ? FINDING_WARN : FINDING_FAIL;
 	char names[512] = "";
@@ -264,25 +264,25 @@ static enum cli_exit verdict(const struct doctor *d)
 		}
 	}
 	if (count == 0) {
-		return CLI_OK;
+		return EXIT_CODE_OK;
 	}
-	return cli_fail(d->cli, CLI_FAILED, "%u check%s to mend:%s", count, count == 1 ? "" : "s",
-			names);
+	return cli_fail(d->cli, EXIT_CODE_FAILED, "%u check%s to mend:%s", count,
+			count == 1 ? "" : "s", names);
 }
 
-static enum cli_exit run(struct doctor *d)
+static enum exit_code run(struct doctor *d)
 {
-	enum cli_exit result;
+	enum exit_code result;
 
 	d->patient.sight.root = d->root;
 	if (d->root[0] != '\0' && access(d->root, X_OK) < 0) {
-		return cli_fail(d->cli, CLI_USAGE, "--root: %s cannot be entered", d->root);
+		return cli_fail(d->cli, EXIT_CODE_USAGE, "--root: %s cannot be entered", d->root);
 	}
 	result = find_daemon(d);
-	if (result == CLI_OK) {
+	if (result == EXIT_CODE_OK) {
 		result = load_config(d);
 	}
-	if (result != CLI_OK) {
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	prepare(d);
@@ -298,13 +298,13 @@ static enum cli_exit run(struct doctor *d)
 	return verdict(d);
 }
 
-enum cli_exit verb_doctor(struct cli *cli, int argc, char **argv)
+enum exit_code verb_doctor(struct cli *cli, int argc, char **argv)
 {
 	struct doctor *d = calloc(1, sizeof(*d));
-	enum cli_exit result;
+	enum exit_code result;
 
 	if (d == NULL) {
-		return cli_fail(cli, CLI_FAILED, "out of memory");
+		return cli_fail(cli, EXIT_CODE_FAILED, "out of memory");
 	}
 	*d = (struct doctor){ .cli = cli, .root = "" };
 

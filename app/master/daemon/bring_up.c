@@ -106,7 +106,7 @@ int session_step(struct session *s, int r, enum exit_code late, const char *erro
 		s->spec.hooks.alive(s->spec.hooks.ctx);
 	}
 	if (r < 0) {
-		return failure_set(failure, exit_code_of_bus(r, late), r, "%s", error);
+		return failure_set(failure, failure_code_of_bus(r, late), r, "%s", error);
 	}
 	return session_cancelled(s, failure);
 }
@@ -214,7 +214,7 @@ static int make_cycle(struct session *s, struct failure *failure)
 	int r = exchange_create(spec.plan, s->line, &s->exchange);
 
 	if (r < 0) {
-		return failure_set(failure, exit_code_of_bus(r, EXIT_CODE_MAPPING), r,
+		return failure_set(failure, failure_code_of_bus(r, EXIT_CODE_MAPPING), r,
 				   "exchange: %s", strerror(-r));
 	}
 	spec.exchange = s->exchange;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* Why something did not work: one line "what: why", and how ecdaqd ends for it. Context: any. */
+/* Why something failed: one line "what: why", and the exit code of ecdaqd for it. Context: any. */
 #ifndef DAEMON_FAILURE_H
 #define DAEMON_FAILURE_H
 
-#include "daemon/exit_code.h"
+#include "program/exit_code.h"
 
 enum { FAILURE_TEXT_BYTES = 320 };
 
@@ -15,5 +15,12 @@ struct failure {
 /** Fill @failure and return @result, which is a negative errno. */
 int failure_set(struct failure *failure, enum exit_code code, int result, const char *format, ...)
 	__attribute__((format(printf, 4, 5)));
+
+/** 1 if the same attempt may succeed later (no slave yet), so that --wait tries again. */
+int failure_is_transient(enum exit_code code);
+
+/** The code for a call of bus/bus.h that failed with @r; @otherwise for a state or lock not
+ * reached. */
+enum exit_code failure_code_of_bus(int r, enum exit_code otherwise);
 
 #endif

@@ -43,7 +43,7 @@ static enum exit_code code_of(int err)
 	case ENAMETOOLONG:
 		return EXIT_CODE_CONFIG;
 	default:
-		return EXIT_CODE_INTERNAL;
+		return EXIT_CODE_FAILED;
 	}
 }
 

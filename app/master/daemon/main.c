@@ -134,7 +134,7 @@ static int bring_up(struct program *pg, struct failure *failure)
 	int r;
 
 	while ((r = session_bring_up(pg->session, failure)) < 0) {
-		if (exit_code_hope(failure->code) != EXIT_CODE_PASSING ||
+		if (!failure_is_transient(failure->code) ||
 		    !(pg->options.can_wait || pg->has_been_up)) {
 			return r;
 		}

@@ -200,10 +200,7 @@ void options_help(FILE *out)
 	      "environment: ECDAQ_RUN_DIR (run directory where none is configured), NOTIFY_SOCKET "
 	      "and\n"
 	      "WATCHDOG_USEC (set by systemd for Type=notify)\n"
-	      "\n"
-	      "exit codes:\n",
+	      "\n",
 	      out);
-	for (int code = 0; code < EXIT_CODE_COUNT; code++) {
-		fprintf(out, "  %2d  %s\n", code, exit_code_to_str((enum exit_code)code));
-	}
+	exit_code_help(out, (EXIT_CODE_BIT(CONTROL) << 1) - 1);
 }

@@ -54,14 +54,15 @@ int session_stop(struct session *session, struct failure *failure)
 		r = bus_request_state(s->bus, AL_SAFEOP, (span_t){ s->spec.cfg->bus_op_timeout_ns },
 				      error);
 		if (r < 0) {
-			first = failure_set(failure, exit_code_of_bus(r, EXIT_CODE_STATE), r, "%s",
-					    error);
+			first = failure_set(failure, failure_code_of_bus(r, EXIT_CODE_STATE), r,
+					    "%s", error);
 		}
 		session_cycle_end(s);
 	}
 	r = bus_stop(s->bus, error);
 	if (r < 0 && first == 0) {
-		first = failure_set(failure, exit_code_of_bus(r, EXIT_CODE_STATE), r, "%s", error);
+		first = failure_set(failure, failure_code_of_bus(r, EXIT_CODE_STATE), r, "%s",
+				    error);
 	}
 	session_drop(s);
 	return first;

@@ -268,7 +268,7 @@ int session_report_ended(struct session *s, struct failure *failure)
 			(unsigned long long)atomic_load_explicit(&s->home.page->cycle.cycle_number,
 								 memory_order_relaxed));
 	}
-	return failure_set(failure, EXIT_CODE_INTERNAL, r < 0 ? r : -EIO,
+	return failure_set(failure, EXIT_CODE_FAILED, r < 0 ? r : -EIO,
 			   "cycle: ended by itself: error %d", -r);
 }
 

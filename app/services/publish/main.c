@@ -8,18 +8,10 @@
 #include <string.h>
 
 #include "config/config.h"
+#include "program/exit_code.h"
 #include "publish/publisher.h"
 
 enum { ERROR_BYTES = 512, SETS = 256 };
-
-/* As ecdaqd's where they mean the same. */
-enum exit_status {
-	STATUS_OK = 0,
-	STATUS_FAILED = 1,
-	STATUS_USAGE = 2,
-	STATUS_CONFIG = 3,
-	STATUS_OFF = 4,
-};
 
 struct arguments {
 	const char *config_path;
@@ -163,8 +155,8 @@ static int exit_status(int error)
 {
 	return error == -EINVAL || error == -ENODEV || error == -ENAMETOOLONG ||
 			       error == -EKEYREJECTED
-		       ? STATUS_CONFIG
-		       : STATUS_FAILED;
+		       ? EXIT_CODE_CONFIG
+		       : EXIT_CODE_FAILED;
 }
 
 int main(int argc, char **argv)
@@ -176,18 +168,18 @@ int main(int argc, char **argv)
 	int r;
 
 	if (parse_arguments(argc, argv, &arguments) < 0) {
-		return STATUS_USAGE;
+		return EXIT_CODE_USAGE;
 	}
 	if (arguments.is_help || arguments.is_version) {
 		arguments.is_help ? help(stdout) : (void)puts("ecdaq-dds " ECDAQ_VERSION);
-		return STATUS_OK;
+		return EXIT_CODE_OK;
 	}
 	if (configure(&arguments, &cfg) < 0) {
-		return STATUS_CONFIG;
+		return EXIT_CODE_CONFIG;
 	}
 	if (!cfg.dds_enable) {
 		fputs("ecdaq-dds: dds.enable is off: nothing to do\n", stderr);
-		return arguments.is_check ? STATUS_OFF : STATUS_OK;
+		return arguments.is_check ? EXIT_CODE_DISABLED : EXIT_CODE_OK;
 	}
 	r = publisher_create(&cfg, &publisher, error, sizeof(error));
 	if (r < 0) {
@@ -196,5 +188,5 @@ int main(int argc, char **argv)
 	}
 	r = arguments.is_check ? 0 : run(publisher);
 	publisher_destroy(publisher);
-	return r < 0 ? exit_status(r) : STATUS_OK;
+	return r < 0 ? exit_status(r) : EXIT_CODE_OK;
 }

@@ -11,19 +11,10 @@
 #include <unistd.h>
 
 #include "config/config.h"
+#include "program/exit_code.h"
 #include "record/recorder.h"
 
 enum { IDLE_MS = 5, CONFIG_TEXT_BYTES = 1 << 20, ERROR_BYTES = 512, SETS = 256 };
-
-/* As ecdaqd's where they mean the same. */
-enum exit_status {
-	STATUS_OK = 0,
-	STATUS_FAILED = 1,
-	STATUS_USAGE = 2,
-	STATUS_CONFIG = 3,
-	STATUS_PERMISSION = 4,
-	STATUS_BUSY = 6,
-};
 
 struct arguments {
 	const char *config_path;
@@ -269,9 +260,9 @@ static int run(struct recorder *rec, int is_once)
 
 static int exit_status(int error)
 {
-	return error == -EBUSY                                          ? STATUS_BUSY
-	       : error == -EACCES || error == -EPERM || error == -EROFS ? STATUS_PERMISSION
-									: STATUS_FAILED;
+	return error == -EBUSY                                          ? EXIT_CODE_BUSY
+	       : error == -EACCES || error == -EPERM || error == -EROFS ? EXIT_CODE_PERMISSION
+									: EXIT_CODE_FAILED;
 }
 
 int main(int argc, char **argv)
@@ -284,23 +275,23 @@ int main(int argc, char **argv)
 	int r;
 
 	if (parse_arguments(argc, argv, &arguments) < 0) {
-		return STATUS_USAGE;
+		return EXIT_CODE_USAGE;
 	}
 	if (arguments.is_help || arguments.is_version) {
 		arguments.is_help ? help(stdout) : (void)puts("ecdaq-record " ECDAQ_VERSION);
-		return STATUS_OK;
+		return EXIT_CODE_OK;
 	}
 	if (configure(&arguments, &pg.cfg) < 0 || find_paths(&pg) < 0) {
-		return STATUS_CONFIG;
+		return EXIT_CODE_CONFIG;
 	}
 	if (!pg.cfg.record_enable) {
 		fputs("ecdaq-record: record.enable is off, there is nothing to do\n", stderr);
-		return STATUS_OK;
+		return EXIT_CODE_OK;
 	}
 	pg.config_text = read_text(pg.cfg.path);
 	if (pg.config_text == NULL) {
 		fprintf(stderr, "ecdaq-record: %s\n", strerror(ENOMEM));
-		return STATUS_FAILED;
+		return EXIT_CODE_FAILED;
 	}
 	options = recorder_options(&pg);
 	r = recorder_create(&options, &rec, error, sizeof(error));
@@ -312,5 +303,5 @@ int main(int argc, char **argv)
 	r = run(rec, arguments.is_once);
 	recorder_destroy(rec);
 	free(pg.config_text);
-	return r < 0 ? STATUS_FAILED : STATUS_OK;
+	return r < 0 ? EXIT_CODE_FAILED : EXIT_CODE_OK;
 }

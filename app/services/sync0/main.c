@@ -9,22 +9,12 @@
 #include <string.h>
 
 #include "config/config.h"
+#include "program/exit_code.h"
 #include "sync0/listen.h"
 #include "sync0/replay.h"
 #include "sync0/watch.h"
 
 enum { ERROR_BYTES = 512, SETS = 256 };
-
-/* As ecdaqd's where they mean the same. */
-enum exit_status {
-	STATUS_OK = 0,
-	STATUS_FAILED = 1,
-	STATUS_USAGE = 2,
-	STATUS_CONFIG = 3,
-	STATUS_PERMISSION = 4,
-	STATUS_BAD = 5,
-	STATUS_BUSY = 6,
-};
 
 struct arguments {
 	const char *config_path;
@@ -230,9 +220,9 @@ static void choose_core(const struct config *cfg)
 
 static int exit_status(int error)
 {
-	return error == -EACCES || error == -EPERM ? STATUS_PERMISSION
-	       : error == -EBUSY                   ? STATUS_BUSY
-						   : STATUS_FAILED;
+	return error == -EACCES || error == -EPERM ? EXIT_CODE_PERMISSION
+	       : error == -EBUSY                   ? EXIT_CODE_BUSY
+						   : EXIT_CODE_FAILED;
 }
 
 static int run_replay(const struct arguments *a, const struct config *cfg)
@@ -256,7 +246,7 @@ static int run_replay(const struct arguments *a, const struct config *cfg)
 		fprintf(stderr, "ecdaq-sync0: %s\n", why);
 		return exit_status(r);
 	}
-	return outcome == REPLAY_BAD ? STATUS_BAD : STATUS_OK;
+	return outcome == REPLAY_BAD ? EXIT_CODE_CHECK_FAILED : EXIT_CODE_OK;
 }
 
 static void take_signals(void)
@@ -276,7 +266,7 @@ static int run_calibration(const struct config *cfg, const char *dev_dir)
 		fprintf(stderr, "ecdaq-sync0: %s\n", why);
 		return exit_status(r);
 	}
-	return STATUS_OK;
+	return EXIT_CODE_OK;
 }
 
 static int run_watch(const struct arguments *a, const struct config *cfg, const char *dev_dir)
@@ -296,7 +286,7 @@ static int run_watch(const struct arguments *a, const struct config *cfg, const 
 	r = watch_create(&spec, &watch, why);
 	if (r < 0) {
 		fprintf(stderr, "ecdaq-sync0: %s\n", why);
-		return r == -ENOENT ? STATUS_CONFIG : exit_status(r);
+		return r == -ENOENT ? EXIT_CODE_CONFIG : exit_status(r);
 	}
 	while (!has_stopped) {
 		watch_step(watch);
@@ -305,9 +295,9 @@ static int run_watch(const struct arguments *a, const struct config *cfg, const 
 	watch_destroy(watch);
 	if (spec.dump != NULL && fclose(spec.dump) != 0) {
 		fprintf(stderr, "ecdaq-sync0: --dump: %s: %s\n", a->dump, strerror(errno));
-		return STATUS_FAILED;
+		return EXIT_CODE_FAILED;
 	}
-	return STATUS_OK;
+	return EXIT_CODE_OK;
 }
 
 int main(int argc, char **argv)
@@ -316,17 +306,17 @@ int main(int argc, char **argv)
 	struct arguments arguments = { .dev_dir = "/dev" };
 
 	if (parse_arguments(argc, argv, &arguments) < 0) {
-		return STATUS_USAGE;
+		return EXIT_CODE_USAGE;
 	}
 	if (!do_fit(&arguments)) {
-		return STATUS_USAGE;
+		return EXIT_CODE_USAGE;
 	}
 	if (arguments.is_help || arguments.is_version) {
 		fputs(arguments.is_help ? help_text : "ecdaq-sync0 " ECDAQ_VERSION "\n", stdout);
-		return STATUS_OK;
+		return EXIT_CODE_OK;
 	}
 	if (configure(&arguments, &cfg) < 0) {
-		return STATUS_CONFIG;
+		return EXIT_CODE_CONFIG;
 	}
 	if (arguments.replay != NULL) {
 		return run_replay(&arguments, &cfg);
@@ -338,7 +328,7 @@ int main(int argc, char **argv)
 	}
 	if (!cfg.sync0_enable && arguments.edges == NULL) {
 		fputs("ecdaq-sync0: sync0.enable is off, there is nothing to do\n", stderr);
-		return STATUS_OK;
+		return EXIT_CODE_OK;
 	}
 	return run_watch(&arguments, &cfg, arguments.dev_dir);
 }

@@ -27,7 +27,7 @@ static const struct verb verb = { "verb", "WORD...", "", NULL, NULL };
 static struct cli cli;
 static struct args args;
 
-static enum args_result parse(const char *const *line, enum cli_exit *ret_exit)
+static enum args_result parse(const char *const *line, enum exit_code *ret_exit)
 {
 	static char words[16][64];
 	static char *argv[16];
@@ -50,7 +50,7 @@ static enum args_result parse(const char *const *line, enum cli_exit *ret_exit)
 
 TEST(args, options_and_operands_may_stand_in_any_order)
 {
-	enum cli_exit result;
+	enum exit_code result;
 
 	CHECK_EQ(PARSE("a", "--flag", "--text=x=y", "b", "--count", "7"), ARGS_GO);
 	CHECK_EQ(got.flag, 1);
@@ -63,7 +63,7 @@ TEST(args, options_and_operands_may_stand_in_any_order)
 
 TEST(args, short_options_take_the_next_word)
 {
-	enum cli_exit result;
+	enum exit_code result;
 
 	CHECK_EQ(PARSE("-f", "-t", "x", "a"), ARGS_GO);
 	CHECK_EQ(got.flag, 1);
@@ -72,7 +72,7 @@ TEST(args, short_options_take_the_next_word)
 
 TEST(args, values_carry_units_where_they_are_durations)
 {
-	enum cli_exit result;
+	enum exit_code result;
 
 	CHECK_EQ(PARSE("a", "--in", "1.5ms", "--number", "2.5", "--at", "-3"), ARGS_GO);
 	CHECK_EQ(got.duration_ns, 1500000);
@@ -84,7 +84,7 @@ TEST(args, values_carry_units_where_they_are_durations)
 
 TEST(args, global_options_are_taken_behind_the_verb_too)
 {
-	enum cli_exit result;
+	enum exit_code result;
 
 	CHECK_EQ(PARSE("--run-dir", "/r", "a", "--config=/c"), ARGS_GO);
 	CHECK_STR(cli.run_dir, "/r");
@@ -93,7 +93,7 @@ TEST(args, global_options_are_taken_behind_the_verb_too)
 
 TEST(args, negative_values_and_words_behind_two_dashes_are_operands)
 {
-	enum cli_exit result;
+	enum exit_code result;
 
 	CHECK_EQ(PARSE("-5", "-.5"), ARGS_GO);
 	CHECK_EQ(args.operand_count, 2);
@@ -104,10 +104,10 @@ TEST(args, negative_values_and_words_behind_two_dashes_are_operands)
 
 static void fails(const char *const *line)
 {
-	enum cli_exit result = CLI_OK;
+	enum exit_code result = EXIT_CODE_OK;
 
 	CHECK_EQ(parse(line, &result), ARGS_DONE);
-	CHECK_EQ(result, CLI_USAGE);
+	CHECK_EQ(result, EXIT_CODE_USAGE);
 }
 
 #define FAILS(...) fails((const char *[]){ __VA_ARGS__, NULL })
