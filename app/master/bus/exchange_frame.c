@@ -6,8 +6,8 @@
 #include <string.h>
 
 #include "base/bytes.h"
-#include "link/echo.h"
 #include "wire/datagram.h"
+#include "wire/echo.h"
 #include "wire/esc_reg.h"
 
 enum {

@@ -46,7 +46,7 @@ static int find(void *host, const char *name, int is_output, uint32_t *ret_index
 static int option_text(void *host, const char *key, char *ret_text, uint32_t text_bytes)
 {
 	struct control *ctl = host;
-	const char *value = words_ask(&ctl->words, key);
+	const char *value = arguments_get(&ctl->arguments, key);
 
 	if (value == NULL) {
 		return -ENOENT;
@@ -61,7 +61,7 @@ static int option_text(void *host, const char *key, char *ret_text, uint32_t tex
 static int option_number(void *host, const char *key, double *ret_value)
 {
 	struct control *ctl = host;
-	const char *text = words_ask(&ctl->words, key);
+	const char *text = arguments_get(&ctl->arguments, key);
 	char *end;
 	double value;
 

@@ -6,10 +6,10 @@
 #include <stdatomic.h>
 
 #include "base/limits.h"
+#include "control/arguments.h"
 #include "control/control.h"
 #include "control/guard.h"
 #include "control/program.h"
-#include "control/words.h"
 
 enum { CONTROL_TEXT_BYTES = 256 };
 
@@ -31,7 +31,7 @@ struct control {
 	int is_guarded;
 	int has_begun;
 	struct control_spec spec;
-	struct words words;
+	struct arguments arguments;
 	char said[CONTROL_TEXT_BYTES];    /* by the program */
 	char trouble[CONTROL_TEXT_BYTES]; /* of the first of our calls that failed */
 	/* the cycle's */

@@ -115,7 +115,7 @@ static int load(struct control *ctl, const struct complaint *to)
 	if (r < 0) {
 		return r;
 	}
-	r = words_parse(&ctl->words, ctl->cfg->control_options, why, sizeof(why));
+	r = arguments_parse(&ctl->arguments, ctl->cfg->control_options, why, sizeof(why));
 	if (r < 0) {
 		return complain(to, r, "control.options: %s", why);
 	}
@@ -209,7 +209,7 @@ static int call_init(struct control *ctl, const struct complaint *to)
 		return complain(to, -EINVAL, "init() failed: %s", why);
 	}
 	ctl->has_begun = 1;
-	unasked = words_unasked(&ctl->words);
+	unasked = arguments_unused(&ctl->arguments);
 	if (unasked != NULL) {
 		return complain(to, -EINVAL,
 				"control.options: %.40s: the program knows no such key", unasked);

@@ -43,7 +43,7 @@ static int load_control(struct session *s, struct failure *failure)
 static int begin_control(struct session *s, struct failure *failure)
 {
 	struct control_spec spec = { .platform = s->spec.platform,
-				     .status = &s->home.page->control };
+				     .status = &s->run.page->control };
 	char error[FAILURE_TEXT_BYTES] = "";
 	int r;
 
@@ -94,9 +94,9 @@ static void show_slaves(struct session *s)
 	const struct slave_info *slaves = bus_slaves(s->bus, &count);
 
 	for (size_t i = 0; i < count && i < LIMIT_SLAVES; i++) {
-		s->home.page->slave[i].info = slaves[i];
+		s->run.page->slave[i].info = slaves[i];
 	}
-	atomic_store_explicit(&s->home.page->slave_count, (uint32_t)count, memory_order_release);
+	atomic_store_explicit(&s->run.page->slave_count, (uint32_t)count, memory_order_release);
 }
 
 int session_step(struct session *s, int r, enum exit_code late, const char *error,
@@ -157,7 +157,7 @@ static size_t write_meta(const struct session *s, uint8_t *meta)
 		.output_bytes = plan->output_bytes,
 		.tai_offset_s = s->spec.tai_offset_s,
 		.period_ns = (uint64_t)s->spec.cfg->cycle_period_ns,
-		.session = s->home.page->session,
+		.session = s->run.page->session,
 	};
 	size_t slaves_bytes = slave_count * sizeof(*slaves);
 	size_t channels_bytes = channel_count * sizeof(*channels);
@@ -183,7 +183,7 @@ static int make_samples(struct session *s, struct failure *failure)
 		.period_ns = (uint64_t)s->spec.cfg->cycle_period_ns,
 		.file_mode = FILE_MODE,
 	};
-	int r = home_path(&s->home, CONFIG_RUN_SAMPLES, path, sizeof(path));
+	int r = run_dir_path(&s->run, CONFIG_RUN_SAMPLES, path, sizeof(path));
 
 	if (r == 0) {
 		r = ring_create(&spec, &s->samples);
@@ -206,10 +206,10 @@ static int make_cycle(struct session *s, struct failure *failure)
 		.platform = session_cycle_platform(s),
 		.plan = bus_plan(s->bus),
 		.samples = s->samples,
-		.events = s->home.events,
-		.stats = &s->home.page->cycle,
+		.events = s->run.events,
+		.stats = &s->run.page->cycle,
 		.boards = { [CYCLE_WRITER_LOCAL] = &s->board,
-			    [CYCLE_WRITER_REMOTE] = s->home.remote },
+			    [CYCLE_WRITER_REMOTE] = s->run.remote },
 	};
 	int r = exchange_create(spec.plan, s->line, &s->exchange);
 
@@ -221,12 +221,12 @@ static int make_cycle(struct session *s, struct failure *failure)
 	spec.slaves = bus_slaves(s->bus, &spec.slave_count);
 	spec.channels = bus_channels(s->bus, &spec.channel_count);
 	board_init(&s->board);
-	board_init(s->home.remote);
+	board_init(s->run.remote);
 	if (s->control != NULL) {
 		spec.control = s->control;
 		spec.boards[CYCLE_WRITER_PROGRAM] = control_board(s->control);
 	}
-	memset(&s->home.page->cycle, 0, sizeof(s->home.page->cycle));
+	memset(&s->run.page->cycle, 0, sizeof(s->run.page->cycle));
 	r = cycle_create(&spec, &s->cycle, error, sizeof(error));
 	if (r < 0) {
 		return failure_set(failure, r == -ENOMEM ? EXIT_CODE_RESOURCES : EXIT_CODE_CONFIG,
@@ -280,8 +280,8 @@ static void arrive(struct session *s)
 	s->is_partial = 0;
 	s->doubled_since = 0;
 	s->doubled_seen = 0;
-	s->cycles_seen = atomic_load_explicit(&s->home.page->cycle.cycles, memory_order_relaxed);
-	s->lost_seen = atomic_load_explicit(&s->home.page->cycle.frames_lost, memory_order_relaxed);
+	s->cycles_seen = atomic_load_explicit(&s->run.page->cycle.cycles, memory_order_relaxed);
+	s->lost_seen = atomic_load_explicit(&s->run.page->cycle.frames_lost, memory_order_relaxed);
 	s->next_watch = session_now(s);
 	session_state_set(s, BUS_OP);
 	session_say(s, "");
@@ -322,7 +322,7 @@ int session_bring_up(struct session *session, struct failure *failure)
 	struct failure ignored;
 	int r;
 
-	s->home.page->session = (uint64_t)s->spec.platform.tai_ns(s->spec.platform.ctx);
+	s->run.page->session = (uint64_t)s->spec.platform.tai_ns(s->spec.platform.ctx);
 	r = climb(s, failure);
 	if (r < 0) {
 		session_say(s, failure->text);

@@ -37,7 +37,7 @@ static uint64_t load(const _Atomic uint64_t *counter)
 
 static int wait_for_lock(struct session *s, struct failure *failure)
 {
-	const struct cycle_stats *st = &s->home.page->cycle;
+	const struct cycle_stats *st = &s->run.page->cycle;
 	int64_t timeout_ns = s->spec.cfg->dc_lock_timeout_ns;
 	mono_t give_up = mono_add(session_now(s), (span_t){ timeout_ns });
 
@@ -115,7 +115,7 @@ static int wait_for_clocks(struct session *s, struct failure *failure)
 	if (!bus_plan(s->bus)->monitor) {
 		return 0;
 	}
-	r = home_path(&s->home, CONFIG_RUN_SAMPLES, path, sizeof(path));
+	r = run_dir_path(&s->run, CONFIG_RUN_SAMPLES, path, sizeof(path));
 	if (r == 0) {
 		r = ring_reader_open(path, &reader);
 	}
@@ -130,7 +130,7 @@ static int wait_for_clocks(struct session *s, struct failure *failure)
 /* A slave that is asked for OP while frames are missing trips over its watchdog (T07). */
 static int wait_for_flow(struct session *s, struct failure *failure)
 {
-	const struct cycle_stats *st = &s->home.page->cycle;
+	const struct cycle_stats *st = &s->run.page->cycle;
 	mono_t give_up = mono_add(session_now(s), (span_t){ s->spec.cfg->bus_op_timeout_ns });
 	uint64_t lost = load(&st->frames_lost);
 	uint64_t enough = load(&st->cycles) + FLOWING_CYCLES;

@@ -179,7 +179,7 @@ int machine_session_create(struct program *pg, struct failure *failure)
 			.warn = warn,
 			.ctx = pg,
 		},
-		.segment = pg->options.is_simulated ? HOME_SIMULATED : HOME_REAL,
+		.segment = pg->options.is_simulated ? RUN_DIR_SIMULATED : RUN_DIR_REAL,
 		.tai_offset_s = kernel_tai_offset(),
 	};
 
@@ -188,14 +188,14 @@ int machine_session_create(struct program *pg, struct failure *failure)
 
 static void check_ring_place(struct program *pg)
 {
-	const struct home *home = session_home(pg->session);
+	const struct run_dir *run = session_run_dir(pg->session);
 	char text[CONFIG_PATH_BYTES + 128];
 
-	if (!home->is_tmpfs) {
+	if (!run->is_tmpfs) {
 		snprintf(text, sizeof(text),
 			 "%s: not on a tmpfs: write-back to the disk will hold the cycle up "
 			 "(runtime.run_dir)",
-			 home->dir);
+			 run->dir);
 		degraded(pg, EVENT_RT_RING_DISK, 0, text);
 	}
 }

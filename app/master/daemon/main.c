@@ -244,7 +244,7 @@ static int run(struct program *pg)
 		return fail(&failure);
 	}
 	atomic_store(&signalled, pg->session);
-	pg->interface_claim = home_claim_interface(pg->cfg.interface, &failure);
+	pg->interface_claim = run_dir_claim_interface(pg->cfg.interface, &failure);
 	r = pg->interface_claim < 0 ? pg->interface_claim : run_session(pg, &failure);
 	if (r < 0) {
 		fail(&failure);

@@ -20,11 +20,11 @@ void session_emit(struct session *s, const struct event *ev)
 	stamped.mono_ns = pf->now(pf->ctx).ns;
 	stamped.tai_ns = pf->tai_ns(pf->ctx);
 	stamped.cycle =
-		atomic_load_explicit(&s->home.page->cycle.cycle_number, memory_order_relaxed);
+		atomic_load_explicit(&s->run.page->cycle.cycle_number, memory_order_relaxed);
 	if (s->is_riding) {
-		post_push(&s->post, &stamped);
+		event_queue_push(&s->events, &stamped);
 	} else {
-		ring_push(s->home.events, &stamped, sizeof(stamped), NULL, 0);
+		ring_push(s->run.events, &stamped, sizeof(stamped), NULL, 0);
 	}
 }
 
@@ -86,11 +86,11 @@ static int cycle_sleep(void *ctx, mono_t deadline)
 {
 	struct session *s = ctx;
 
-	post_collect(&s->post, s->home.events);
+	event_queue_collect(&s->events, s->run.events);
 	if (atomic_load_explicit(&s->clear_asked, memory_order_relaxed)) {
 		atomic_store_explicit(&s->clear_asked, 0, memory_order_relaxed);
-		clear_stats(&s->home.page->cycle);
-		clear_control(&s->home.page->control);
+		clear_stats(&s->run.page->cycle);
+		clear_control(&s->run.page->control);
 	}
 	return s->spec.platform.sleep_until(s->spec.platform.ctx, deadline);
 }
@@ -137,16 +137,16 @@ void session_state_set(struct session *s, enum bus_state state)
 	}
 	session_emit(s, &ev);
 	if (state == BUS_STOPPED) {
-		atomic_store_explicit(&s->home.page->bus_state_at_stop, s->state,
+		atomic_store_explicit(&s->run.page->bus_state_at_stop, s->state,
 				      memory_order_relaxed);
 	}
 	s->state = state;
-	atomic_store_explicit(&s->home.page->bus_state, state, memory_order_relaxed);
+	atomic_store_explicit(&s->run.page->bus_state, state, memory_order_relaxed);
 }
 
 void session_say(struct session *session, const char *text)
 {
-	home_say(&session->home, text);
+	run_dir_set_message(&session->run, text);
 }
 
 void session_degraded(struct session *session, enum event_rt which, int err)
@@ -157,14 +157,14 @@ void session_degraded(struct session *session, enum event_rt which, int err)
 		.arg = { (int32_t)which, err },
 	};
 
-	atomic_fetch_or_explicit(&session->home.page->rt_degraded, 1u << which,
+	atomic_fetch_or_explicit(&session->run.page->rt_degraded, 1u << which,
 				 memory_order_relaxed);
 	session_emit(session, &ev);
 }
 
 void session_cpu_set(struct session *session, uint32_t cpu)
 {
-	atomic_store_explicit(&session->home.page->cycle_cpu, cpu, memory_order_relaxed);
+	atomic_store_explicit(&session->run.page->cycle_cpu, cpu, memory_order_relaxed);
 }
 
 void session_stop_ask(struct session *session)
@@ -179,7 +179,7 @@ int session_is_stop_asked(const struct session *session)
 
 const struct status_page *session_page(const struct session *session)
 {
-	return session->home.page;
+	return session->run.page;
 }
 
 struct bus *session_bus(const struct session *session)
@@ -197,9 +197,9 @@ struct cycle *session_cycle(const struct session *session)
 	return session->cycle;
 }
 
-const struct home *session_home(const struct session *session)
+const struct run_dir *session_run_dir(const struct session *session)
 {
-	return &session->home;
+	return &session->run;
 }
 
 int session_fd(const struct session *session)
@@ -218,16 +218,16 @@ static int open_sockets(struct session *s, char *error, size_t error_bytes)
 {
 	char admin[CONFIG_PATH_BYTES + 16];
 	char remote[CONFIG_PATH_BYTES + 16];
-	int r = home_path(&s->home, CONFIG_RUN_ADMIN, admin, sizeof(admin));
+	int r = run_dir_path(&s->run, CONFIG_RUN_ADMIN, admin, sizeof(admin));
 
-	r = r < 0 ? r : home_path(&s->home, CONFIG_RUN_COMMANDS_REMOTE, remote, sizeof(remote));
+	r = r < 0 ? r : run_dir_path(&s->run, CONFIG_RUN_COMMANDS_REMOTE, remote, sizeof(remote));
 	if (r < 0) {
-		snprintf(error, error_bytes, "%s: %s", s->home.dir, strerror(-r));
+		snprintf(error, error_bytes, "%s: %s", s->run.dir, strerror(-r));
 		return r;
 	}
-	r = admin_server_create(admin, s->home.group, &s->admin, error, error_bytes);
+	r = admin_server_create(admin, s->run.group, &s->admin, error, error_bytes);
 	return r < 0 ? r
-		     : admin_server_offer_board(s->admin, remote, s->home.group, s->home.remote_fd,
+		     : admin_server_offer_board(s->admin, remote, s->run.group, s->run.remote_fd,
 						error, error_bytes);
 }
 
@@ -243,7 +243,7 @@ int session_create(const struct session_spec *spec, struct session **ret_session
 	}
 	memset(s, 0, sizeof(*s));
 	s->spec = *spec;
-	r = home_open(&s->home, spec->cfg, &spec->platform, spec->segment, failure);
+	r = run_dir_open(&s->run, spec->cfg, &spec->platform, spec->segment, failure);
 	if (r < 0) {
 		session_destroy(s);
 		return r;
@@ -265,11 +265,11 @@ void session_conclude(struct session *session, const struct failure *failure)
 	struct event ev = {
 		.id = EVENT_STOPPED,
 		.slave_pos = EVENT_NO_SLAVE,
-		.value = (int64_t)atomic_load_explicit(&session->home.page->cycle.cycles,
+		.value = (int64_t)atomic_load_explicit(&session->run.page->cycle.cycles,
 						       memory_order_relaxed),
 	};
 
-	atomic_store_explicit(&session->home.page->exit_code,
+	atomic_store_explicit(&session->run.page->exit_code,
 			      failure != NULL ? (uint32_t)failure->code : EXIT_CODE_OK,
 			      memory_order_relaxed);
 	session_say(session, failure != NULL ? failure->text : "");
@@ -279,7 +279,7 @@ void session_conclude(struct session *session, const struct failure *failure)
 
 void session_stuck(struct session *session, enum exit_code code, const char *text)
 {
-	struct status_page *page = session->home.page;
+	struct status_page *page = session->run.page;
 
 	atomic_store_explicit(&page->control.state, CONTROL_STUCK, memory_order_relaxed);
 	atomic_store_explicit(&page->exit_code, (uint32_t)code, memory_order_relaxed);
@@ -294,6 +294,6 @@ void session_destroy(struct session *session)
 	}
 	session_drop(session);
 	admin_server_destroy(session->admin);
-	home_close(&session->home);
+	run_dir_close(&session->run);
 	free(session);
 }

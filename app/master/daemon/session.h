@@ -20,7 +20,7 @@
 #include "config/config.h"
 #include "cycle/cycle.h"
 #include "daemon/failure.h"
-#include "daemon/home.h"
+#include "daemon/run_dir.h"
 
 struct session;
 
@@ -46,7 +46,7 @@ struct session_spec {
 	const struct config *cfg; /* outlives the session */
 	struct platform platform;
 	struct session_hooks hooks;
-	enum home_segment segment;
+	enum run_dir_segment segment;
 	int32_t tai_offset_s; /* TAI - UTC of the kernel; 0: unset */
 };
 
@@ -119,6 +119,6 @@ struct bus *session_bus(const struct session *session);
 struct control *session_control(const struct session *session);
 struct cycle *session_cycle(const struct session *session);
 /** The run directory. */
-const struct home *session_home(const struct session *session);
+const struct run_dir *session_run_dir(const struct session *session);
 
 #endif

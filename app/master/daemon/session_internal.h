@@ -10,18 +10,18 @@
 #include "bus/bus.h"
 #include "bus/exchange.h"
 #include "control/program.h"
-#include "daemon/home.h"
-#include "daemon/post.h"
+#include "daemon/event_queue.h"
+#include "daemon/run_dir.h"
 #include "daemon/session.h"
 #include "link/line.h"
 
 struct session {
 	struct session_spec spec;
-	struct home home;
+	struct run_dir run;
 	struct admin_server *admin;
 	_Atomic int stop_asked;  /* [any] */
 	_Atomic int clear_asked; /* [service] set; [cycle] reset */
-	struct post post;
+	struct event_queue events;
 	unsigned replies_waiting;
 	/* while the bus is up */
 	struct line *line;

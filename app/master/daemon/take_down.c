@@ -19,13 +19,13 @@ int session_cycle_end(struct session *s)
 	r = s->spec.hooks.cycle_end(s->spec.hooks.ctx);
 	s->is_riding = 0;
 	line_ride_end(s->line);
-	post_collect(&s->post, s->home.events);
+	event_queue_collect(&s->events, s->run.events);
 	return r;
 }
 
 static void make_outputs_safe(struct session *s)
 {
-	const _Atomic uint64_t *cycles = &s->home.page->cycle.cycles;
+	const _Atomic uint64_t *cycles = &s->run.page->cycle.cycles;
 	uint64_t enough = atomic_load_explicit(cycles, memory_order_relaxed) + SAFE_CYCLES;
 	mono_t give_up = mono_add(session_now(s), (span_t){ SAFE_TIMEOUT_NS });
 

@@ -121,7 +121,7 @@ static void go_on_with(struct session *s, uint64_t op_mask)
 
 static void follow_bus(struct session *s, const struct bus_watch_report *report)
 {
-	uint32_t count = atomic_load_explicit(&s->home.page->slave_count, memory_order_relaxed);
+	uint32_t count = atomic_load_explicit(&s->run.page->slave_count, memory_order_relaxed);
 	char text[BUS_ERROR_BYTES];
 
 	if (report->is_all_op && s->state == BUS_RECOVERING) {
@@ -152,7 +152,7 @@ static uint64_t silence_limit(const struct session *s)
 /* The cycle knows first whether anything comes back. */
 static void count_silence(struct session *s)
 {
-	const struct cycle_stats *st = &s->home.page->cycle;
+	const struct cycle_stats *st = &s->run.page->cycle;
 	uint64_t cycles = atomic_load_explicit(&st->cycles, memory_order_relaxed);
 	uint64_t lost = atomic_load_explicit(&st->frames_lost, memory_order_relaxed);
 
@@ -169,7 +169,7 @@ static void follow_silence(struct session *s)
 {
 	struct bus_watch_report report = {
 		.slaves_lost =
-			atomic_load_explicit(&s->home.page->slave_count, memory_order_relaxed),
+			atomic_load_explicit(&s->run.page->slave_count, memory_order_relaxed),
 	};
 
 	follow_bus(s, &report);
@@ -190,7 +190,7 @@ enum session_news session_watch(struct session *s)
 	if (s->silent_cycles >= silence_limit(s)) {
 		/* Nobody is there to be asked; each question would cost its time-out. */
 		follow_silence(s);
-	} else if (bus_watch(s->bus, s->home.page, emit_event, s, &report) == 0) {
+	} else if (bus_watch(s->bus, s->run.page, emit_event, s, &report) == 0) {
 		follow_bus(s, &report);
 		bus_lead_back(s->bus, emit_event, s);
 	}
@@ -222,7 +222,7 @@ void session_judge_doubled(struct session *s, uint64_t frames, uint64_t twice)
 
 static void watch_doubled(struct session *s)
 {
-	const struct cycle_stats *st = &s->home.page->cycle;
+	const struct cycle_stats *st = &s->run.page->cycle;
 	uint64_t cycles = atomic_load_explicit(&st->cycles, memory_order_relaxed);
 	uint64_t doubled = atomic_load_explicit(&st->frames_doubled, memory_order_relaxed);
 	uint64_t window = cycles - s->doubled_since;
@@ -240,7 +240,7 @@ static void watch_doubled(struct session *s)
 /* Has the working counter been low for longer than is waited for? Then look at once. */
 static int is_wkc_alarming(struct session *s)
 {
-	uint64_t low = atomic_load_explicit(&s->home.page->cycle.wkc_low, memory_order_relaxed);
+	uint64_t low = atomic_load_explicit(&s->run.page->cycle.wkc_low, memory_order_relaxed);
 	uint64_t more = low - s->wkc_low_seen;
 
 	if (low < s->wkc_low_seen) { /* cleared */
@@ -262,11 +262,10 @@ int session_report_ended(struct session *s, struct failure *failure)
 		return failure_set(failure, EXIT_CODE_CONTROL, r < 0 ? r : -EIO, "%s", text);
 	}
 	if (r == -ETIME) {
-		return failure_set(
-			failure, EXIT_CODE_OVERRUN, r,
-			"cycle: overrun in cycle %llu, and cycle.overrun is stop",
-			(unsigned long long)atomic_load_explicit(&s->home.page->cycle.cycle_number,
-								 memory_order_relaxed));
+		return failure_set(failure, EXIT_CODE_OVERRUN, r,
+				   "cycle: overrun in cycle %llu, and cycle.overrun is stop",
+				   (unsigned long long)atomic_load_explicit(
+					   &s->run.page->cycle.cycle_number, memory_order_relaxed));
 	}
 	return failure_set(failure, EXIT_CODE_FAILED, r < 0 ? r : -EIO,
 			   "cycle: ended by itself: error %d", -r);
@@ -290,8 +289,8 @@ int session_service(struct session *session, struct failure *failure)
 	}
 	if (now.ns >= s->next_watch.ns || is_wkc_alarming(s)) {
 		s->wkc_low_seen =
-			atomic_load_explicit(&s->home.page->cycle.wkc_low, memory_order_relaxed);
-		atomic_fetch_add_explicit(&s->home.page->heartbeat, 1, memory_order_relaxed);
+			atomic_load_explicit(&s->run.page->cycle.wkc_low, memory_order_relaxed);
+		atomic_fetch_add_explicit(&s->run.page->heartbeat, 1, memory_order_relaxed);
 		if (s->is_riding) {
 			watch_link(s);
 			watch_doubled(s);

@@ -8,8 +8,8 @@
 #include <string.h>
 
 #include "base/limits.h"
-#include "link/echo.h"
 #include "wire/datagram.h"
+#include "wire/echo.h"
 
 /*
  * Who may touch the slot's buffers in which state:

@@ -46,7 +46,7 @@ void line_bind(struct line *line);
 struct line *line_bound(void);
 
 /**
- * Send @frame and wait for its echo (link/echo.h: every command, index, address and length the
+ * Send @frame and wait for its echo (wire/echo.h: every command, index, address and length the
  * same). Returns the answer's length, -ETIMEDOUT, -EINVAL for bytes that are no EtherCAT frame, or
  * -errno of the transport. Other frames are thrown away and counted. While riding, @timeout is 100
  * ms at least.

@@ -275,7 +275,7 @@ void virtual_master_init(struct virtual_master *vm, struct virtual_bench *bench,
 			   .cycle_has_ended = has_cycle_ended,
 			   .wait = let_pass,
 			   .ctx = vm },
-		.segment = HOME_SIMULATED,
+		.segment = RUN_DIR_SIMULATED,
 	};
 
 	memset(vm, 0, sizeof(*vm));

@@ -93,7 +93,7 @@ static void bench_open(struct bench *b)
 			   .wait = let_pass,
 			   .warn = warn,
 			   .ctx = b },
-		.segment = HOME_SIMULATED,
+		.segment = RUN_DIR_SIMULATED,
 	};
 
 	memset(b, 0, sizeof(*b));

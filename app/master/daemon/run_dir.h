@@ -4,8 +4,8 @@
  * and the remote command board in it. It lives as long as the program; sessions on the bus come and
  * go inside it.
  */
-#ifndef DAEMON_HOME_H
-#define DAEMON_HOME_H
+#ifndef DAEMON_RUN_DIR_H
+#define DAEMON_RUN_DIR_H
 
 #include <stddef.h>
 #include <sys/types.h>
@@ -17,7 +17,7 @@
 #include "config/config.h"
 #include "daemon/failure.h"
 
-struct home {
+struct run_dir {
 	char dir[CONFIG_PATH_BYTES];
 	gid_t group; /* (gid_t)-1: leave */
 	int lock;    /* descriptor that holds the lock; -1: none */
@@ -28,27 +28,27 @@ struct home {
 	int remote_fd;        /* the same, to be given to it; -1: none */
 };
 
-enum home_segment { HOME_REAL, HOME_SIMULATED };
+enum run_dir_segment { RUN_DIR_REAL, RUN_DIR_SIMULATED };
 
 /**
  * Make all of it. 0 or -errno with @failure: no permission, another instance, tmpfs full, no such
- * group. Close with home_close(), also after a failure. Context: blocking.
+ * group. Close with run_dir_close(), also after a failure. Context: blocking.
  */
-int home_open(struct home *home, const struct config *cfg, const struct platform *platform,
-	      enum home_segment segment, struct failure *failure);
+int run_dir_open(struct run_dir *run, const struct config *cfg, const struct platform *platform,
+		 enum run_dir_segment segment, struct failure *failure);
 /** The files stay for readers; the lock goes. */
-void home_close(struct home *home);
+void run_dir_close(struct run_dir *run);
 
 /** The path of @file inside. 0 or -ENAMETOOLONG. */
-int home_path(const struct home *home, const char *file, char *ret_path, size_t path_bytes);
+int run_dir_path(const struct run_dir *run, const char *file, char *ret_path, size_t path_bytes);
 
 /** The page's message; "" for none. Context: service thread. */
-void home_say(struct home *home, const char *text);
+void run_dir_set_message(struct run_dir *run, const char *text);
 
 /**
  * Claim the NIC @name in this network namespace, so that two masters never share it. A descriptor
  * to close at the end, or -errno with @failure. Context: blocking.
  */
-int home_claim_interface(const char *name, struct failure *failure);
+int run_dir_claim_interface(const char *name, struct failure *failure);
 
 #endif

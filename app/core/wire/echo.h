@@ -5,8 +5,8 @@
  * set bit 0x02 in the first octet of the source address; all else comes back as it went. Context:
  * any, RT-safe.
  */
-#ifndef LINK_ECHO_H
-#define LINK_ECHO_H
+#ifndef WIRE_ECHO_H
+#define WIRE_ECHO_H
 
 #include <stddef.h>
 #include <stdint.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "daemon/home.h"
+#include "daemon/run_dir.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -18,7 +18,7 @@ struct bench {
 
 static void bench_open(struct bench *b, const char *parent)
 {
-	snprintf(b->root, sizeof(b->root), "%s/ecdaqd-home-XXXXXX", parent);
+	snprintf(b->root, sizeof(b->root), "%s/ecdaqd-run-XXXXXX", parent);
 	CHECK(mkdtemp(b->root) != NULL);
 	config_defaults(&b->cfg);
 	snprintf(b->cfg.run_dir, sizeof(b->cfg.run_dir), "%s/run", b->root);
@@ -39,26 +39,26 @@ static void bench_close(const struct bench *b)
 	CHECK_EQ(nftw(b->root, forget, 8, FTW_DEPTH | FTW_PHYS), 0);
 }
 
-static int open_home(struct bench *b, struct home *home, struct failure *failure)
+static int open_home(struct bench *b, struct run_dir *run, struct failure *failure)
 {
-	return home_open(home, &b->cfg, &b->platform, HOME_REAL, failure);
+	return run_dir_open(run, &b->cfg, &b->platform, RUN_DIR_REAL, failure);
 }
 
-TEST(daemon_home, it_makes_a_directory_for_owner_and_group_with_page_and_ring)
+TEST(run_dir, it_makes_a_directory_for_owner_and_group_with_page_and_ring)
 {
 	static struct bench b;
-	struct home home;
+	struct run_dir run;
 	struct failure failure;
 	struct stat st;
 	char path[512];
 	const struct status_page *page;
 
 	bench_open(&b, "/dev/shm");
-	CHECK_EQ(open_home(&b, &home, &failure), 0);
+	CHECK_EQ(open_home(&b, &run, &failure), 0);
 	CHECK_EQ(stat(b.cfg.run_dir, &st), 0);
 	CHECK_EQ(st.st_mode & 07777, 0750);
-	CHECK_EQ(home.is_tmpfs, 1);
-	CHECK_EQ(home_path(&home, CONFIG_RUN_STATUS, path, sizeof(path)), 0);
+	CHECK_EQ(run.is_tmpfs, 1);
+	CHECK_EQ(run_dir_path(&run, CONFIG_RUN_STATUS, path, sizeof(path)), 0);
 	CHECK_EQ(stat(path, &st), 0);
 	CHECK_EQ(st.st_mode & 07777, 0640);
 	page = status_open(path, STATUS_MAGIC, sizeof(*page));
@@ -67,39 +67,39 @@ TEST(daemon_home, it_makes_a_directory_for_owner_and_group_with_page_and_ring)
 	CHECK_STR(page->interface, "eth9");
 	CHECK_EQ(page->bus_state, BUS_DOWN);
 	status_unmap(page, sizeof(*page));
-	CHECK_EQ(home_path(&home, CONFIG_RUN_EVENTS, path, sizeof(path)), 0);
+	CHECK_EQ(run_dir_path(&run, CONFIG_RUN_EVENTS, path, sizeof(path)), 0);
 	CHECK_EQ(access(path, R_OK), 0);
-	home_close(&home);
+	run_dir_close(&run);
 	bench_close(&b);
 }
 
-TEST(daemon_home, a_second_instance_is_refused_and_leaves_the_first_one_s_page_alone)
+TEST(run_dir, a_second_instance_is_refused_and_leaves_the_first_one_s_page_alone)
 {
 	static struct bench b;
-	struct home first;
-	struct home second;
+	struct run_dir first;
+	struct run_dir second;
 	struct failure failure;
 	char wanted[32];
 
 	bench_open(&b, "/dev/shm");
 	CHECK_EQ(open_home(&b, &first, &failure), 0);
-	home_say(&first, "the first");
+	run_dir_set_message(&first, "the first");
 	CHECK_EQ(open_home(&b, &second, &failure), -EBUSY);
 	CHECK_EQ(failure.code, EXIT_CODE_BUSY);
 	snprintf(wanted, sizeof(wanted), "running here (pid %d)", getpid());
 	CHECK(strstr(failure.text, wanted) != NULL);
-	home_close(&second);
+	run_dir_close(&second);
 	CHECK_STR(first.page->message, "the first");
-	home_close(&first);
+	run_dir_close(&first);
 	CHECK_EQ(open_home(&b, &second, &failure), 0); /* the lock went with the first */
-	home_close(&second);
+	run_dir_close(&second);
 	bench_close(&b);
 }
 
-TEST(daemon_home, who_is_of_the_group_may_add_files_and_take_away_only_his_own)
+TEST(run_dir, who_is_of_the_group_may_add_files_and_take_away_only_his_own)
 {
 	static struct bench b;
-	struct home home;
+	struct run_dir run;
 	struct failure failure;
 	struct stat st;
 	struct group *group = getgrgid(getegid());
@@ -107,33 +107,33 @@ TEST(daemon_home, who_is_of_the_group_may_add_files_and_take_away_only_his_own)
 	CHECK(group != NULL);
 	bench_open(&b, "/dev/shm");
 	snprintf(b.cfg.group, sizeof(b.cfg.group), "%s", group->gr_name);
-	CHECK_EQ(open_home(&b, &home, &failure), 0);
+	CHECK_EQ(open_home(&b, &run, &failure), 0);
 	CHECK_EQ(stat(b.cfg.run_dir, &st), 0);
 	CHECK_EQ(st.st_mode & 07777, 03770);
 	CHECK_EQ(st.st_gid, getegid());
-	home_close(&home);
+	run_dir_close(&run);
 	bench_close(&b);
 }
 
-TEST(daemon_home, a_group_that_is_not_there_is_an_error_of_the_configuration)
+TEST(run_dir, a_group_that_is_not_there_is_an_error_of_the_configuration)
 {
 	static struct bench b;
-	struct home home;
+	struct run_dir run;
 	struct failure failure;
 
 	bench_open(&b, "/dev/shm");
 	snprintf(b.cfg.group, sizeof(b.cfg.group), "no-such-group-9");
-	CHECK_EQ(open_home(&b, &home, &failure), -ENOENT);
+	CHECK_EQ(open_home(&b, &run, &failure), -ENOENT);
 	CHECK_EQ(failure.code, EXIT_CODE_CONFIG);
 	CHECK_STR(failure.text, "runtime.group: no group is named no-such-group-9");
-	home_close(&home);
+	run_dir_close(&run);
 	bench_close(&b);
 }
 
-TEST(daemon_home, files_belong_to_the_configured_group)
+TEST(run_dir, files_belong_to_the_configured_group)
 {
 	static struct bench b;
-	struct home home;
+	struct run_dir run;
 	struct failure failure;
 	struct stat st;
 	char path[512];
@@ -143,21 +143,21 @@ TEST(daemon_home, files_belong_to_the_configured_group)
 	}
 	bench_open(&b, "/dev/shm");
 	snprintf(b.cfg.group, sizeof(b.cfg.group), "daemon");
-	CHECK_EQ(open_home(&b, &home, &failure), 0);
-	CHECK(home.group != (gid_t)-1 && home.group != 0);
+	CHECK_EQ(open_home(&b, &run, &failure), 0);
+	CHECK(run.group != (gid_t)-1 && run.group != 0);
 	CHECK_EQ(stat(b.cfg.run_dir, &st), 0);
-	CHECK_EQ(st.st_gid, home.group);
-	CHECK_EQ(home_path(&home, CONFIG_RUN_STATUS, path, sizeof(path)), 0);
+	CHECK_EQ(st.st_gid, run.group);
+	CHECK_EQ(run_dir_path(&run, CONFIG_RUN_STATUS, path, sizeof(path)), 0);
 	CHECK_EQ(stat(path, &st), 0);
-	CHECK_EQ(st.st_gid, home.group);
-	home_close(&home);
+	CHECK_EQ(st.st_gid, run.group);
+	run_dir_close(&run);
 	bench_close(&b);
 }
 
-TEST(daemon_home, a_directory_of_another_user_is_not_trusted)
+TEST(run_dir, a_directory_of_another_user_is_not_trusted)
 {
 	static struct bench b;
-	struct home home;
+	struct run_dir run;
 	struct failure failure;
 
 	if (geteuid() != 0) {
@@ -166,67 +166,67 @@ TEST(daemon_home, a_directory_of_another_user_is_not_trusted)
 	bench_open(&b, "/dev/shm");
 	CHECK_EQ(mkdir(b.cfg.run_dir, 0777), 0);
 	CHECK_EQ(chown(b.cfg.run_dir, 12345, 12345), 0);
-	CHECK_EQ(open_home(&b, &home, &failure), -EPERM);
+	CHECK_EQ(open_home(&b, &run, &failure), -EPERM);
 	CHECK_EQ(failure.code, EXIT_CODE_PERMISSION);
 	CHECK(strstr(failure.text, "belongs to user 12345") != NULL);
-	home_close(&home);
+	run_dir_close(&run);
 	bench_close(&b);
 }
 
-TEST(daemon_home, a_path_that_cannot_be_made_is_named)
+TEST(run_dir, a_path_that_cannot_be_made_is_named)
 {
 	static struct bench b;
-	struct home home;
+	struct run_dir run;
 	struct failure failure;
 	char path[512];
 	int fd;
 
 	bench_open(&b, "/dev/shm");
 	snprintf(b.cfg.run_dir, sizeof(b.cfg.run_dir), "%s/not/there", b.root);
-	CHECK_EQ(open_home(&b, &home, &failure), -ENOENT);
+	CHECK_EQ(open_home(&b, &run, &failure), -ENOENT);
 	CHECK_EQ(failure.code, EXIT_CODE_CONFIG);
 	CHECK(strstr(failure.text, "/not/there") != NULL);
-	home_close(&home);
+	run_dir_close(&run);
 	snprintf(path, sizeof(path), "%s/file", b.root);
 	fd = open(path, O_CREAT | O_WRONLY, 0600);
 	CHECK(fd >= 0);
 	close(fd);
 	snprintf(b.cfg.run_dir, sizeof(b.cfg.run_dir), "%s/file", b.root);
-	CHECK_EQ(open_home(&b, &home, &failure), -ENOTDIR);
-	home_close(&home);
+	CHECK_EQ(open_home(&b, &run, &failure), -ENOTDIR);
+	run_dir_close(&run);
 	bench_close(&b);
 }
 
-TEST(daemon_home, a_directory_that_is_not_in_memory_is_noticed)
+TEST(run_dir, a_directory_that_is_not_in_memory_is_noticed)
 {
 	static struct bench b;
-	struct home home;
+	struct run_dir run;
 	struct failure failure;
 
 	bench_open(&b, "/var/tmp");
-	CHECK_EQ(open_home(&b, &home, &failure), 0);
-	if (home.is_tmpfs) {
+	CHECK_EQ(open_home(&b, &run, &failure), 0);
+	if (run.is_tmpfs) {
 		SKIP("/var/tmp is a tmpfs here");
 	}
-	home_close(&home);
+	run_dir_close(&run);
 	bench_close(&b);
 }
 
-TEST(daemon_home, an_interface_is_claimed_once)
+TEST(run_dir, an_interface_is_claimed_once)
 {
 	struct failure failure;
-	int first = home_claim_interface("test-nic-0", &failure);
+	int first = run_dir_claim_interface("test-nic-0", &failure);
 	int other;
 
 	CHECK(first >= 0);
-	CHECK_EQ(home_claim_interface("test-nic-0", &failure), -EBUSY);
+	CHECK_EQ(run_dir_claim_interface("test-nic-0", &failure), -EBUSY);
 	CHECK_EQ(failure.code, EXIT_CODE_BUSY);
 	CHECK_STR(failure.text, "test-nic-0: another ecdaqd is running on this interface");
-	other = home_claim_interface("test-nic-1", &failure);
+	other = run_dir_claim_interface("test-nic-1", &failure);
 	CHECK(other >= 0);
 	close(other);
 	close(first);
-	first = home_claim_interface("test-nic-0", &failure);
+	first = run_dir_claim_interface("test-nic-0", &failure);
 	CHECK(first >= 0);
 	close(first);
 }

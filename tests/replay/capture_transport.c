@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* The other half of link/replay.h: note what passes, write it as pcapng at the end. */
+#include "capture_transport.h"
+
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "link/replay.h"
 #include "wire/pcapng.h"
 
 struct capture {
@@ -57,7 +57,7 @@ static int capture_is_up(void *ctx)
 	return cap->inner.is_up != NULL ? cap->inner.is_up(cap->inner.ctx) : 1;
 }
 
-/* destroy() has nobody to tell: a file that cannot be written is not there. */
+/* destroy() returns nothing: a file that cannot be written is removed. */
 static void write_out(const struct capture *cap)
 {
 	FILE *file = fopen(cap->path, "wb");

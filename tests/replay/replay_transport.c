@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "link/replay.h"
+#include "replay_transport.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -8,8 +8,8 @@
 
 #include "base/bytes.h"
 #include "base/limits.h"
-#include "link/echo.h"
 #include "wire/datagram.h"
+#include "wire/echo.h"
 #include "wire/pcapng.h"
 
 enum { SOURCE = 6, SOURCE_BYTES = 6, PASSED_A_SLAVE = 0x02, QUEUE = 16, TROUBLE_BYTES = 160 };

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "link/echo.h"
+#include "wire/echo.h"
 
 #include "base/bytes.h"
 #include "wire/datagram.h"

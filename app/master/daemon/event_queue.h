@@ -4,8 +4,8 @@
  * thread while it runs; so the service thread posts here and the cycle thread collects before it
  * sleeps. One producer, one consumer; a full queue drops the newest and counts it.
  */
-#ifndef DAEMON_POST_H
-#define DAEMON_POST_H
+#ifndef DAEMON_EVENT_QUEUE_H
+#define DAEMON_EVENT_QUEUE_H
 
 #include <stdatomic.h>
 #include <stdint.h>
@@ -13,20 +13,21 @@
 #include "base/event.h"
 #include "base/ring.h"
 
-enum { POST_CAPACITY = 1024 };
+enum { EVENT_QUEUE_CAPACITY = 1024 };
 
-struct post {
+struct event_queue {
 	_Alignas(64) _Atomic uint32_t head; /* [service] next slot to fill */
 	uint64_t dropped;                   /* [service] */
 	_Alignas(64) _Atomic uint32_t tail; /* [cycle] next slot to take */
-	_Alignas(64) struct event slot[POST_CAPACITY];
+	_Alignas(64) struct event slot[EVENT_QUEUE_CAPACITY];
 };
 
-static_assert((POST_CAPACITY & (POST_CAPACITY - 1)) == 0, "index wrap needs a power of two");
+static_assert((EVENT_QUEUE_CAPACITY & (EVENT_QUEUE_CAPACITY - 1)) == 0,
+	      "index wrap needs a power of two");
 
 /** Context: service thread. 0, or -EAGAIN if it was full. */
-int post_push(struct post *post, const struct event *ev);
+int event_queue_push(struct event_queue *queue, const struct event *ev);
 /** Put what waits onto @events, of which the caller is the producer. RT-safe. */
-void post_collect(struct post *post, struct ring *events);
+void event_queue_collect(struct event_queue *queue, struct ring *events);
 
 #endif

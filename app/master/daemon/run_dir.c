@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "daemon/home.h"
+#include "daemon/run_dir.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -19,9 +19,9 @@
 
 enum { DIR_MODE = 0750, SHARED_MODE = 03770, FILE_MODE = 0640, GROUP_BYTES = 4096 };
 
-int home_path(const struct home *home, const char *file, char *ret_path, size_t path_bytes)
+int run_dir_path(const struct run_dir *run, const char *file, char *ret_path, size_t path_bytes)
 {
-	int len = snprintf(ret_path, path_bytes, "%s/%s", home->dir, file);
+	int len = snprintf(ret_path, path_bytes, "%s/%s", run->dir, file);
 
 	return len < 0 || (size_t)len >= path_bytes ? -ENAMETOOLONG : 0;
 }
@@ -53,13 +53,13 @@ static int fail(struct failure *failure, const char *what, int err)
 			   err == ENOSPC ? " (a smaller ring.depth needs less)" : "");
 }
 
-static int find_group(struct home *home, const char *name, struct failure *failure)
+static int find_group(struct run_dir *run, const char *name, struct failure *failure)
 {
 	struct group entry;
 	struct group *found = NULL;
 	char buf[GROUP_BYTES];
 
-	home->group = (gid_t)-1;
+	run->group = (gid_t)-1;
 	if (name[0] == '\0') {
 		return 0;
 	}
@@ -68,102 +68,102 @@ static int find_group(struct home *home, const char *name, struct failure *failu
 		return failure_set(failure, EXIT_CODE_CONFIG, -ENOENT,
 				   "runtime.group: no group is named %s", name);
 	}
-	home->group = found->gr_gid;
+	run->group = found->gr_gid;
 	return 0;
 }
 
 /* The recorder and the publisher, other users of the group, lay pages of their own beside ours: the
  * group may make files. Each belongs to the group (set-group-ID), and only its maker takes it away
  * (sticky). */
-static int hand_to_group(const struct home *home, struct failure *failure)
+static int hand_to_group(const struct run_dir *run, struct failure *failure)
 {
-	if (home->group == (gid_t)-1) {
+	if (run->group == (gid_t)-1) {
 		return 0;
 	}
-	if (chown(home->dir, (uid_t)-1, home->group) < 0 || chmod(home->dir, SHARED_MODE) < 0) {
-		return fail(failure, home->dir, errno);
+	if (chown(run->dir, (uid_t)-1, run->group) < 0 || chmod(run->dir, SHARED_MODE) < 0) {
+		return fail(failure, run->dir, errno);
 	}
 	return 0;
 }
 
-static int make_dir(struct home *home, struct failure *failure)
+static int make_dir(struct run_dir *run, struct failure *failure)
 {
 	struct stat st;
 	struct statfs fs;
 
-	if (mkdir(home->dir, DIR_MODE) == 0) {
+	if (mkdir(run->dir, DIR_MODE) == 0) {
 		/* Not what the umask leaves of it. */
-		if (chmod(home->dir, DIR_MODE) < 0) {
-			return fail(failure, home->dir, errno);
+		if (chmod(run->dir, DIR_MODE) < 0) {
+			return fail(failure, run->dir, errno);
 		}
 	} else if (errno != EEXIST) {
-		return fail(failure, home->dir, errno);
+		return fail(failure, run->dir, errno);
 	}
-	if (lstat(home->dir, &st) < 0 || statfs(home->dir, &fs) < 0) {
-		return fail(failure, home->dir, errno);
+	if (lstat(run->dir, &st) < 0 || statfs(run->dir, &fs) < 0) {
+		return fail(failure, run->dir, errno);
 	}
 	if (!S_ISDIR(st.st_mode)) {
-		return fail(failure, home->dir, ENOTDIR);
+		return fail(failure, run->dir, ENOTDIR);
 	}
 	/* In a directory of somebody else, our files could be swapped under us (/dev/shm is open to
 	 * all). */
 	if (st.st_uid != geteuid() && st.st_uid != 0) {
 		return failure_set(failure, EXIT_CODE_PERMISSION, -EPERM,
-				   "%s: belongs to user %u, not to this one", home->dir, st.st_uid);
+				   "%s: belongs to user %u, not to this one", run->dir, st.st_uid);
 	}
-	home->is_tmpfs = fs.f_type == TMPFS_MAGIC || fs.f_type == RAMFS_MAGIC;
-	return hand_to_group(home, failure);
+	run->is_tmpfs = fs.f_type == TMPFS_MAGIC || fs.f_type == RAMFS_MAGIC;
+	return hand_to_group(run, failure);
 }
 
-static int busy(const struct home *home, struct failure *failure)
+static int busy(const struct run_dir *run, struct failure *failure)
 {
 	char pid[24] = "";
-	ssize_t len = pread(home->lock, pid, sizeof(pid) - 1, 0);
+	ssize_t len = pread(run->lock, pid, sizeof(pid) - 1, 0);
 
 	pid[len > 0 ? strcspn(pid, "\n") : 0] = '\0';
 	return failure_set(failure, EXIT_CODE_BUSY, -EBUSY,
-			   "%s: another ecdaqd is running here%s%s%s", home->dir,
+			   "%s: another ecdaqd is running here%s%s%s", run->dir,
 			   pid[0] != '\0' ? " (pid " : "", pid, pid[0] != '\0' ? ")" : "");
 }
 
-static int lock_dir(struct home *home, struct failure *failure)
+static int lock_dir(struct run_dir *run, struct failure *failure)
 {
 	char path[CONFIG_PATH_BYTES + 16];
 	char pid[24];
 	int len;
 
-	if (home_path(home, "lock", path, sizeof(path)) < 0) {
-		return fail(failure, home->dir, ENAMETOOLONG);
+	if (run_dir_path(run, "lock", path, sizeof(path)) < 0) {
+		return fail(failure, run->dir, ENAMETOOLONG);
 	}
-	home->lock = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, FILE_MODE);
-	if (home->lock < 0) {
+	run->lock = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, FILE_MODE);
+	if (run->lock < 0) {
 		return fail(failure, path, errno);
 	}
-	if (flock(home->lock, LOCK_EX | LOCK_NB) < 0) {
-		return errno == EWOULDBLOCK ? busy(home, failure) : fail(failure, path, errno);
+	if (flock(run->lock, LOCK_EX | LOCK_NB) < 0) {
+		return errno == EWOULDBLOCK ? busy(run, failure) : fail(failure, path, errno);
 	}
 	len = snprintf(pid, sizeof(pid), "%d\n", (int)getpid());
-	if (ftruncate(home->lock, 0) < 0 || pwrite(home->lock, pid, (size_t)len, 0) != len) {
+	if (ftruncate(run->lock, 0) < 0 || pwrite(run->lock, pid, (size_t)len, 0) != len) {
 		return fail(failure, path, errno);
 	}
 	return 0;
 }
 
-static int make_page(struct home *home, const struct config *cfg, const struct platform *platform,
-		     enum home_segment segment, struct failure *failure)
+static int make_page(struct run_dir *run, const struct config *cfg, const struct platform *platform,
+		     enum run_dir_segment segment, struct failure *failure)
 {
 	char path[CONFIG_PATH_BYTES + 16];
 	struct status_page *page;
 
-	if (home_path(home, CONFIG_RUN_STATUS, path, sizeof(path)) < 0) {
-		return fail(failure, home->dir, ENAMETOOLONG);
+	if (run_dir_path(run, CONFIG_RUN_STATUS, path, sizeof(path)) < 0) {
+		return fail(failure, run->dir, ENAMETOOLONG);
 	}
 	page = status_create(path, STATUS_MAGIC, sizeof(*page), FILE_MODE);
 	if (page == NULL) {
 		return fail(failure, path, errno);
 	}
-	home->page = page;
-	page->is_simulated = segment == HOME_SIMULATED;
+	run->page = page;
+	page->is_simulated = segment == RUN_DIR_SIMULATED;
 	page->pid = getpid();
 	page->start_tai_ns = platform->tai_ns(platform->ctx);
 	page->period_ns = (uint64_t)cfg->cycle_period_ns;
@@ -175,13 +175,13 @@ static int make_page(struct home *home, const struct config *cfg, const struct p
 	return 0;
 }
 
-static int make_events(struct home *home, const struct config *cfg, struct failure *failure)
+static int make_events(struct run_dir *run, const struct config *cfg, struct failure *failure)
 {
 	char path[CONFIG_PATH_BYTES + 16];
 	int r;
 
-	if (home_path(home, CONFIG_RUN_EVENTS, path, sizeof(path)) < 0) {
-		return fail(failure, home->dir, ENAMETOOLONG);
+	if (run_dir_path(run, CONFIG_RUN_EVENTS, path, sizeof(path)) < 0) {
+		return fail(failure, run->dir, ENAMETOOLONG);
 	}
 	r = ring_create(&(struct ring_spec){ .path = path,
 					     .kind = "event",
@@ -191,82 +191,82 @@ static int make_events(struct home *home, const struct config *cfg, struct failu
 					     .meta_bytes = 0,
 					     .period_ns = 0,
 					     .file_mode = FILE_MODE },
-			&home->events);
+			&run->events);
 	return r < 0 ? fail(failure, path, -r) : 0;
 }
 
-static int make_remote(struct home *home, struct failure *failure)
+static int make_remote(struct run_dir *run, struct failure *failure)
 {
-	home->remote = board_create_shared(&home->remote_fd);
-	return home->remote == NULL ? fail(failure, "remote command board", errno) : 0;
+	run->remote = board_create_shared(&run->remote_fd);
+	return run->remote == NULL ? fail(failure, "remote command board", errno) : 0;
 }
 
-int home_open(struct home *home, const struct config *cfg, const struct platform *platform,
-	      enum home_segment segment, struct failure *failure)
+int run_dir_open(struct run_dir *run, const struct config *cfg, const struct platform *platform,
+		 enum run_dir_segment segment, struct failure *failure)
 {
 	int r;
 
-	memset(home, 0, sizeof(*home));
-	home->lock = -1;
-	home->remote_fd = -1;
-	if (config_run_path(cfg, "", home->dir, sizeof(home->dir)) < 0) {
+	memset(run, 0, sizeof(*run));
+	run->lock = -1;
+	run->remote_fd = -1;
+	if (config_run_path(cfg, "", run->dir, sizeof(run->dir)) < 0) {
 		return failure_set(failure, EXIT_CODE_CONFIG, -ENAMETOOLONG,
 				   "runtime.run_dir: the path is too long");
 	}
-	for (size_t len = strlen(home->dir); len > 1 && home->dir[len - 1] == '/'; len--) {
-		home->dir[len - 1] = '\0';
+	for (size_t len = strlen(run->dir); len > 1 && run->dir[len - 1] == '/'; len--) {
+		run->dir[len - 1] = '\0';
 	}
-	r = find_group(home, cfg->group, failure);
+	r = find_group(run, cfg->group, failure);
 	if (r == 0) {
-		r = make_dir(home, failure);
-	}
-	if (r == 0) {
-		r = lock_dir(home, failure);
+		r = make_dir(run, failure);
 	}
 	if (r == 0) {
-		r = make_page(home, cfg, platform, segment, failure);
+		r = lock_dir(run, failure);
 	}
 	if (r == 0) {
-		r = make_events(home, cfg, failure);
+		r = make_page(run, cfg, platform, segment, failure);
 	}
 	if (r == 0) {
-		r = make_remote(home, failure);
+		r = make_events(run, cfg, failure);
+	}
+	if (r == 0) {
+		r = make_remote(run, failure);
 	}
 	return r;
 }
 
-void home_close(struct home *home)
+void run_dir_close(struct run_dir *run)
 {
-	if (home->events != NULL) {
-		ring_close(home->events);
-		ring_destroy(home->events);
-		home->events = NULL;
+	if (run->events != NULL) {
+		ring_close(run->events);
+		ring_destroy(run->events);
+		run->events = NULL;
 	}
-	if (home->remote != NULL) {
-		board_unmap(home->remote);
-		home->remote = NULL;
+	if (run->remote != NULL) {
+		board_unmap(run->remote);
+		run->remote = NULL;
 	}
-	if (home->remote_fd >= 0) {
-		close(home->remote_fd);
-		home->remote_fd = -1;
+	if (run->remote_fd >= 0) {
+		close(run->remote_fd);
+		run->remote_fd = -1;
 	}
-	if (home->page != NULL) {
-		status_unmap(home->page, sizeof(*home->page));
-		home->page = NULL;
+	if (run->page != NULL) {
+		status_unmap(run->page, sizeof(*run->page));
+		run->page = NULL;
 	}
-	if (home->lock >= 0) {
-		close(home->lock);
-		home->lock = -1;
+	if (run->lock >= 0) {
+		close(run->lock);
+		run->lock = -1;
 	}
 }
 
-void home_say(struct home *home, const char *text)
+void run_dir_set_message(struct run_dir *run, const char *text)
 {
-	status_text_set(&home->page->text_sequence, home->page->message,
-			sizeof(home->page->message), text);
+	status_text_set(&run->page->text_sequence, run->page->message, sizeof(run->page->message),
+			text);
 }
 
-int home_claim_interface(const char *name, struct failure *failure)
+int run_dir_claim_interface(const char *name, struct failure *failure)
 {
 	/* The abstract socket namespace belongs to the network namespace, as the names of NICs do.
 	 */

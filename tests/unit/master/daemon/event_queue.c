@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "daemon/post.h"
+#include "daemon/event_queue.h"
 
 #include <errno.h>
 #include <pthread.h>
@@ -17,14 +17,14 @@ static struct ring *make_events(char *path, size_t path_bytes, unsigned depth)
 				  .slot_count = depth,
 				  .file_mode = 0600 };
 
-	snprintf(path, path_bytes, "/dev/shm/ecdaqd-post-%d", getpid());
+	snprintf(path, path_bytes, "/dev/shm/ecdaqd-event-queue-%d", getpid());
 	CHECK_EQ(ring_create(&spec, &events), 0);
 	return events;
 }
 
-TEST(daemon_post, events_come_out_in_the_order_they_were_posted)
+TEST(daemon_event_queue, events_come_out_in_the_order_they_were_pushed)
 {
-	static struct post post;
+	static struct event_queue queue;
 	char path[64];
 	struct ring *events = make_events(path, sizeof(path), 64);
 	struct ring_reader *reader = NULL;
@@ -34,12 +34,12 @@ TEST(daemon_post, events_come_out_in_the_order_they_were_posted)
 	CHECK_EQ(ring_reader_open(path, &reader), 0);
 	for (int i = 0; i < 10; i++) {
 		ev.value = i;
-		CHECK_EQ(post_push(&post, &ev), 0);
+		CHECK_EQ(event_queue_push(&queue, &ev), 0);
 	}
 	CHECK_EQ(ring_pushed(events), 0);
-	post_collect(&post, events);
+	event_queue_collect(&queue, events);
 	CHECK_EQ(ring_pushed(events), 10);
-	post_collect(&post, events);
+	event_queue_collect(&queue, events);
 	CHECK_EQ(ring_pushed(events), 10);
 	ring_seek(reader, 0);
 	for (int i = 0; i < 10; i++) {
@@ -51,21 +51,21 @@ TEST(daemon_post, events_come_out_in_the_order_they_were_posted)
 	unlink(path);
 }
 
-TEST(daemon_post, a_full_queue_drops_the_newest_and_counts_it)
+TEST(daemon_event_queue, a_full_queue_drops_the_newest_and_counts_it)
 {
-	static struct post post;
+	static struct event_queue queue;
 	char path[64];
-	struct ring *events = make_events(path, sizeof(path), 2 * POST_CAPACITY);
+	struct ring *events = make_events(path, sizeof(path), 2 * EVENT_QUEUE_CAPACITY);
 	struct event ev = { .id = EVENT_SLAVE_LOST };
 
-	for (int i = 0; i < POST_CAPACITY; i++) {
-		CHECK_EQ(post_push(&post, &ev), 0);
+	for (int i = 0; i < EVENT_QUEUE_CAPACITY; i++) {
+		CHECK_EQ(event_queue_push(&queue, &ev), 0);
 	}
-	CHECK_EQ(post_push(&post, &ev), -EAGAIN);
-	CHECK_EQ(post.dropped, 1);
-	post_collect(&post, events);
-	CHECK_EQ(ring_pushed(events), POST_CAPACITY);
-	CHECK_EQ(post_push(&post, &ev), 0);
+	CHECK_EQ(event_queue_push(&queue, &ev), -EAGAIN);
+	CHECK_EQ(queue.dropped, 1);
+	event_queue_collect(&queue, events);
+	CHECK_EQ(ring_pushed(events), EVENT_QUEUE_CAPACITY);
+	CHECK_EQ(event_queue_push(&queue, &ev), 0);
 	ring_destroy(events);
 	unlink(path);
 }
@@ -73,7 +73,7 @@ TEST(daemon_post, a_full_queue_drops_the_newest_and_counts_it)
 enum { HANDOVER_EVENTS = 200000 };
 
 struct handover {
-	struct post post;
+	struct event_queue queue;
 	struct ring *events;
 	_Atomic int is_done;
 };
@@ -83,13 +83,13 @@ static void *collect(void *arg)
 	struct handover *h = arg;
 
 	while (!atomic_load(&h->is_done)) {
-		post_collect(&h->post, h->events);
+		event_queue_collect(&h->queue, h->events);
 	}
-	post_collect(&h->post, h->events);
+	event_queue_collect(&h->queue, h->events);
 	return NULL;
 }
 
-TEST(daemon_post, two_threads_hand_over_every_event)
+TEST(daemon_event_queue, two_threads_hand_over_every_event)
 {
 	static struct handover h;
 	char path[64];
@@ -100,7 +100,7 @@ TEST(daemon_post, two_threads_hand_over_every_event)
 	h.events = make_events(path, sizeof(path), 64);
 	CHECK_EQ(pthread_create(&thread, NULL, collect, &h), 0);
 	while (posted < HANDOVER_EVENTS) {
-		posted += post_push(&h.post, &ev) == 0;
+		posted += event_queue_push(&h.queue, &ev) == 0;
 	}
 	atomic_store(&h.is_done, 1);
 	pthread_join(thread, NULL);

@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Captures (pcapng) as a wire. Replay: what the master sends must be, byte for byte, what was sent
- * when the capture was made; the answers come from the capture, on a virtual clock. Capture: a
- * transport that notes what passes through another one.
+ * A capture (pcapng) as a transport: what the master sends must be, byte for byte, what was sent
+ * when the capture was made; the answers come from the capture, on a virtual clock.
  */
-#ifndef LINK_REPLAY_H
-#define LINK_REPLAY_H
+#ifndef TESTS_REPLAY_REPLAY_TRANSPORT_H
+#define TESTS_REPLAY_REPLAY_TRANSPORT_H
 
 #include <stddef.h>
 #include <stdint.h>
@@ -40,13 +39,5 @@ size_t replay_frames(const struct replay *rp);
 size_t replay_matched(const struct replay *rp);
 /** One line about the first frame that differed; "" for none. */
 const char *replay_trouble(const struct replay *rp);
-
-/**
- * Wrap @inner (taken over): frames go through it and are noted in @limit_bytes of memory, allocated
- * here; the file is written when the transport is destroyed. When the memory is full, noting stops.
- * RT-safe but for destroy.
- */
-int capture_create(const char *path, size_t limit_bytes, struct platform platform,
-		   struct transport inner, struct transport *ret_transport);
 
 #endif

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-#include "link/replay.h"
+#include "replay_transport.h"
 
 #include <unistd.h>
 
+#include "capture_transport.h"
 #include "harness/test.h"
 #include "link/line.h"
 #include "unit/master/link/fake_wire.h"
