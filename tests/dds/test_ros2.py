@@ -11,7 +11,7 @@ from bench import ROOT, Bench, live
 from cyclonedds.idl import IdlStruct, types
 from cyclonedds.idl.annotations import final
 
-PUBLISH = ROOT / "app" / "publish"
+PUBLISH = ROOT / "app" / "services" / "publish"
 # rosidl's names of the types of IDL.
 ROS = {
     "boolean": "bool", "double": "float64", "unsigned short": "uint16",

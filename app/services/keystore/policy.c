@@ -8,6 +8,8 @@
 #include <string.h>
 #include <time.h>
 
+#include "keystore/dds_topics.h"
+
 enum { TIME_BYTES = 32 };
 
 /* Highest domain of Cyclone DDS with its standard ports. */
@@ -65,11 +67,20 @@ size_t policy_governance(char *ret_text)
 	return text.len;
 }
 
-static void add_topics(struct text *text, const char *verb, const char *const *topics, size_t count)
+/* The topics with one of @access (enum topic_access). */
+static void add_topics(struct text *text, const char *verb, unsigned access)
 {
+#define TOPIC_ROW(member, topic, type, who, ...) { topic, TOPIC_##who },
+	static const struct {
+		const char *name;
+		enum topic_access access;
+	} topics[] = { DDS_TOPICS(TOPIC_ROW) };
+
 	add(text, "        <%s><topics>\n", verb);
-	for (size_t i = 0; i < count; i++) {
-		add(text, "          <topic>%s</topic>\n", topics[i]);
+	for (size_t i = 0; i < sizeof(topics) / sizeof(topics[0]); i++) {
+		if ((access & topics[i].access) != 0) {
+			add(text, "          <topic>%s</topic>\n", topics[i].name);
+		}
 	}
 	add(text, "        </topics></%s>\n", verb);
 }
@@ -85,12 +96,7 @@ static void format_time(int64_t unix_s, char *ret_text)
 
 size_t policy_permissions(const struct policy_grant *grant, char *ret_text)
 {
-	static const char *const published[] = { "ecdaq/sample", "ecdaq/block", "ecdaq/channels",
-						 "ecdaq/status", "ecdaq/event", "ecdaq/timemap",
-						 "ecdaq/sync0",  "ecdaq/idl",   "rt/ecdaq/sample",
-						 "ecdaq/reply" };
-	static const char *const commands[] = { "ecdaq/command" };
-	enum { PUBLISHED = sizeof(published) / sizeof(published[0]) };
+	const unsigned published = TOPIC_PUBLISHED | TOPIC_MIRROR;
 	struct text text = { .start = ret_text, .len = 0 };
 	char from[TIME_BYTES];
 	char until[TIME_BYTES];
@@ -109,15 +115,15 @@ size_t policy_permissions(const struct policy_grant *grant, char *ret_text)
 	    grant->name, grant->name, from, until);
 	switch (grant->role) {
 	case KEYSTORE_APPLIANCE:
-		add_topics(&text, "publish", published, PUBLISHED);
-		add_topics(&text, "subscribe", commands, 1);
+		add_topics(&text, "publish", published | TOPIC_REPLY);
+		add_topics(&text, "subscribe", TOPIC_COMMAND);
 		break;
 	case KEYSTORE_COMMANDER:
-		add_topics(&text, "publish", commands, 1);
-		add_topics(&text, "subscribe", published, PUBLISHED);
+		add_topics(&text, "publish", TOPIC_COMMAND);
+		add_topics(&text, "subscribe", published | TOPIC_REPLY);
 		break;
-	case KEYSTORE_SUBSCRIBER: /* all but the answers to commands */
-		add_topics(&text, "subscribe", published, PUBLISHED - 1);
+	case KEYSTORE_SUBSCRIBER:
+		add_topics(&text, "subscribe", published);
 		break;
 	}
 	add(&text, "      </allow_rule>\n"

@@ -143,10 +143,6 @@ int publisher_create(const struct config *cfg, struct publisher **ret_publisher,
 	if (said[0] != '\0') {
 		fprintf(stderr, "ecdaq-dds: %s\n", said);
 	}
-	if (p->topics.sync0 == 0) {
-		fprintf(stderr, "ecdaq-dds: dds.security: these keys are older than ecdaq/sync0, "
-				"which is not published: ecdaq security add-appliance\n");
-	}
 	*ret_publisher = p;
 	return 0;
 }

@@ -86,7 +86,7 @@ void sync0_step(struct sync0 *sync0, const struct topics *topics, const struct s
 		if (got == RING_EMPTY || got == RING_CLOSED) {
 			return;
 		}
-		if (got == RING_OK && topics->sync0 > 0) {
+		if (got == RING_OK) {
 			put(topics, samples, &result);
 		}
 	}

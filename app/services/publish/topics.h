@@ -7,24 +7,22 @@
 
 #include "config/config.h"
 #include "dds/dds.h"
+#include "keystore/dds_topics.h"
 
+#define TOPIC_MEMBER(member, ...) dds_entity_t member;
+
+/* A writer for each topic, a reader for the command. 0: not opened, writes to it are dropped. */
 struct topics {
 	dds_entity_t domain;
 	dds_entity_t participant;
-	dds_entity_t sample;
-	dds_entity_t block;
-	dds_entity_t channels;
-	dds_entity_t status;
-	dds_entity_t event;
-	dds_entity_t timemap;
-	dds_entity_t sync0; /* 0: keys of before this topic do not allow it */
-	dds_entity_t idl;
-	dds_entity_t command; /* the one reader */
-	dds_entity_t reply;
-	dds_entity_t ros2_sample; /* 0: there is no mirror */
+	DDS_TOPICS(TOPIC_MEMBER)
 };
 
-/** 0, or -EIO with one line in @error. Close with topics_close(), also after a failure. */
+/**
+ * Open all topics; a published one other than ecdaq/sample that the keys do not allow (keys older
+ * than the topic) is reported on stderr and left out. 0, or -EIO with one line in @error. Close
+ * with topics_close(), also after a failure.
+ */
 int topics_open(struct topics *topics, const struct config *cfg, const dds_listener_t *on_command,
 		char *error, size_t error_bytes);
 void topics_close(struct topics *topics);
