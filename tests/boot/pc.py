@@ -2,7 +2,7 @@
 """The program on the PC: reads samples for some seconds, then switches the LED on, off and on.
 
 pc.py INTERFACE DOMAIN SECONDS; one JSON object on standard output. The kit
-(app/services/publish/python) has to be on PYTHONPATH.
+(share/ecdaq/python of an installed ecdaq) must be on PYTHONPATH.
 """
 
 from __future__ import annotations

@@ -130,7 +130,7 @@ def gaps_of(path: Path) -> tuple[int, int]:
 
 def test_subscribers_on_the_host_miss_nothing_and_the_led_obeys(machine: Machine) -> None:
     assert machine.space is not None
-    kit = str(TOP / "app" / "publish" / "python")
+    kit = str(BIN.parent / "share" / "ecdaq" / "python")
     program = [sys.executable, Path(__file__).parent / "pc.py", "lan", DOMAIN, str(SECONDS)]
     c_program = [BUILD / "tests/dds/dds_subscriber", DOMAIN, "lan", str(SECONDS)]
     c_file = machine.folder / "c.csv"

@@ -14,7 +14,6 @@ from types import ModuleType
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
-KIT = ROOT / "app" / "publish" / "python"
 
 
 def load_segment() -> ModuleType:
@@ -32,6 +31,7 @@ def load_segment() -> ModuleType:
 
 live = load_segment()
 wait_for = live.wait_for
+KIT = live.BIN.parent / "share" / "ecdaq" / "python"  # installed: with the generated types
 BUILD = Path(os.environ.get("ECDAQ_BUILD", ROOT / "build" / "release"))
 
 DDS_SETTINGS = {

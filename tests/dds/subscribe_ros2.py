@@ -15,7 +15,7 @@ def main() -> None:
     interface, domain, count, out = sys.argv[1:]
     lines = []
     with ecdaq.connect(interface, domain=int(domain)) as link:
-        reader = link.reader("rt/ecdaq/sample", Sample)
+        reader = link.reader(Sample, topic="rt/ecdaq/sample")
         link.channels()
         end = time.monotonic() + 60
         while len(lines) < int(count) and time.monotonic() < end:

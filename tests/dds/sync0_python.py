@@ -21,7 +21,7 @@ def main() -> None:
     newest: dict[int, Sync0V1] = {}
     end = time.monotonic() + given.seconds
     with ecdaq.connect(given.interface, domain=given.domain) as link:
-        reader = link.reader("ecdaq/sync0", Sync0V1, is_state=True)
+        reader = link.reader(Sync0V1, is_state=True)
         while len(newest) < given.slaves and time.monotonic() < end:
             for m in link._take(reader, 1.0):
                 newest[m.slave] = m

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import re
 import signal
@@ -14,57 +15,34 @@ from typing import Any
 import ecdaq
 import pandas
 import pytest
-from bench import KIT, ROOT, Bench, live, wait_for
-from ecdaq import idl_types, keys
+from bench import ROOT, Bench, live, wait_for
+from cyclonedds.idl import types
+from ecdaq import keys
+from ecdaq.idl_types import TOPICS, SampleV1, StatusV1
 from ecdaq.link import domain_config
 
-IDL = (ROOT / "app" / "publish" / "idl" / "ecdaq.idl").read_text()
-TYPES = {
-    "boolean": "bool", "double": "types.float64", "string": "str",
-    "unsigned short": "types.uint16", "unsigned long": "types.uint32", "long": "types.int32",
-    "unsigned long long": "types.uint64", "long long": "types.int64",
-}  # fmt: skip
-
-
-def of_idl() -> dict[str, list[tuple[str, str]]]:
-    found = {}
-    text = re.sub(r"//.*", "", IDL)
-    for struct in re.finditer(r"@final struct (\w+) \{(.*?)\};", text, re.DOTALL):
-        members = []
-        for line in filter(None, map(str.strip, struct.group(2).split(";"))):
-            kind, name = line.removeprefix("@key ").rsplit(" ", 1)
-            inner = re.fullmatch(r"sequence<(.*)>", kind)
-            python = f"types.sequence[{TYPES[inner.group(1)]}]" if inner else TYPES[kind]
-            members.append((name, python))
-        found[struct.group(1)] = members
-    return found
-
-
-def of_python() -> dict[str, list[tuple[str, str]]]:
-    text = (KIT / "ecdaq" / "idl_types.py").read_text()
-    return {
-        found.group(1): re.findall(r"^    (\w+): (.+)$", found.group(2), re.MULTILINE)
-        for found in re.finditer(r"^class (\w+)\(.*?\n((?:    .*\n)+)", text, re.MULTILINE)
-    }
-
-
-def test_types_are_those_of_the_idl() -> None:
-    assert of_idl() == of_python()
-    keys = dict(re.findall(r"@final struct (\w+) \{[^}]*?@key [a-z ]+ (\w+);", IDL))
-    assert keys == {
-        "SampleV1": "slave", "BlockV1": "slave", "Sync0V1": "slave",
-        "CommandV1": "commander", "ReplyV1": "commander",
-    }  # fmt: skip
-    for name, key in keys.items():
-        text = (KIT / "ecdaq" / "idl_types.py").read_text()
-        assert re.search(rf'class {name}\(.*?\n    {key}: [^\n]*\n    key\("{key}"\)', text)
-        assert getattr(idl_types, name).__idl__.idl_transformed_typename == f"ecdaq::{name}"
+IDL = (ROOT / "app" / "services" / "publish" / "idl" / "ecdaq.idl").read_text()
 
 
 def test_types_are_final_and_flat() -> None:
     text = re.sub(r"//.*", "", IDL)
-    assert text.count("struct") == text.count("@final struct")
+    assert text.count("struct") == text.count("@final struct") == len(TOPICS)
     assert not re.search(r"\b(octet|u?int8|char|enum|typedef|optional|union|map)\b", text)
+
+
+def test_types_have_the_names_members_and_keys_of_the_idl() -> None:
+    """Spot checks of what is generated; a wrong type would not be matched by the C side."""
+    for kind in TOPICS:
+        assert kind.__idl__.idl_transformed_typename == f"ecdaq::{kind.__name__}"
+        declared = re.search(rf"struct {kind.__name__} {{(.*?)}};", IDL, re.DOTALL)
+        assert declared
+        lines = re.findall(r"^ *(@key )?[a-z<> ]+ (\w+);", declared[1], re.MULTILINE)
+        assert [name for _, name in lines] == [f.name for f in dataclasses.fields(kind)]
+        key_names = {name for is_key, name in lines if is_key}
+        assert set(kind.__idl_field_annotations__) == key_names
+    assert SampleV1.__annotations__["raw"] == types.sequence[types.uint64]
+    assert SampleV1.__annotations__["is_good"] is bool
+    assert StatusV1.__annotations__["dc_diff_max_ns"] == types.int64
 
 
 def sample(slave: int, cycle: int, session: int = 1) -> Any:

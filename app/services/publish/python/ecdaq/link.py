@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
+from typing import TypeVar
 
 from cyclonedds.core import (
     InstanceState,
@@ -28,6 +29,7 @@ from cyclonedds.util import duration
 
 from ecdaq.errors import LinkError, RefusedError
 from ecdaq.idl_types import (
+    TOPICS,
     BlockV1,
     ChannelsV1,
     CommandV1,
@@ -41,6 +43,7 @@ from ecdaq.idl_types import (
 from ecdaq.keys import security_config
 from ecdaq.series import Gaps
 
+State = TypeVar("State", ChannelsV1, IdlV1, StatusV1, TimeMapV1)
 ANY = ViewState.Any | InstanceState.Any | SampleState.Any
 TAKE_AT_ONCE = 4096
 
@@ -190,8 +193,12 @@ class Link:
         """End subscribe() and blocks() soon; for signal handlers, which must not raise into DDS."""
         self._is_stopped = True
 
-    def reader(self, topic: str, kind: type, *, is_state: bool = False) -> DataReader:
-        """The reader of @topic: RELIABLE, KEEP_ALL; of a state: TRANSIENT_LOCAL, KEEP_LAST 1."""
+    def reader(self, kind: type, *, topic: str = "", is_state: bool = False) -> DataReader:
+        """The reader of a type on its topic, or on @topic if that is given.
+
+        RELIABLE, KEEP_ALL; with @is_state: TRANSIENT_LOCAL, KEEP_LAST 1.
+        """
+        topic = topic or TOPICS[kind]
         if topic not in self._readers:
             qos = Qos(
                 Policy.Reliability.Reliable(duration(milliseconds=100)),
@@ -212,8 +219,8 @@ class Link:
         taken = reader.take(N=TAKE_AT_ONCE)
         return [m for m in taken if m.sample_info.valid_data]
 
-    def _newest(self, topic: str, kind: type, seconds: float) -> object:
-        reader = self.reader(topic, kind, is_state=True)
+    def _newest(self, kind: type[State], seconds: float) -> State:
+        reader = self.reader(kind, is_state=True)
         end = time.monotonic() + seconds
         while True:
             found = [m for m in reader.read(N=16) if m.sample_info.valid_data]
@@ -221,40 +228,33 @@ class Link:
                 return found[-1]
             left = end - time.monotonic()
             if left <= 0:
-                raise LinkError(f"no {topic} within {seconds:g} s: is ecdaq-dds there?")
+                raise LinkError(f"no {TOPICS[kind]} within {seconds:g} s: is ecdaq-dds there?")
             waitset = WaitSet(self.participant)
             waitset.attach(ReadCondition(reader, ANY))
             waitset.wait(duration(seconds=left))
 
     def channels(self, seconds: float = 10) -> Channels:
         """The channel table of the master that runs now."""
-        message = self._newest("ecdaq/channels", ChannelsV1, seconds)
-        assert isinstance(message, ChannelsV1)
+        message = self._newest(ChannelsV1, seconds)
         if self._channels is None or self._channels.session != message.session:
             self._channels = Channels(message)
         return self._channels
 
     def status(self, seconds: float = 10) -> StatusV1:
-        message = self._newest("ecdaq/status", StatusV1, seconds)
-        assert isinstance(message, StatusV1)
-        return message
+        return self._newest(StatusV1, seconds)
 
     def timemap(self, seconds: float = 10) -> TimeMapV1:
-        message = self._newest("ecdaq/timemap", TimeMapV1, seconds)
-        assert isinstance(message, TimeMapV1)
-        return message
+        return self._newest(TimeMapV1, seconds)
 
     def idl(self, seconds: float = 10) -> str:
         """The IDL text of what is published."""
-        message = self._newest("ecdaq/idl", IdlV1, seconds)
-        assert isinstance(message, IdlV1)
-        return message.text
+        return self._newest(IdlV1, seconds).text
 
     def subscribe(
         self, seconds: float | None = None, slave: int | None = None
     ) -> Iterator[SampleV1]:
         """Samples as they come, gaps counted in .gaps; for @seconds, or for ever."""
-        reader = self.reader("ecdaq/sample", SampleV1)
+        reader = self.reader(SampleV1)
         end = None if seconds is None else time.monotonic() + seconds
         while not self._is_stopped and (end is None or time.monotonic() < end):
             left = 1.0 if end is None else min(1.0, max(0.001, end - time.monotonic()))
@@ -268,7 +268,7 @@ class Link:
 
     def blocks(self, seconds: float | None = None) -> Iterator[BlockV1]:
         """Blocks as they come; gaps are not counted."""
-        reader = self.reader("ecdaq/block", BlockV1)
+        reader = self.reader(BlockV1)
         end = None if seconds is None else time.monotonic() + seconds
         while not self._is_stopped and (end is None or time.monotonic() < end):
             left = 1.0 if end is None else min(1.0, max(0.001, end - time.monotonic()))
@@ -276,7 +276,7 @@ class Link:
 
     def events(self, seconds: float) -> list[EventV1]:
         """Events that came since the last call, or come first within @seconds."""
-        return self._take(self.reader("ecdaq/event", EventV1), seconds)
+        return self._take(self.reader(EventV1), seconds)
 
     # Commands
 
@@ -289,15 +289,13 @@ class Link:
                 Policy.Lifespan(duration(seconds=1)),
                 Policy.Liveliness.Automatic(lease_ns),
             )
-            topic = Topic(self.participant, "ecdaq/command", CommandV1)
-            self.reader("ecdaq/reply", ReplyV1)
+            topic = Topic(self.participant, TOPICS[CommandV1], CommandV1)
             self._writer = DataWriter(self.participant, topic, qos=qos)
-            self._wait_for_match(self._writer)
+            self._wait_for_match(self._writer, self.reader(ReplyV1))
         return self._writer
 
-    def _wait_for_match(self, writer: DataWriter, seconds: float = 10) -> None:
+    def _wait_for_match(self, writer: DataWriter, replies: DataReader, seconds: float = 10) -> None:
         end = time.monotonic() + seconds
-        replies = self._readers["ecdaq/reply"]
         while not (writer.get_matched_subscriptions() and replies.get_matched_publications()):
             if time.monotonic() > end:
                 raise LinkError("nobody takes commands here")
@@ -333,7 +331,7 @@ class Link:
 
     def replies(self, seconds: float) -> list[ReplyV1]:
         """Answers to our commands that came, or come first within @seconds."""
-        taken = self._take(self.reader("ecdaq/reply", ReplyV1), seconds)
+        taken = self._take(self.reader(ReplyV1), seconds)
         return [r for r in taken if r.commander == self.commander]
 
     def command(
