@@ -3,8 +3,8 @@
  * What a name or an SII image stands for: ESC features by what the real device has shown, delays by
  * its kind of port. Used to make the list of slaves that a segment is built from.
  */
-#ifndef SIM_CATALOGUE_H
-#define SIM_CATALOGUE_H
+#ifndef SIM_DEVICES_CATALOGUE_H
+#define SIM_DEVICES_CATALOGUE_H
 
 #include <stddef.h>
 #include <stdint.h>

@@ -3,8 +3,8 @@
  * A slave's application: what sits on the PDI of an ESC. It lives on the segment's time axis and is
  * called when its time has come; it never waits.
  */
-#ifndef SIM_DEVICE_H
-#define SIM_DEVICE_H
+#ifndef SIM_SEGMENT_DEVICE_H
+#define SIM_SEGMENT_DEVICE_H
 
 #include <stddef.h>
 #include <stdint.h>

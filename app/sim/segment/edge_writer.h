@@ -4,8 +4,8 @@
  * which it may keep the newest part only; or, each at once, into a pipe. Context: the segment's
  * loop; it never waits for a reader.
  */
-#ifndef SIM_EDGE_WRITER_H
-#define SIM_EDGE_WRITER_H
+#ifndef SIM_SEGMENT_EDGE_WRITER_H
+#define SIM_SEGMENT_EDGE_WRITER_H
 
 #include <stdint.h>
 

@@ -6,8 +6,8 @@
  * one axis for the whole segment; the ESC's own clock runs off it by its ppm. What rests on the
  * data sheet, on captures, or is our model is said in app/doc/reference/simulated-esc.md.
  */
-#ifndef SIM_ESC_H
-#define SIM_ESC_H
+#ifndef SIM_SEGMENT_ESC_H
+#define SIM_SEGMENT_ESC_H
 
 #include <stddef.h>
 #include <stdint.h>
@@ -219,8 +219,6 @@ int esc_eeprom_loaded(const struct esc *esc);
 int esc_has_sync0_pin(const struct esc *esc);
 /** 1 once after the reset sequence was written to 0x0040 or 0x0041: start the slave anew. */
 int esc_take_reset(struct esc *esc);
-/** Level of the PDI's interrupt: AL event request and mask. */
-int esc_irq(const struct esc *esc);
 
 enum esc_error {
 	ESC_ERROR_INVALID_FRAME, /* 0x0300 */

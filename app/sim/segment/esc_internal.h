@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Between the files of the ESC model; not for others. */
-#ifndef SIM_ESC_INTERNAL_H
-#define SIM_ESC_INTERNAL_H
+#ifndef SIM_SEGMENT_ESC_INTERNAL_H
+#define SIM_SEGMENT_ESC_INTERNAL_H
 
 #include "base/bytes.h"
 #include "segment/esc.h"

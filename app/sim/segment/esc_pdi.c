@@ -24,11 +24,6 @@ int esc_take_reset(struct esc *esc)
 	return was;
 }
 
-int esc_irq(const struct esc *esc)
-{
-	return (esc->al_event & get_le32(esc->reg + ESC_REG_AL_EVENT_MASK)) != 0;
-}
-
 /* Reading is how the firmware acknowledges. */
 static void acknowledge(struct esc *esc, uint16_t addr, size_t len)
 {

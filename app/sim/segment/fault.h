@@ -21,8 +21,8 @@
  *   at=3s sync0-lost slave=1 count=3   its next SYNC0 pulses do not come out of the chip
  *   at=3s identity slave=1 product=0x1 its EEPROM names another product from now on
  */
-#ifndef SIM_FAULT_H
-#define SIM_FAULT_H
+#ifndef SIM_SEGMENT_FAULT_H
+#define SIM_SEGMENT_FAULT_H
 
 #include <stddef.h>
 #include <stdint.h>

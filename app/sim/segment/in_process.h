@@ -4,8 +4,8 @@
  * a sleep moves the clock, and the same seed gives the same run. The host's clock runs off true
  * time by its ppm; its wakes are late by a seeded latency.
  */
-#ifndef SIM_IN_PROCESS_H
-#define SIM_IN_PROCESS_H
+#ifndef SIM_SEGMENT_IN_PROCESS_H
+#define SIM_SEGMENT_IN_PROCESS_H
 
 #include <stdint.h>
 

@@ -3,8 +3,8 @@
  * Terminals by a line of text: "io slave=0" answers what slave 0 has at its terminals, "io slave=0
  * KEY=VALUE..." sets some of them first. Which keys there are is the device's business.
  */
-#ifndef SIM_IO_LINE_H
-#define SIM_IO_LINE_H
+#ifndef SIM_SEGMENT_IO_LINE_H
+#define SIM_SEGMENT_IO_LINE_H
 
 #include <stddef.h>
 

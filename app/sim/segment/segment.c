@@ -113,7 +113,7 @@ void segment_sync0_to(struct segment *segment,
 
 static int is_live(const struct segment *seg, int slave)
 {
-	return slave != WAY_NOWHERE && seg->node[slave].has_power;
+	return slave != PATH_NOWHERE && seg->node[slave].has_power;
 }
 
 /* Both ends see the link; each may still hold its loop closed (DL control). */
@@ -123,13 +123,13 @@ static void set_links(struct segment *seg)
 		struct node *n = &seg->node[i];
 		uint8_t links = 0;
 
-		for (unsigned port = 0; port < WAY_PORTS; port++) {
-			const struct way_link *l = &seg->wiring[i].link[port];
+		for (unsigned port = 0; port < PATH_PORTS; port++) {
+			const struct path_link *l = &seg->wiring[i].link[port];
 			int is_cut = port == 0 ? n->is_cut : 0;
 
 			if (l->is_master && l->master == SEGMENT_SECONDARY) {
 				is_cut = seg->is_ring_cut;
-			} else if (port != 0 && l->slave != WAY_NOWHERE) {
+			} else if (port != 0 && l->slave != PATH_NOWHERE) {
 				is_cut = seg->node[l->slave].is_cut;
 			}
 			if (!is_cut && (l->is_master || is_live(seg, l->slave))) {
@@ -138,29 +138,29 @@ static void set_links(struct segment *seg)
 		}
 		esc_set_links(&n->esc, n->has_power ? links : 0);
 		n->esc.is_loop_changed = 0;
-		for (unsigned port = 0; port < WAY_PORTS; port++) {
+		for (unsigned port = 0; port < PATH_PORTS; port++) {
 			seg->wiring[i].link[port].is_open =
 				(links >> port & 1) && !esc_is_port_closed(&n->esc, port);
 		}
 	}
 }
 
-void segment_lay_ways(struct segment *segment)
+void segment_find_paths(struct segment *segment)
 {
 	const struct node *first = &segment->node[segment->first];
-	int has_ring = segment->ring_slave != WAY_NOWHERE && !segment->is_ring_cut &&
+	int has_ring = segment->ring_slave != PATH_NOWHERE && !segment->is_ring_cut &&
 		       segment->node[segment->ring_slave].has_power;
 
 	set_links(segment);
-	memset(segment->way, 0, sizeof(segment->way));
+	memset(segment->path, 0, sizeof(segment->path));
 	if (segment_is_up(segment, SEGMENT_PRIMARY) &&
 	    segment->wiring[segment->first].link[0].is_open) {
-		way_lay(segment->wiring, (unsigned)segment->first, 0, first->wire_ns,
-			&segment->way[SEGMENT_PRIMARY]);
+		frame_path_find(segment->wiring, (unsigned)segment->first, 0, first->wire_ns,
+				&segment->path[SEGMENT_PRIMARY]);
 	}
 	if (has_ring && segment->wiring[segment->ring_slave].link[segment->ring_port].is_open) {
-		way_lay(segment->wiring, (unsigned)segment->ring_slave, segment->ring_port,
-			segment->ring_wire_ns, &segment->way[SEGMENT_SECONDARY]);
+		frame_path_find(segment->wiring, (unsigned)segment->ring_slave, segment->ring_port,
+				segment->ring_wire_ns, &segment->path[SEGMENT_SECONDARY]);
 	}
 	for (size_t i = 0; i < segment->count; i++) {
 		segment_plan(&segment->node[i]);
@@ -170,7 +170,7 @@ void segment_lay_ways(struct segment *segment)
 int segment_is_up(const struct segment *segment, enum segment_port port)
 {
 	if (port == SEGMENT_SECONDARY) {
-		return segment->ring_slave != WAY_NOWHERE && !segment->is_ring_cut &&
+		return segment->ring_slave != PATH_NOWHERE && !segment->is_ring_cut &&
 		       segment->node[segment->ring_slave].has_power;
 	}
 	return segment->node[segment->first].has_power && !segment->node[segment->first].is_cut;
@@ -178,24 +178,24 @@ int segment_is_up(const struct segment *segment, enum segment_port port)
 
 int segment_close_ring(struct segment *segment, size_t slave, unsigned port, int64_t wire_ns)
 {
-	struct way_link *l;
+	struct path_link *l;
 
-	if (slave >= segment->count || port < 1 || port >= WAY_PORTS ||
-	    segment->ring_slave != WAY_NOWHERE) {
+	if (slave >= segment->count || port < 1 || port >= PATH_PORTS ||
+	    segment->ring_slave != PATH_NOWHERE) {
 		return -EINVAL;
 	}
 	l = &segment->wiring[slave].link[port];
-	if (l->slave != WAY_NOWHERE || l->is_master) {
+	if (l->slave != PATH_NOWHERE || l->is_master) {
 		return -EINVAL;
 	}
-	*l = (struct way_link){ .slave = WAY_NOWHERE,
-				.is_master = 1,
-				.master = SEGMENT_SECONDARY,
-				.wire_ns = wire_ns };
+	*l = (struct path_link){ .slave = PATH_NOWHERE,
+				 .is_master = 1,
+				 .master = SEGMENT_SECONDARY,
+				 .wire_ns = wire_ns };
 	segment->ring_slave = (int)slave;
 	segment->ring_port = port;
 	segment->ring_wire_ns = wire_ns;
-	segment_lay_ways(segment);
+	segment_find_paths(segment);
 	return 0;
 }
 
@@ -221,28 +221,28 @@ void segment_start_node(struct node *n, int64_t t_ns, uint64_t clock_ns)
 
 static int connect(struct segment *seg, unsigned i, const struct segment_slave_spec *spec)
 {
-	struct way_link *up = &seg->wiring[i].link[0];
-	struct way_link *down;
+	struct path_link *up = &seg->wiring[i].link[0];
+	struct path_link *down;
 
-	*up = (struct way_link){ .slave = spec->parent,
-				 .port = spec->parent_port,
-				 .wire_ns = spec->wire_ns };
+	*up = (struct path_link){ .slave = spec->parent,
+				  .port = spec->parent_port,
+				  .wire_ns = spec->wire_ns };
 	if (spec->parent < 0) {
 		/* One slave only is at the master's port. */
-		up->slave = WAY_NOWHERE;
+		up->slave = PATH_NOWHERE;
 		up->is_master = 1;
 		up->master = SEGMENT_PRIMARY;
 		seg->first = (int)i;
 		return i == 0 ? 0 : -EINVAL;
 	}
-	if (spec->parent >= (int)i || spec->parent_port < 1 || spec->parent_port >= WAY_PORTS) {
+	if (spec->parent >= (int)i || spec->parent_port < 1 || spec->parent_port >= PATH_PORTS) {
 		return -EINVAL;
 	}
 	down = &seg->wiring[spec->parent].link[spec->parent_port];
-	if (down->slave != WAY_NOWHERE) {
+	if (down->slave != PATH_NOWHERE) {
 		return -EINVAL;
 	}
-	*down = (struct way_link){ .slave = (int)i, .port = 0, .wire_ns = spec->wire_ns };
+	*down = (struct path_link){ .slave = (int)i, .port = 0, .wire_ns = spec->wire_ns };
 	return 0;
 }
 
@@ -300,10 +300,10 @@ static struct segment *allocate(size_t count)
 		segment_destroy(seg);
 		return NULL;
 	}
-	for (size_t i = 0; i < count * WAY_PORTS; i++) {
-		seg->wiring[i / WAY_PORTS].link[i % WAY_PORTS].slave = WAY_NOWHERE;
+	for (size_t i = 0; i < count * PATH_PORTS; i++) {
+		seg->wiring[i / PATH_PORTS].link[i % PATH_PORTS].slave = PATH_NOWHERE;
 	}
-	seg->ring_slave = WAY_NOWHERE;
+	seg->ring_slave = PATH_NOWHERE;
 	return seg;
 }
 
@@ -331,7 +331,7 @@ int segment_create(const struct segment_slave_spec *slaves, size_t count, int64_
 	for (size_t i = 0; i < count; i++) {
 		segment_start_node(&seg->node[i], t_ns, seg->node[i].clock_start_ns);
 	}
-	segment_lay_ways(seg);
+	segment_find_paths(seg);
 	*ret_segment = seg;
 	return 0;
 }
@@ -367,9 +367,4 @@ struct esc *segment_esc(struct segment *segment, size_t slave)
 struct sim_device *segment_device(struct segment *segment, size_t slave)
 {
 	return segment->node[slave].device;
-}
-
-int64_t segment_now_ns(const struct segment *segment)
-{
-	return segment->now_ns;
 }

@@ -4,8 +4,8 @@
  * them. Nothing here reads a clock or waits: segment_advance() runs everything that is due,
  * segment_frame() sends a frame through. Same calls, same results.
  */
-#ifndef SIM_SEGMENT_H
-#define SIM_SEGMENT_H
+#ifndef SIM_SEGMENT_SEGMENT_H
+#define SIM_SEGMENT_SEGMENT_H
 
 #include <stddef.h>
 #include <stdint.h>
@@ -85,7 +85,6 @@ int segment_is_up(const struct segment *segment, enum segment_port port);
 size_t segment_slave_count(const struct segment *segment);
 struct esc *segment_esc(struct segment *segment, size_t slave);
 struct sim_device *segment_device(struct segment *segment, size_t slave);
-int64_t segment_now_ns(const struct segment *segment);
 
 /** Every SYNC0 edge of every slave, exact. */
 void segment_sync0_to(struct segment *segment,

@@ -18,7 +18,7 @@ void segment_cut(struct segment *segment, size_t slave, int64_t t_ns)
 		n->is_cut = 1;
 		lose_upper_end(segment, n);
 		esc_count_error(&n->esc, 0, ESC_ERROR_LOST_LINK);
-		segment_lay_ways(segment);
+		segment_find_paths(segment);
 	}
 }
 
@@ -26,17 +26,17 @@ void segment_heal(struct segment *segment, size_t slave, int64_t t_ns)
 {
 	segment_advance(segment, t_ns);
 	segment->node[slave].is_cut = 0;
-	segment_lay_ways(segment);
+	segment_find_paths(segment);
 }
 
 void segment_cut_ring(struct segment *segment, int64_t t_ns)
 {
 	segment_advance(segment, t_ns);
-	if (segment->ring_slave != WAY_NOWHERE && !segment->is_ring_cut) {
+	if (segment->ring_slave != PATH_NOWHERE && !segment->is_ring_cut) {
 		segment->is_ring_cut = 1;
 		esc_count_error(&segment->node[segment->ring_slave].esc, segment->ring_port,
 				ESC_ERROR_LOST_LINK);
-		segment_lay_ways(segment);
+		segment_find_paths(segment);
 	}
 }
 
@@ -44,7 +44,7 @@ void segment_heal_ring(struct segment *segment, int64_t t_ns)
 {
 	segment_advance(segment, t_ns);
 	segment->is_ring_cut = 0;
-	segment_lay_ways(segment);
+	segment_find_paths(segment);
 }
 
 /* Everybody who had a cable to it has lost a link. */
@@ -68,7 +68,7 @@ void segment_power_off(struct segment *segment, size_t slave, int64_t t_ns)
 			lose_upper_end(segment, n);
 		}
 		lose_lower_ends(segment, slave);
-		segment_lay_ways(segment);
+		segment_find_paths(segment);
 	}
 }
 
@@ -77,7 +77,7 @@ void segment_power_on(struct segment *segment, size_t slave, int64_t t_ns)
 	segment_advance(segment, t_ns);
 	if (!segment->node[slave].has_power) {
 		segment_start_node(&segment->node[slave], t_ns, 0);
-		segment_lay_ways(segment);
+		segment_find_paths(segment);
 	}
 }
 
@@ -98,6 +98,6 @@ void segment_reset(struct segment *segment, size_t slave, int64_t t_ns)
 	segment_advance(segment, t_ns);
 	if (segment->node[slave].has_power) {
 		segment_start_node(&segment->node[slave], t_ns, 0);
-		segment_lay_ways(segment);
+		segment_find_paths(segment);
 	}
 }

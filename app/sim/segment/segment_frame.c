@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A frame on its way: slave by slave, each at its own time, datagram by datagram. */
+/* A frame passes the segment: slave by slave, each at its own time, datagram by datagram. */
 #include <errno.h>
 
 #include "segment/segment_internal.h"
@@ -44,7 +44,7 @@ static struct esc_frame shift(const struct esc_frame *passing, struct node *n, i
 
 	t_ns += jitter(n);
 	f.pu_ns += t_ns;
-	for (unsigned port = 0; port < WAY_PORTS; port++) {
+	for (unsigned port = 0; port < PATH_PORTS; port++) {
 		f.port_ns[port] += t_ns;
 	}
 	return f;
@@ -78,16 +78,16 @@ static void pass(struct node *n, const struct esc_frame *passing, int64_t t_ns,
  * The first slave finds the damage and spoils the check sum, by which the others know that it was
  * found.
  */
-static void count_errors(struct segment *seg, const struct way *way, size_t from,
+static void count_errors(struct segment *seg, const struct frame_path *path, size_t from,
 			 enum esc_error error)
 {
 	int is_first = 1;
 
-	for (unsigned k = 0; k < way->count; k++) {
-		if (is_first && way->slave[k] != from) {
+	for (unsigned k = 0; k < path->count; k++) {
+		if (is_first && path->slave[k] != from) {
 			continue;
 		}
-		esc_count_error(&seg->node[way->slave[k]].esc, 0,
+		esc_count_error(&seg->node[path->slave[k]].esc, 0,
 				is_first ? error : ESC_ERROR_FORWARDED);
 		is_first = 0;
 	}
@@ -112,13 +112,13 @@ static int is_ethercat(const uint8_t *frame, size_t frame_len)
 int segment_frame_from(struct segment *segment, enum segment_port from, int64_t t_ns,
 		       uint8_t *frame, size_t frame_len, struct segment_return *ret)
 {
-	const struct way *way = &segment->way[from];
+	const struct frame_path *path = &segment->path[from];
 	struct ecat_datagram dg[DATAGRAMS_MAX];
 	int is_rewired = 0;
 	int count;
 
 	segment_advance(segment, t_ns);
-	if (!way->is_back) {
+	if (!path->is_back) {
 		return -ENOLINK;
 	}
 	if (!is_ethercat(frame, frame_len)) {
@@ -126,25 +126,25 @@ int segment_frame_from(struct segment *segment, enum segment_port from, int64_t 
 	}
 	count = find_datagrams(frame, frame_len, dg);
 	if (count < 0) {
-		count_errors(segment, way, way->slave[0], ESC_ERROR_UNIT);
+		count_errors(segment, path, path->slave[0], ESC_ERROR_UNIT);
 		return -EBADMSG;
 	}
 	if (segment->wire_free_ns[from] > t_ns + QUEUE_NS) {
 		return -ENOBUFS;
 	}
 	t_ns = start_of(segment, from, t_ns, frame_len);
-	for (unsigned k = 0; k < way->count; k++) {
-		struct node *n = &segment->node[way->slave[k]];
+	for (unsigned k = 0; k < path->count; k++) {
+		struct node *n = &segment->node[path->slave[k]];
 
-		pass(n, &way->passing[way->slave[k]], t_ns, frame, dg, count);
+		pass(n, &path->passing[path->slave[k]], t_ns, frame, dg, count);
 		is_rewired |= n->esc.is_loop_changed;
 	}
-	if (way->count > 0) {
+	if (path->count > 0) {
 		frame[6] |= 0x02; /* every ESC marks the source address of what it has processed */
 	}
-	*ret = (struct segment_return){ .port = way->exit, .t_ns = t_ns + way->back_ns };
+	*ret = (struct segment_return){ .port = path->exit, .t_ns = t_ns + path->back_ns };
 	if (is_rewired) {
-		segment_lay_ways(segment);
+		segment_find_paths(segment);
 	}
 	return 0;
 }
@@ -168,5 +168,5 @@ int segment_frame(struct segment *segment, int64_t t_ns, uint8_t *frame, size_t 
 void segment_damaged_frame(struct segment *segment, int64_t t_ns, size_t slave)
 {
 	segment_advance(segment, t_ns);
-	count_errors(segment, &segment->way[SEGMENT_PRIMARY], slave, ESC_ERROR_INVALID_FRAME);
+	count_errors(segment, &segment->path[SEGMENT_PRIMARY], slave, ESC_ERROR_INVALID_FRAME);
 }

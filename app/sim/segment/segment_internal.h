@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* Between the files of the segment; not for others. */
-#ifndef SIM_SEGMENT_INTERNAL_H
-#define SIM_SEGMENT_INTERNAL_H
+#ifndef SIM_SEGMENT_SEGMENT_INTERNAL_H
+#define SIM_SEGMENT_SEGMENT_INTERNAL_H
 
 #include "base/prng.h"
+#include "segment/frame_path.h"
 #include "segment/segment.h"
-#include "segment/way.h"
 
 struct node {
 	struct segment *segment;
@@ -33,10 +33,10 @@ struct node {
 struct segment {
 	struct node *node;
 	size_t count;
-	struct way_node *wiring;
-	struct way way[SEGMENT_PORTS];
+	struct path_node *wiring;
+	struct frame_path path[SEGMENT_PORTS];
 	int first;      /* the slave at the primary port */
-	int ring_slave; /* at the secondary port; WAY_NOWHERE: no ring */
+	int ring_slave; /* at the secondary port; PATH_NOWHERE: no ring */
 	unsigned ring_port;
 	int64_t ring_wire_ns;
 	int is_ring_cut;
@@ -50,8 +50,8 @@ struct segment {
 void segment_plan(struct node *n);
 /** Run the slave's events up to and including @t_ns. */
 void segment_run_node(struct node *n, int64_t t_ns);
-/** Lay both ways anew: a link or a loop has changed. */
-void segment_lay_ways(struct segment *segment);
+/** Compute both paths again: a link or a loop has changed. */
+void segment_find_paths(struct segment *segment);
 /** Power-on reset of one slave. */
 void segment_start_node(struct node *n, int64_t t_ns, uint64_t clock_ns);
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* What a simulated analog input sees: a pure function of time, so that a sample can be checked. */
-#ifndef SIM_SIGNAL_H
-#define SIM_SIGNAL_H
+#ifndef SIM_SEGMENT_SIGNAL_H
+#define SIM_SEGMENT_SIGNAL_H
 
 #include <stdint.h>
 

@@ -3,8 +3,8 @@
  * Fault lines at run time, one a datagram on a Unix socket; answered with "ok" or why not. A line
  * that begins with "io" is a hand at the slaves' terminals (sim/io_line.h).
  */
-#ifndef SIM_CONTROL_H
-#define SIM_CONTROL_H
+#ifndef SIM_SIMULATOR_CONTROL_H
+#define SIM_SIMULATOR_CONTROL_H
 
 #include <stddef.h>
 #include <stdint.h>

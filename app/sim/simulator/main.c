@@ -14,8 +14,8 @@
 #include "segment/fault.h"
 #include "segment/segment.h"
 #include "simulator/control.h"
-#include "simulator/line_up.h"
 #include "simulator/options.h"
+#include "simulator/topology.h"
 #include "simulator/wire_socket.h"
 
 enum {
@@ -71,34 +71,34 @@ static int open_all(struct simulation *sim)
 
 	sim->faults = fault_plan_create(sim->opt.seed, wire_socket_now_ns());
 	if (sim->faults == NULL) {
-		return sim_complain("no memory");
+		return sim_error("no memory");
 	}
 	if (sim->opt.faults != NULL &&
 	    fault_plan_load(sim->faults, sim->opt.faults, segment_slave_count(sim->segment), error,
 			    sizeof(error)) < 0) {
-		return sim_complain(error);
+		return sim_error(error);
 	}
 	if (sim->opt.edges != NULL) {
 		r = edge_writer_open(sim->opt.edges, sim->opt.edges_keep_bytes, &sim->edges);
 		if (r < 0) {
 			snprintf(error, sizeof(error), "%s: %s", sim->opt.edges, strerror(-r));
-			return sim_complain(error);
+			return sim_error(error);
 		}
 		segment_sync0_to(sim->segment, write_edge, sim);
 	}
 	/* Held to the end. Before the control socket: that of the one which is there stays. */
 	if (wire_socket_claim(sim->opt.interface, error, sizeof(error)) < 0) {
-		return sim_complain(error);
+		return sim_error(error);
 	}
 	sim->control_fd = -1;
 	if (sim->opt.control != NULL) {
 		sim->control_fd = control_open(sim->opt.control, error, sizeof(error));
 		if (sim->control_fd < 0) {
-			return sim_complain(error);
+			return sim_error(error);
 		}
 	}
 	sim->fd = wire_socket_open(sim->opt.interface, error, sizeof(error));
-	return sim->fd < 0 ? sim_complain(error) : 0;
+	return sim->fd < 0 ? sim_error(error) : 0;
 }
 
 static void flush_edges(struct simulation *sim, int64_t now_ns)
@@ -109,7 +109,7 @@ static void flush_edges(struct simulation *sim, int64_t now_ns)
 	if (r < 0) {
 		snprintf(error, sizeof(error), "--edges-keep: %s: %s: all is kept", sim->opt.edges,
 			 strerror(-r));
-		sim_complain(error);
+		sim_error(error);
 	}
 }
 
@@ -265,7 +265,7 @@ static int serve(struct simulation *sim)
 		} else if (n < 0 && n != -ENETDOWN) {
 			snprintf(line, sizeof(line), "interface %s: %s", sim->opt.interface,
 				 strerror(-n));
-			return sim_complain(line);
+			return sim_error(line);
 		}
 	}
 	return 0;
@@ -284,7 +284,7 @@ int main(int argc, char **argv)
 	sim_options_read(argc, argv, &sim.opt);
 	sigaction(SIGTERM, &action, NULL);
 	sigaction(SIGINT, &action, NULL);
-	if (line_up_create(&sim.opt, wire_socket_now_ns(), &sim.segment) < 0 ||
+	if (topology_create(&sim.opt, wire_socket_now_ns(), &sim.segment) < 0 ||
 	    open_all(&sim) < 0) {
 		return 1;
 	}

@@ -48,7 +48,7 @@ static const char usage_text[] =
 	"\n"
 	"exit codes: 0 ended by a signal, 1 failed, 2 wrong options\n";
 
-int sim_complain(const char *what)
+int sim_error(const char *what)
 {
 	fprintf(stderr, "ecdaq-sim: %s\n", what);
 	return -1;
@@ -63,7 +63,7 @@ static int number_of(const char *text, const char *what, long low, long high, lo
 	if (end == text || *end != '\0' || v < low || v > high) {
 		snprintf(line, sizeof(line), "%s: '%.40s' is not %ld to %ld", what, text, low,
 			 high);
-		return sim_complain(line);
+		return sim_error(line);
 	}
 	*ret = v;
 	return 0;
@@ -75,7 +75,7 @@ static int take_wander(const char *text, struct sim_options *opt)
 	double ppm = strtod(text, &end);
 
 	if (end == text || *end != '\0' || !(ppm >= 0 && ppm <= 100)) {
-		return sim_complain("--wander: not 0 to 100 ppm");
+		return sim_error("--wander: not 0 to 100 ppm");
 	}
 	opt->wander_ppm = ppm;
 	return 0;
@@ -115,7 +115,7 @@ static int take_option(int c, const char *value, struct sim_options *opt)
 		return 0;
 	case 'g':
 		return signal_parse(value, &opt->signal) < 0
-			       ? sim_complain("--signal: not sine:HZ:V:OFFSET_V[:PHASE_DEG]")
+			       ? sim_error("--signal: not sine:HZ:V:OFFSET_V[:PHASE_DEG]")
 			       : 0;
 	case 'j':
 		if (number_of(value, "--jitter", 0, 10000, &n) < 0) {
@@ -185,11 +185,11 @@ void sim_options_read(int argc, char **argv, struct sim_options *opt)
 		}
 	}
 	if (optind < argc) {
-		sim_complain("more words than options (see --help)");
+		sim_error("more words than options (see --help)");
 		exit(2);
 	}
 	if (opt->interface == NULL) {
-		sim_complain("--interface is missing: on which NIC is the master?");
+		sim_error("--interface is missing: on which NIC is the master?");
 		exit(2);
 	}
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The command line of ecdaq-sim. */
-#ifndef SIM_OPTIONS_H
-#define SIM_OPTIONS_H
+#ifndef SIM_SIMULATOR_OPTIONS_H
+#define SIM_SIMULATOR_OPTIONS_H
 
 #include <stdint.h>
 
@@ -29,6 +29,6 @@ struct sim_options {
 void sim_options_read(int argc, char **argv, struct sim_options *opt);
 
 /** "ecdaq-sim: WHAT" on stderr. Returns -1. */
-int sim_complain(const char *what);
+int sim_error(const char *what);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The segment's end of a real Ethernet wire: frames in, frames out, on the host's clock. */
-#ifndef SIM_WIRE_SOCKET_H
-#define SIM_WIRE_SOCKET_H
+#ifndef SIM_SIMULATOR_WIRE_SOCKET_H
+#define SIM_SIMULATOR_WIRE_SOCKET_H
 
 #include <stddef.h>
 #include <stdint.h>

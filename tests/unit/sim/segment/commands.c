@@ -161,10 +161,14 @@ TEST(commands, digital_outputs_keep_the_bits_that_another_fmmu_wrote)
 TEST(commands, an_fmmu_of_more_bytes_than_any_frame_is_harmless)
 {
 	struct bench *b = two();
-	uint8_t data[16] = { 0 };
+	uint8_t data[16] = { 0x5a };
 
+	/* Beyond the RAM nothing is read or written, and logical addresses do not start again at 0.
+	 */
 	bench_fmmu(b, 0x1000, 0, 0xfffffff8, 0xffff, 0xfff0, 3);
-	(void)bench_logical(b, ECAT_CMD_LRW, 0xfffffff0, data, 16);
-	(void)bench_logical(b, ECAT_CMD_LRW, 0, data, 16);
+	CHECK_EQ(bench_logical(b, ECAT_CMD_LRW, 0xfffffff0, data, 16), 0);
+	CHECK_EQ(bench_logical(b, ECAT_CMD_LRW, 0, data, 16), 0);
+	CHECK_EQ(data[0], 0x5a);
+	CHECK_EQ(bench_send(b, ECAT_CMD_FPRD, 0x1000, ESC_REG_AL_STATUS, data, 2), 1);
 	bench_destroy(b);
 }

@@ -243,9 +243,10 @@ TEST(sync_manager, three_buffers_that_do_not_fit_are_survived)
 	char got[5] = "";
 
 	bench_sm(b, BENCH_STATION, 0, 0x2ffc, 4, OUTPUTS);
-	(void)master_writes(b, 0x2ffc, "last", 4);
+	CHECK_EQ(master_writes(b, 0x2ffc, "last", 4), 1);
 	bench_pdi_read(b, 0, 0x2ffc, got, 4);
+	CHECK_STR(got, "last");
 	bench_sm(b, BENCH_STATION, 1, 0xfff0, 64, OUTPUTS);
-	(void)master_writes(b, 0xfff0, "beyond the end..", 16);
+	CHECK_EQ(master_writes(b, 0xfff0, "beyond the end..", 16), 0);
 	bench_destroy(b);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "simulator/line_up.h"
+#include "simulator/topology.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -20,7 +20,7 @@ enum { NAME_BYTES = 96, PATH_BYTES = 1024, LINE_BYTES = PATH_BYTES + 200 };
 
 #define PPM_LIMIT 1000.0
 
-struct line_up {
+struct topology {
 	const struct sim_options *opt;
 	struct prng prng;
 	int count;
@@ -29,7 +29,7 @@ struct line_up {
 	uint8_t sii[LIMIT_SLAVES][SEGMENT_SII_BYTES];
 };
 
-static int take_names(struct line_up *l)
+static int take_names(struct topology *l)
 {
 	const char *text = l->opt->slaves;
 
@@ -38,15 +38,15 @@ static int take_names(struct line_up *l)
 
 		if (l->count == LIMIT_SLAVES || len == 0 || len >= NAME_BYTES ||
 		    memchr(text, '/', len) != NULL) {
-			return sim_complain("--slaves: at most 64 names, NAME,NAME,...");
+			return sim_error("--slaves: at most 64 names, NAME,NAME,...");
 		}
 		snprintf(l->name[l->count++], NAME_BYTES, "%.*s", (int)len, text);
 		text += len + (text[len] == ',');
 	}
-	return l->count > 0 ? 0 : sim_complain("--slaves: nothing given");
+	return l->count > 0 ? 0 : sim_error("--slaves: nothing given");
 }
 
-static int take_slaves(struct line_up *l)
+static int take_slaves(struct topology *l)
 {
 	char *end;
 	long count = strtol(l->opt->slaves, &end, 10);
@@ -55,7 +55,7 @@ static int take_slaves(struct line_up *l)
 		return take_names(l);
 	}
 	if (count < 1 || count > LIMIT_SLAVES) {
-		return sim_complain("--slaves: not 1 to 64");
+		return sim_error("--slaves: not 1 to 64");
 	}
 	for (; l->count < (int)count; l->count++) {
 		snprintf(l->name[l->count], NAME_BYTES, "fb1111_piccolo");
@@ -93,7 +93,7 @@ static int check_image(const char *path, const uint8_t *image, size_t bytes)
 	if (bytes < SII_CATEGORIES_BYTE) {
 		snprintf(line, sizeof(line), "%s: no SII image: %zu bytes, at least %d are needed",
 			 path, bytes, SII_CATEGORIES_BYTE);
-		return sim_complain(line);
+		return sim_error(line);
 	}
 	if (sii_checksum(image) != image[14]) {
 		fprintf(stderr,
@@ -106,7 +106,7 @@ static int check_image(const char *path, const uint8_t *image, size_t bytes)
 	return 0;
 }
 
-static int read_image(struct line_up *l, int i, size_t *ret_bytes)
+static int read_image(struct topology *l, int i, size_t *ret_bytes)
 {
 	char path[PATH_BYTES];
 	char line[LINE_BYTES];
@@ -114,21 +114,21 @@ static int read_image(struct line_up *l, int i, size_t *ret_bytes)
 
 	if (l->opt->sii_dir == NULL) {
 		snprintf(line, sizeof(line), "slave '%s': --sii DIR is missing", l->name[i]);
-		return sim_complain(line);
+		return sim_error(line);
 	}
 	if (snprintf(path, sizeof(path), "%s/%s.bin", l->opt->sii_dir, l->name[i]) >=
 	    (int)sizeof(path)) {
-		return sim_complain("--sii: path too long");
+		return sim_error("--sii: path too long");
 	}
 	r = read_file(path, l->sii[i], SEGMENT_SII_BYTES, ret_bytes);
 	if (r < 0) {
 		snprintf(line, sizeof(line), "%s: %s", path, strerror(-r));
-		return sim_complain(line);
+		return sim_error(line);
 	}
 	return check_image(path, l->sii[i], *ret_bytes);
 }
 
-static int make_wago(struct line_up *l, int i)
+static int make_wago(struct topology *l, int i)
 {
 	char line[LINE_BYTES];
 	int r = wago_750_354_by_name(i, l->name[i], &l->spec[i]);
@@ -138,12 +138,12 @@ static int make_wago(struct line_up *l, int i)
 			 "slave '%s': not wago_750_354, or that with +430, +457, +530, +557 for "
 			 "its modules (at most %d)",
 			 l->name[i], WAGO_MODULES_MAX);
-		return sim_complain(line);
+		return sim_error(line);
 	}
-	return r < 0 ? sim_complain("no memory") : 0;
+	return r < 0 ? sim_error("no memory") : 0;
 }
 
-static int make_plant(struct line_up *l, int i)
+static int make_plant(struct topology *l, int i)
 {
 	char line[LINE_BYTES];
 	int r = plant_by_name(i, l->name[i], &l->spec[i]);
@@ -152,12 +152,12 @@ static int make_plant(struct line_up *l, int i)
 		snprintf(line, sizeof(line),
 			 "slave '%s': not plant[:TAU_MS[:GAIN]], each above 0 and up to 1000000",
 			 l->name[i]);
-		return sim_complain(line);
+		return sim_error(line);
 	}
-	return r < 0 ? sim_complain("no memory") : 0;
+	return r < 0 ? sim_error("no memory") : 0;
 }
 
-static int make_slave(struct line_up *l, int i)
+static int make_slave(struct topology *l, int i)
 {
 	size_t bytes = 0;
 	int r;
@@ -176,7 +176,7 @@ static int make_slave(struct line_up *l, int i)
 	} else {
 		r = catalogue_sii_slave(l->sii[i], bytes, i, &l->spec[i]);
 	}
-	return r < 0 ? sim_complain("no memory") : 0;
+	return r < 0 ? sim_error("no memory") : 0;
 }
 
 /* --- crystals --- */
@@ -189,14 +189,14 @@ static int take_ppm(const char **text, double *ret_ppm)
 	/* Written so that a NaN is refused, too. */
 	if (end == *text || (*end != ',' && *end != '\0') ||
 	    !(ppm >= -PPM_LIMIT && ppm <= PPM_LIMIT)) {
-		return sim_complain("--ppm: numbers from -1000 to 1000, with commas");
+		return sim_error("--ppm: numbers from -1000 to 1000, with commas");
 	}
 	*text = *end == ',' ? end + 1 : end;
 	*ret_ppm = ppm;
 	return 0;
 }
 
-static int set_crystals(struct line_up *l)
+static int set_crystals(struct topology *l)
 {
 	const char *text = l->opt->ppm != NULL ? l->opt->ppm : "";
 
@@ -213,10 +213,10 @@ static int set_crystals(struct line_up *l)
 			return -1;
 		}
 	}
-	return *text == '\0' ? 0 : sim_complain("--ppm: more numbers than slaves");
+	return *text == '\0' ? 0 : sim_error("--ppm: more numbers than slaves");
 }
 
-static int make(struct line_up *l, int64_t t_ns, struct segment **ret_segment)
+static int make(struct topology *l, int64_t t_ns, struct segment **ret_segment)
 {
 	if (take_slaves(l) < 0) {
 		return -1;
@@ -230,13 +230,13 @@ static int make(struct line_up *l, int64_t t_ns, struct segment **ret_segment)
 		return -1;
 	}
 	return segment_create(l->spec, (size_t)l->count, t_ns, ret_segment) < 0
-		       ? sim_complain("the segment cannot be made: no memory")
+		       ? sim_error("the segment cannot be made: no memory")
 		       : 0;
 }
 
-int line_up_create(const struct sim_options *opt, int64_t t_ns, struct segment **ret_segment)
+int topology_create(const struct sim_options *opt, int64_t t_ns, struct segment **ret_segment)
 {
-	static struct line_up l;
+	static struct topology l;
 
 	l.opt = opt;
 	l.prng.state = opt->seed;
