@@ -108,7 +108,8 @@ static void print_sync0_until(struct events *events, int64_t mono_ns)
 
 	while (events->sync0 != NULL) {
 		if (!events->has_waiting) {
-			switch (ring_read(events->sync0, &events->waiting, &lost)) {
+			switch (ring_read(events->sync0, &events->waiting, sizeof(events->waiting),
+					  &lost)) {
 			case RING_OK:
 				events->has_waiting = 1;
 				break;
@@ -117,6 +118,7 @@ static void print_sync0_until(struct events *events, int64_t mono_ns)
 				continue;
 			case RING_EMPTY:
 			case RING_CLOSED:
+			case RING_DAMAGED:
 				return;
 			}
 		}
@@ -165,7 +167,7 @@ static enum exit_code run(struct events *events)
 	struct event ev;
 
 	for (;;) {
-		switch (ring_read(events->reader, &ev, &lost)) {
+		switch (ring_read(events->reader, &ev, sizeof(ev), &lost)) {
 		case RING_OK:
 			print_sync0_until(events, ev.mono_ns);
 			print(events, &ev);
@@ -186,6 +188,7 @@ static enum exit_code run(struct events *events)
 			}
 			break;
 		case RING_CLOSED:
+		case RING_DAMAGED:
 			print_sync0_until(events, INT64_MAX);
 			return EXIT_CODE_OK;
 		}

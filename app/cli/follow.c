@@ -68,7 +68,8 @@ enum follow_news follow_next(struct follow *follow, uint64_t *ret_lost)
 	if (screen_is_over()) {
 		return FOLLOW_OVER;
 	}
-	switch (ring_read(follow->samples.reader, follow->samples.payload, ret_lost)) {
+	switch (ring_read(follow->samples.reader, follow->samples.payload,
+			  ring_payload_bytes(follow->samples.reader), ret_lost)) {
 	case RING_OK:
 		news = FOLLOW_SAMPLE;
 		break;
@@ -79,6 +80,7 @@ enum follow_news follow_next(struct follow *follow, uint64_t *ret_lost)
 		news = ring_is_orphaned(follow->samples.reader) ? next_ring(follow) : FOLLOW_IDLE;
 		break;
 	case RING_CLOSED:
+	case RING_DAMAGED:
 		news = next_ring(follow);
 		break;
 	}

@@ -49,7 +49,7 @@ static void read_results(struct cli *cli, struct view *view)
 		newest = ring_newest(ring);
 		oldest = ring_oldest(ring);
 		ring_seek(ring, newest - oldest > NEWEST ? newest - NEWEST : oldest);
-		while (ring_read(ring, &r, &lost) == RING_OK) {
+		while (ring_read(ring, &r, sizeof(r), &lost) == RING_OK) {
 			if (r.line < view->lines) {
 				view->result[r.line] = r;
 				view->has_result[r.line] = 1;

@@ -3,9 +3,11 @@
 # the rings (pkg-config name: ecdaq), the licence texts, and what SOEM's licence asks to hand on.
 
 # The include paths of the headers are those of the source tree: "base/ring.h", "image/image.h".
-add_library(ecdaq_client STATIC $<TARGET_OBJECTS:ecdaq_base> $<TARGET_OBJECTS:ecdaq_image>)
+add_library(ecdaq_client STATIC $<TARGET_OBJECTS:ecdaq_base> $<TARGET_OBJECTS:ecdaq_image>
+	$<TARGET_OBJECTS:ecdaq_reader>)
 set_target_properties(ecdaq_client PROPERTIES OUTPUT_NAME ecdaq LINKER_LANGUAGE C)
-add_library(ecdaq_client_shared SHARED $<TARGET_OBJECTS:ecdaq_base> $<TARGET_OBJECTS:ecdaq_image>)
+add_library(ecdaq_client_shared SHARED $<TARGET_OBJECTS:ecdaq_base> $<TARGET_OBJECTS:ecdaq_image>
+	$<TARGET_OBJECTS:ecdaq_reader>)
 set_target_properties(ecdaq_client_shared PROPERTIES OUTPUT_NAME ecdaq LINKER_LANGUAGE C
 	VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR})
 target_link_libraries(ecdaq_client_shared PRIVATE m)
@@ -16,6 +18,8 @@ install(FILES core/base/board.h core/base/clock.h core/base/event.h core/base/hi
 	DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq/base)
 # Control programs say <ecdaq/control.h>.
 install(FILES master/control/control.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq)
+install(FILES core/reader/feed.h core/reader/page.h core/reader/reader.h core/reader/table.h core/reader/utc.h
+	DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq/reader)
 install(FILES core/image/image.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq/image)
 
 file(RELATIVE_PATH ECDAQ_PC_TO_PREFIX "/${CMAKE_INSTALL_LIBDIR}/pkgconfig" "/")

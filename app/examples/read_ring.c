@@ -6,7 +6,7 @@
  *
  *	cc read_ring.c -o read_ring $(pkg-config --cflags --libs ecdaq)
  *
- * It maps the ring read-only: nothing it does, a crash included, disturbs the cycle.
+ * It only reads: nothing it does, a crash included, disturbs the cycle.
  */
 #include <errno.h>
 #include <inttypes.h>
@@ -45,7 +45,7 @@ static int read_until_closed(struct ring_reader *reader, const struct channel *c
 	for (;;) {
 		uint64_t lost = 0;
 
-		switch (ring_read(reader, payload, &lost)) {
+		switch (ring_read(reader, payload, ring_payload_bytes(reader), &lost)) {
 		case RING_OK:
 			print_sample(payload, wanted, count);
 			break;
@@ -59,6 +59,9 @@ static int read_until_closed(struct ring_reader *reader, const struct channel *c
 			}
 			nanosleep(&pause, NULL);
 			break;
+		case RING_DAMAGED:
+			free(payload);
+			return -EIO;
 		case RING_CLOSED:
 			free(payload);
 			return 0;

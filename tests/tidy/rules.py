@@ -24,7 +24,7 @@ WING_TABLE: dict[str, set[str]] = {
     "examples": {"core"},
 }
 # What each module of a wing may include of the other modules, and always its own.
-READERS = {"base", "image", "config", "program"}
+READERS = {"base", "image", "config", "program", "reader"}
 MODULES: dict[str, dict[str, set[str]]] = {
     "core": {
         "base": set(),
@@ -32,6 +32,7 @@ MODULES: dict[str, dict[str, set[str]]] = {
         "config": {"base"},
         "program": {"base", "config"},
         "image": {"base", "wire"},
+        "reader": {"base", "image"},
     },
     "master": {
         "control": {"base", "config", "image"},

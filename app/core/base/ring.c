@@ -18,6 +18,14 @@
 #define RING_MAGIC UINT64_C(0x31676e6972716463) /* "cdqring1" */
 #define PAGE_BYTES 4096u
 #define WORD_BYTES sizeof(uint64_t)
+/* Far above what any ring of ecdaq has; a reader allocates no more than these. */
+#define PAYLOAD_LIMIT (UINT32_C(1) << 16)
+#define META_LIMIT (UINT64_C(1) << 20)
+/* 280 years at 1 GHz: a head beyond it was not counted but written by someone. */
+#define HEAD_LIMIT (UINT64_C(1) << 62)
+/* Slots that a reader copies at once, in bytes. */
+#define BATCH_BYTES 65536u
+#define PEEK_TRIES 16
 
 enum ring_state { RING_STATE_OPEN = 1, RING_STATE_CLOSED = 2 };
 
@@ -50,13 +58,18 @@ struct ring {
 	size_t map_bytes;
 };
 
+/* Nothing of the file is mapped: it may be truncated or rewritten at any time (ADR 42). */
 struct ring_reader {
-	const struct ring_header *header;
-	const _Atomic uint64_t *slots;
-	uint64_t slot_words;
-	uint64_t slot_count;
+	struct ring_header header; /* checked; head and state as they were read last */
+	void *meta;
+	int fd;
+	int is_damaged; /* truncated or overwritten: nothing of it is read any more */
 	uint64_t cursor;
-	size_t map_bytes;
+	uint64_t head;      /* all slots before it were complete */
+	uint64_t *batch;    /* slots copied, and found whole, ahead of the cursor */
+	uint64_t batch_max; /* slots that have room in it */
+	uint64_t batch_first;
+	uint64_t batch_count;
 	char *path;
 	dev_t dev;
 	ino_t ino;
@@ -240,69 +253,117 @@ static int header_is_sane(const struct ring_header *h, uint64_t file_bytes)
 {
 	return h->magic == RING_MAGIC && h->version == RING_VERSION &&
 	       h->total_bytes == file_bytes && h->slot_count >= 2 &&
-	       (h->slot_count & (h->slot_count - 1)) == 0 &&
-	       h->slot_bytes >= WORD_BYTES + h->payload_bytes && h->slot_bytes % WORD_BYTES == 0 &&
-	       h->meta_offset == PAGE_BYTES && h->slots_offset <= file_bytes &&
-	       h->meta_bytes <= h->slots_offset - h->meta_offset &&
-	       h->slots_offset % PAGE_BYTES == 0 && h->slot_bytes <= file_bytes &&
-	       h->slot_count <= file_bytes &&
+	       (h->slot_count & (h->slot_count - 1)) == 0 && h->payload_bytes <= PAYLOAD_LIMIT &&
+	       h->slot_bytes == WORD_BYTES + round_up(h->payload_bytes, WORD_BYTES) &&
+	       h->meta_offset == PAGE_BYTES && h->meta_bytes <= META_LIMIT &&
+	       h->slots_offset == h->meta_offset + round_up(h->meta_bytes, PAGE_BYTES) &&
+	       h->slots_offset <= file_bytes &&
 	       h->slot_count <= (file_bytes - h->slots_offset) / h->slot_bytes &&
 	       memchr(h->kind, 0, sizeof(h->kind)) != NULL;
 }
 
-static int map_for_reading(int fd, struct ring_reader *reader)
+/* All of it, or -EIO: the file has become shorter. */
+static int read_at(int fd, void *buf, size_t bytes, uint64_t offset)
 {
-	struct stat st;
-	void *map;
+	uint8_t *out = buf;
 
-	if (fstat(fd, &st) < 0) {
+	while (bytes > 0) {
+		ssize_t n = pread(fd, out, bytes, (off_t)offset);
+
+		if (n < 0 && errno == EINTR) {
+			continue;
+		}
+		if (n <= 0) {
+			return -EIO;
+		}
+		out += n;
+		offset += (uint64_t)n;
+		bytes -= (size_t)n;
+	}
+	return 0;
+}
+
+static int damaged(struct ring_reader *reader)
+{
+	reader->is_damaged = 1;
+	reader->batch_count = 0;
+	return -EIO;
+}
+
+/*
+ * Look how far the producer is. An aligned word is read at once by pread on x86-64 and arm64; were
+ * it not, the sequence in each slot would show it.
+ */
+static int look_at_head(struct ring_reader *reader)
+{
+	struct {
+		uint64_t head;
+		uint32_t state;
+		uint32_t padding;
+	} now;
+
+	static_assert(offsetof(struct ring_header, state) ==
+			      offsetof(struct ring_header, head) + sizeof(now.head),
+		      "read together");
+	if (reader->is_damaged ||
+	    read_at(reader->fd, &now, sizeof(now), offsetof(struct ring_header, head)) < 0 ||
+	    now.head < reader->head || now.head > HEAD_LIMIT) {
+		return damaged(reader);
+	}
+	/* What the head covers was written before it. */
+	atomic_thread_fence(memory_order_acquire);
+	reader->head = now.head;
+	reader->header.state = now.state;
+	return 0;
+}
+
+static int open_file(struct ring_reader *reader)
+{
+	struct ring_header *h = &reader->header;
+	struct stat st;
+
+	/* Not blocking: it may be a FIFO, put there by someone. */
+	reader->fd = open(reader->path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+	if (reader->fd < 0 || fstat(reader->fd, &st) < 0) {
 		return -errno;
 	}
-	if (st.st_size < (off_t)PAGE_BYTES) {
+	if (!S_ISREG(st.st_mode) || read_at(reader->fd, h, sizeof(*h), 0) < 0 ||
+	    !header_is_sane(h, (uint64_t)st.st_size)) {
 		return -EPROTO;
 	}
-	map = mmap(NULL, (size_t)st.st_size, PROT_READ, MAP_SHARED, fd, 0);
-	if (map == MAP_FAILED) {
-		return -errno;
-	}
-	if (!header_is_sane(map, (uint64_t)st.st_size)) {
-		munmap(map, (size_t)st.st_size);
-		return -EPROTO;
-	}
-	reader->header = map;
-	reader->map_bytes = (size_t)st.st_size;
-	reader->slots = (const _Atomic uint64_t *)(const void *)((const char *)map +
-								 reader->header->slots_offset);
-	reader->slot_words = reader->header->slot_bytes / WORD_BYTES;
-	reader->slot_count = reader->header->slot_count;
 	reader->dev = st.st_dev;
 	reader->ino = st.st_ino;
-	return 0;
+	reader->batch_max = BATCH_BYTES / h->slot_bytes;
+	reader->batch_max = reader->batch_max < 1               ? 1
+			    : reader->batch_max > h->slot_count ? h->slot_count
+								: reader->batch_max;
+	reader->batch = malloc(reader->batch_max * h->slot_bytes);
+	reader->meta = malloc(h->meta_bytes + 1);
+	if (reader->batch == NULL || reader->meta == NULL) {
+		return -ENOMEM;
+	}
+	return read_at(reader->fd, reader->meta, h->meta_bytes, h->meta_offset) < 0 ||
+			       look_at_head(reader) < 0
+		       ? -EPROTO
+		       : 0;
 }
 
 int ring_reader_open(const char *path, struct ring_reader **ret_reader)
 {
 	struct ring_reader *reader = calloc(1, sizeof(*reader));
-	int fd;
 	int r;
 
 	if (reader == NULL) {
 		return -ENOMEM;
 	}
+	reader->fd = -1;
 	reader->path = strdup(path);
-	fd = reader->path == NULL ? -1 : open(path, O_RDONLY | O_CLOEXEC);
-	if (fd < 0) {
-		r = -errno;
-		ring_reader_destroy(reader);
-		return r;
-	}
-	r = map_for_reading(fd, reader);
-	close(fd);
+	r = reader->path == NULL ? -ENOMEM : open_file(reader);
 	if (r < 0) {
 		ring_reader_destroy(reader);
 		return r;
 	}
-	reader->cursor = ring_newest(reader);
+	reader->cursor = reader->head;
 	*ret_reader = reader;
 	return 0;
 }
@@ -312,68 +373,141 @@ void ring_reader_destroy(struct ring_reader *reader)
 	if (reader == NULL) {
 		return;
 	}
-	if (reader->header != NULL) {
-		/* munmap takes a plain pointer; nothing is written through it. */
-		munmap((void *)(uintptr_t)reader->header, reader->map_bytes);
+	if (reader->fd >= 0) {
+		close(reader->fd);
 	}
+	free(reader->batch);
+	free(reader->meta);
 	free(reader->path);
 	free(reader);
 }
 
-static int copy_slot(const struct ring_reader *reader, uint64_t sequence, void *payload)
+/*
+ * Copy slots from @sequence on, which is before the head: 1; 0 if the producer has come round to
+ * the first of them meanwhile; -EIO. It wrote them before it moved the head that we saw; if its
+ * head, read after the copy, is less than a ring further, it had not begun to overwrite them.
+ */
+static int copy_slots(struct ring_reader *reader, uint64_t sequence)
 {
-	const _Atomic uint64_t *slot =
-		reader->slots + (sequence & (reader->slot_count - 1)) * reader->slot_words;
-	uint8_t *out = payload;
-	size_t left = reader->header->payload_bytes;
+	const struct ring_header *h = &reader->header;
+	uint64_t place = sequence & (h->slot_count - 1);
+	uint64_t count = reader->head - sequence;
 
-	if (atomic_load_explicit(slot, memory_order_acquire) != 2 * sequence + 2) {
-		return 0;
-	}
-	for (uint64_t i = 1; left > 0; i++) {
-		uint64_t v = atomic_load_explicit(slot + i, memory_order_relaxed);
-		size_t n = left < WORD_BYTES ? left : WORD_BYTES;
-
-		memcpy(out, &v, n);
-		out += n;
-		left -= n;
+	count = count < reader->batch_max ? count : reader->batch_max;
+	count = count < h->slot_count - place ? count : h->slot_count - place;
+	reader->batch_count = 0;
+	if (read_at(reader->fd, reader->batch, count * h->slot_bytes,
+		    h->slots_offset + place * h->slot_bytes) < 0) {
+		return damaged(reader);
 	}
 	atomic_thread_fence(memory_order_acquire);
-	return atomic_load_explicit(slot, memory_order_relaxed) == 2 * sequence + 2;
+	if (look_at_head(reader) < 0) {
+		return -EIO;
+	}
+	if (reader->head - sequence >= h->slot_count) {
+		return 0;
+	}
+	for (uint64_t i = 0; i < count; i++) {
+		if (reader->batch[i * (h->slot_bytes / WORD_BYTES)] != 2 * (sequence + i) + 2) {
+			return damaged(reader);
+		}
+	}
+	reader->batch_first = sequence;
+	reader->batch_count = count;
+	return 1;
 }
 
-enum ring_result ring_read(struct ring_reader *reader, void *payload, uint64_t *ret_lost)
+static int batch_has(const struct ring_reader *reader, uint64_t sequence)
 {
-	uint64_t oldest;
+	return sequence >= reader->batch_first &&
+	       sequence - reader->batch_first < reader->batch_count;
+}
 
-	/* The state is read before the head: what was pushed before the close is never missed. */
-	uint32_t state = atomic_load_explicit(&reader->header->state, memory_order_acquire);
+static void take_from_batch(const struct ring_reader *reader, uint64_t sequence, void *payload,
+			    size_t payload_bytes)
+{
+	const struct ring_header *h = &reader->header;
+	const uint64_t *slot =
+		reader->batch + (sequence - reader->batch_first) * (h->slot_bytes / WORD_BYTES);
 
-	if (reader->cursor >= ring_newest(reader)) {
-		return state == RING_STATE_CLOSED ? RING_CLOSED : RING_EMPTY;
+	memcpy(payload, slot + 1,
+	       payload_bytes < h->payload_bytes ? payload_bytes : h->payload_bytes);
+}
+
+/* Nothing is left before the head that is known. Has it moved, or will it never? */
+static enum ring_result look_for_more(struct ring_reader *reader)
+{
+	/* Twice if it is closed: what was pushed before the close is never missed. */
+	if (look_at_head(reader) < 0 ||
+	    (reader->header.state == RING_STATE_CLOSED && look_at_head(reader) < 0)) {
+		return RING_DAMAGED;
 	}
-	if (copy_slot(reader, reader->cursor, payload)) {
+	if (reader->cursor < reader->head) {
+		return RING_OK;
+	}
+	return reader->header.state == RING_STATE_CLOSED ? RING_CLOSED : RING_EMPTY;
+}
+
+static uint64_t oldest_before(const struct ring_reader *reader, uint64_t head)
+{
+	uint64_t slots = reader->header.slot_count;
+	/* The producer is about to overwrite the oldest slots: keep clear of them by a 16th. */
+	uint64_t safe = slots - slots / 16 - 1;
+
+	return head > safe ? head - safe : 0;
+}
+
+enum ring_result ring_read(struct ring_reader *reader, void *payload, size_t payload_bytes,
+			   uint64_t *ret_lost)
+{
+	enum ring_result result;
+	uint64_t oldest;
+	int r = 1;
+
+	if (!batch_has(reader, reader->cursor)) {
+		result = reader->cursor < reader->head ? RING_OK : look_for_more(reader);
+		if (result != RING_OK) {
+			return result;
+		}
+		r = copy_slots(reader, reader->cursor);
+	}
+	if (r < 0) {
+		return RING_DAMAGED;
+	}
+	if (r > 0) {
+		take_from_batch(reader, reader->cursor, payload, payload_bytes);
 		reader->cursor++;
 		return RING_OK;
 	}
-	oldest = ring_oldest(reader);
-	*ret_lost = oldest > reader->cursor ? oldest - reader->cursor : 1;
-	reader->cursor += *ret_lost;
+	oldest = oldest_before(reader, reader->head);
+	*ret_lost = oldest - reader->cursor;
+	reader->cursor = oldest;
 	return RING_LOST;
 }
 
-enum ring_result ring_peek_newest(struct ring_reader *reader, void *payload)
+enum ring_result ring_peek_newest(struct ring_reader *reader, void *payload, size_t payload_bytes)
 {
-	for (;;) {
-		uint64_t newest = ring_newest(reader);
+	for (int tries = 0; tries < PEEK_TRIES; tries++) {
+		uint64_t newest;
+		int r = look_at_head(reader);
 
-		if (newest == 0) {
+		if (r < 0) {
+			return RING_DAMAGED;
+		}
+		if (reader->head == 0) {
 			return RING_EMPTY;
 		}
-		if (copy_slot(reader, newest - 1, payload)) {
+		newest = reader->head - 1;
+		r = batch_has(reader, newest) ? 1 : copy_slots(reader, newest);
+		if (r < 0) {
+			return RING_DAMAGED;
+		}
+		if (r > 0) {
+			take_from_batch(reader, newest, payload, payload_bytes);
 			return RING_OK;
 		}
 	}
+	return RING_EMPTY;
 }
 
 uint64_t ring_cursor(const struct ring_reader *reader)
@@ -386,18 +520,15 @@ void ring_seek(struct ring_reader *reader, uint64_t sequence)
 	reader->cursor = sequence;
 }
 
-uint64_t ring_oldest(const struct ring_reader *reader)
+uint64_t ring_oldest(struct ring_reader *reader)
 {
-	uint64_t newest = ring_newest(reader);
-	/* The producer is about to overwrite the oldest slots: keep clear of them by a 16th. */
-	uint64_t safe = reader->slot_count - reader->slot_count / 16 - 1;
-
-	return newest > safe ? newest - safe : 0;
+	return oldest_before(reader, ring_newest(reader));
 }
 
-uint64_t ring_newest(const struct ring_reader *reader)
+uint64_t ring_newest(struct ring_reader *reader)
 {
-	return atomic_load_explicit(&reader->header->head, memory_order_acquire);
+	(void)look_at_head(reader);
+	return reader->head;
 }
 
 int ring_is_replaced(const struct ring_reader *reader)
@@ -407,35 +538,29 @@ int ring_is_replaced(const struct ring_reader *reader)
 	return stat(reader->path, &st) < 0 || st.st_dev != reader->dev || st.st_ino != reader->ino;
 }
 
-int ring_is_orphaned(const struct ring_reader *reader)
+int ring_is_orphaned(struct ring_reader *reader)
 {
-	return atomic_load_explicit(&reader->header->state, memory_order_acquire) ==
-		       RING_STATE_OPEN &&
-	       kill((pid_t)reader->header->producer_pid, 0) < 0 && errno == ESRCH;
+	return look_at_head(reader) == 0 && reader->header.state == RING_STATE_OPEN &&
+	       kill((pid_t)reader->header.producer_pid, 0) < 0 && errno == ESRCH;
 }
 
 const void *ring_meta(const struct ring_reader *reader, size_t *ret_bytes)
 {
-	*ret_bytes = reader->header->meta_bytes;
-	return (const char *)reader->header + reader->header->meta_offset;
+	*ret_bytes = reader->header.meta_bytes;
+	return reader->meta;
 }
 
 const char *ring_kind(const struct ring_reader *reader)
 {
-	return reader->header->kind;
+	return reader->header.kind;
 }
 
 uint32_t ring_payload_bytes(const struct ring_reader *reader)
 {
-	return reader->header->payload_bytes;
+	return reader->header.payload_bytes;
 }
 
 uint64_t ring_slot_count(const struct ring_reader *reader)
 {
-	return reader->slot_count;
-}
-
-uint64_t ring_period_ns(const struct ring_reader *reader)
-{
-	return reader->header->period_ns;
+	return reader->header.slot_count;
 }

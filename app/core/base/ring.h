@@ -1,10 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A ring in shared memory: one producer, any number of readers. Readers map it read-only and keep
+ * A ring in shared memory: one producer, any number of readers. Readers read its file and keep
  * their own cursor, so none of them, however slow, dead or hostile, can disturb the producer. The
  * producer never waits; a reader that falls a whole ring behind learns exactly how many slots it
- * missed. A slot is guarded by its own sequence (a seqlock) and copied word by word with relaxed
- * atomics. The file belongs on a tmpfs: a disk's write-back would fault the producer's pages.
+ * missed. The producer maps the file, writes a slot word by word with relaxed atomics, the slot's
+ * sequence last, and then moves the head; readers copy slots with pread() between two reads of the
+ * head. They map nothing and copy the header once, so that a file that is truncated or overwritten
+ * under them is an error (RING_DAMAGED) and no more (ADR 42). The file belongs on a tmpfs: a disk's
+ * write-back would fault the producer's pages.
  *
  * The header carries the slot size, the depth, and a meta area that describes the payload
  * (for samples: base/sample.h), so that a reader needs nothing but the path.
@@ -55,38 +58,40 @@ enum ring_result {
 	RING_EMPTY, /* nothing new yet */
 	RING_LOST,  /* the cursor was overrun: *ret_lost slots are gone, the cursor is at the oldest
 		       safe one */
-	RING_CLOSED, /* nothing new, and nothing will follow */
+	RING_CLOSED,  /* nothing new, and nothing will follow */
+	RING_DAMAGED, /* truncated or overwritten by someone: nothing more can be read of it */
 };
 
 /**
- * Map the ring at @path for reading; the cursor stands at the newest slot. 0, or -errno:
- * -ENOENT no ring, -EPROTO not a ring or another version. Free with ring_reader_destroy().
+ * Open the ring at @path for reading; the cursor stands behind the newest slot. 0, or -errno:
+ * -ENOENT no ring, -EPROTO not a ring, or another version. Free with ring_reader_destroy().
+ * Context of all below: one thread at a time for each reader; they never wait.
  */
 int ring_reader_open(const char *path, struct ring_reader **ret_reader);
 void ring_reader_destroy(struct ring_reader *reader);
 
-/** Copy the slot under the cursor to @payload (payload_bytes long). Context: any; never blocks. */
-enum ring_result ring_read(struct ring_reader *reader, void *payload, uint64_t *ret_lost);
-
-/** Copy the newest slot without moving the cursor. RING_OK, RING_EMPTY (none yet). */
-enum ring_result ring_peek_newest(struct ring_reader *reader, void *payload);
+/** Copy the slot at the cursor to @payload: @payload_bytes of it, or all if that is less. */
+enum ring_result ring_read(struct ring_reader *reader, void *payload, size_t payload_bytes,
+			   uint64_t *ret_lost);
+/** Copy the newest slot without moving the cursor. RING_OK, RING_EMPTY (none), RING_DAMAGED. */
+enum ring_result ring_peek_newest(struct ring_reader *reader, void *payload, size_t payload_bytes);
 
 /** The sequence number of the slot that ring_read() takes next. */
 uint64_t ring_cursor(const struct ring_reader *reader);
 void ring_seek(struct ring_reader *reader, uint64_t sequence);
 /** The oldest slot that can still be read with some margin, and one past the newest. */
-uint64_t ring_oldest(const struct ring_reader *reader);
-uint64_t ring_newest(const struct ring_reader *reader);
+uint64_t ring_oldest(struct ring_reader *reader);
+uint64_t ring_newest(struct ring_reader *reader);
 
-/** 1 if another ring has taken this one's place at its path (the producer was restarted). */
+/** 1 if the ring is no longer the file at its path: removed, or another one took its place. */
 int ring_is_replaced(const struct ring_reader *reader);
 /** 1 if the producer's process is gone without closing the ring. */
-int ring_is_orphaned(const struct ring_reader *reader);
+int ring_is_orphaned(struct ring_reader *reader);
 
+/** The reader's own copy of what was checked when it opened the ring. */
 const void *ring_meta(const struct ring_reader *reader, size_t *ret_bytes);
 const char *ring_kind(const struct ring_reader *reader);
 uint32_t ring_payload_bytes(const struct ring_reader *reader);
 uint64_t ring_slot_count(const struct ring_reader *reader);
-uint64_t ring_period_ns(const struct ring_reader *reader);
 
 #endif

@@ -63,26 +63,22 @@ static int wait_for_lock(struct session *s, struct failure *failure)
 }
 
 /* The newest |0x092C| of all slaves as the cycle reads it, an upper estimate; -1: not known. */
-static int64_t newest_diff_ns(struct ring_reader *reader, uint8_t *slot)
+static int64_t newest_diff_ns(struct ring_reader *reader)
 {
 	struct sample_header header;
 
-	if (ring_peek_newest(reader, slot) != RING_OK) {
-		return -1;
-	}
-	memcpy(&header, slot, sizeof(header));
-	return header.dc_diff_ns;
+	return ring_peek_newest(reader, &header, sizeof(header)) == RING_OK ? header.dc_diff_ns
+									    : -1;
 }
 
 static int wait_for_agreement(struct session *s, struct ring_reader *reader,
 			      struct failure *failure)
 {
-	static uint8_t slot[sizeof(struct sample_header) + LIMIT_IMAGE_BYTES];
 	int64_t limit_ns = s->spec.cfg->dc_diff_limit_ns;
 	mono_t give_up = mono_add(session_now(s), (span_t){ s->spec.cfg->dc_lock_timeout_ns });
 
 	for (int looks = 0; looks < AGREEING_LOOKS;) {
-		int64_t diff_ns = newest_diff_ns(reader, slot);
+		int64_t diff_ns = newest_diff_ns(reader);
 		int r;
 
 		looks = diff_ns >= 0 && diff_ns <= limit_ns ? looks + 1 : 0;

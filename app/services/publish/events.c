@@ -75,9 +75,9 @@ void events_step(struct events *events, const struct topics *topics, const struc
 	uint64_t lost;
 
 	for (unsigned n = 0; events->ring != NULL && n < EVENTS_A_STEP; n++) {
-		enum ring_result result = ring_read(events->ring, &ev, &lost);
+		enum ring_result result = ring_read(events->ring, &ev, sizeof(ev), &lost);
 
-		if (result == RING_EMPTY || result == RING_CLOSED) {
+		if (result != RING_OK && result != RING_LOST) {
 			return;
 		}
 		if (result == RING_OK) {

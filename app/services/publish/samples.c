@@ -291,7 +291,7 @@ enum samples_result samples_step(struct samples *s, unsigned most)
 	uint64_t lost = 0;
 
 	for (unsigned n = 0; n < most;) {
-		switch (ring_read(s->ring, s->payload, &lost)) {
+		switch (ring_read(s->ring, s->payload, ring_payload_bytes(s->ring), &lost)) {
 		case RING_OK:
 			n++;
 			put_cycle(s);
@@ -302,6 +302,7 @@ enum samples_result samples_step(struct samples *s, unsigned most)
 		case RING_EMPTY:
 			return SAMPLES_EMPTY;
 		case RING_CLOSED:
+		case RING_DAMAGED:
 			return SAMPLES_ENDED;
 		}
 	}

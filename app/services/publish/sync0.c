@@ -81,9 +81,9 @@ void sync0_step(struct sync0 *sync0, const struct topics *topics, const struct s
 	uint64_t lost;
 
 	for (unsigned n = 0; sync0->ring != NULL && n < RESULTS_A_STEP; n++) {
-		enum ring_result got = ring_read(sync0->ring, &result, &lost);
+		enum ring_result got = ring_read(sync0->ring, &result, sizeof(result), &lost);
 
-		if (got == RING_EMPTY || got == RING_CLOSED) {
+		if (got != RING_OK && got != RING_LOST) {
 			return;
 		}
 		if (got == RING_OK) {

@@ -86,7 +86,7 @@ void feed_seek(struct feed *f, const struct feed_mark *mark)
 	}
 	if (mark->next > 0 && mark->next <= ring_newest(f->ring)) {
 		ring_seek(f->ring, mark->next - 1);
-		if (ring_read(f->ring, &before, &lost) == RING_OK) {
+		if (ring_read(f->ring, &before, sizeof(before), &lost) == RING_OK) {
 			memcpy(&mono_ns, (const char *)&before + kinds[f->kind].mono_at,
 			       sizeof(mono_ns));
 			if (mono_ns == mark->mono_ns) {
@@ -106,7 +106,7 @@ int feed_read(struct feed *f, void *ret_record, uint64_t *ret_sequence, uint64_t
 	for (;;) {
 		uint64_t lost = 0;
 
-		switch (ring_read(f->ring, ret_record, &lost)) {
+		switch (ring_read(f->ring, ret_record, kinds[f->kind].bytes, &lost)) {
 		case RING_OK:
 			*ret_sequence = ring_cursor(f->ring) - 1;
 			return 1;
@@ -115,6 +115,7 @@ int feed_read(struct feed *f, void *ret_record, uint64_t *ret_sequence, uint64_t
 			break;
 		case RING_EMPTY:
 		case RING_CLOSED:
+		case RING_DAMAGED:
 			return 0;
 		}
 	}

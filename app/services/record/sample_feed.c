@@ -50,10 +50,9 @@ static int resume_is_believable(struct sample_feed *s, const struct store_state 
 	if (resume->session != s->meta->session) {
 		return 0;
 	}
-	if (ring_peek_newest(s->ring, s->payload) != RING_OK) {
+	if (ring_peek_newest(s->ring, &newest, sizeof(newest)) != RING_OK) {
 		return resume->next_cycle == 0;
 	}
-	memcpy(&newest, s->payload, sizeof(newest));
 	return resume->next_cycle <= newest.cycle + 1;
 }
 
@@ -296,7 +295,7 @@ enum sample_feed_result sample_feed_read(struct sample_feed *s, unsigned most)
 	for (unsigned n = 0; n < most;) {
 		uint64_t lost = 0;
 
-		switch (ring_read(s->ring, s->payload, &lost)) {
+		switch (ring_read(s->ring, s->payload, ring_payload_bytes(s->ring), &lost)) {
 		case RING_OK:
 			n++;
 			if (take_sample(s) < 0) {
@@ -313,6 +312,7 @@ enum sample_feed_result sample_feed_read(struct sample_feed *s, unsigned most)
 		case RING_EMPTY:
 			return SAMPLE_FEED_EMPTY;
 		case RING_CLOSED:
+		case RING_DAMAGED:
 			return SAMPLE_FEED_CLOSED;
 		}
 	}

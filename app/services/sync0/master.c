@@ -184,7 +184,7 @@ int master_next(struct master *m, struct master_item *ret)
 	uint64_t lost;
 
 	for (;;) {
-		switch (ring_read(m->ring, m->payload, &lost)) {
+		switch (ring_read(m->ring, m->payload, ring_payload_bytes(m->ring), &lost)) {
 		case RING_OK:
 			make_item(m, ret);
 			return 1;
@@ -197,6 +197,7 @@ int master_next(struct master *m, struct master_item *ret)
 			m->is_done = 1;
 			return -EPIPE;
 		case RING_CLOSED:
+		case RING_DAMAGED:
 			m->is_done = 1;
 			return -EPIPE;
 		}

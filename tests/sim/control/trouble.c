@@ -82,7 +82,7 @@ static unsigned events(enum event_id id, char *ret_text, size_t text_bytes)
 	snprintf(path, sizeof(path), "%s/" CONFIG_RUN_EVENTS, vm.dir);
 	CHECK_EQ(ring_reader_open(path, &reader), 0);
 	ring_seek(reader, ring_oldest(reader));
-	while (ring_read(reader, &ev, &lost) == RING_OK) {
+	while (ring_read(reader, &ev, sizeof(ev), &lost) == RING_OK) {
 		if (ev.id == id) {
 			count++;
 			event_format(&ev, ret_text, text_bytes);

@@ -222,7 +222,9 @@ static void take_samples(struct virtual_master *vm)
 	uint64_t lost = 0;
 	enum ring_result r;
 
-	while ((r = ring_read(vm->samples, vm->newest, &lost)) != RING_EMPTY && r != RING_CLOSED) {
+	while ((r = ring_read(vm->samples, vm->newest, ring_payload_bytes(vm->samples), &lost)) ==
+		       RING_OK ||
+	       r == RING_LOST) {
 		if (r == RING_LOST) {
 			test_fail(__FILE__, __LINE__, "the ring ran over: %llu samples",
 				  (unsigned long long)lost);
@@ -385,7 +387,7 @@ void virtual_master_print_events(const struct virtual_master *vm, uint64_t count
 		return;
 	}
 	ring_seek(reader, ring_newest(reader) > count ? ring_newest(reader) - count : 0);
-	while (ring_read(reader, &ev, &lost) == RING_OK) {
+	while (ring_read(reader, &ev, sizeof(ev), &lost) == RING_OK) {
 		event_format(&ev, text, sizeof(text));
 		fprintf(stderr, "  %.6f s: %s\n", (double)ev.mono_ns * 1e-9, text);
 	}

@@ -216,7 +216,7 @@ static struct got next_sample(void)
 	struct got got;
 	uint64_t lost;
 
-	CHECK_EQ(ring_read(reader, &got, &lost), RING_OK);
+	CHECK_EQ(ring_read(reader, &got, sizeof(got), &lost), RING_OK);
 	return got;
 }
 
@@ -296,7 +296,7 @@ TEST(cycle, a_stall_too_long_for_placeholders_jumps_the_numbers_by_exactly_the_s
 	steps(2);
 	CHECK_EQ(next_sample().h.cycle, cycle + 5001);
 	CHECK_EQ(next_sample().h.slaves_bad, 0);
-	while (ring_read(event_reader, &ev, &lost) == RING_OK) {
+	while (ring_read(event_reader, &ev, sizeof(ev), &lost) == RING_OK) {
 		jumps += ev.id == EVENT_NUMBERING_JUMP && ev.arg[0] == 5000;
 	}
 	CHECK_EQ(jumps, 1);
@@ -458,7 +458,7 @@ TEST(cycle, events_of_one_kind_are_limited_but_the_counters_are_not)
 	start_in_op();
 	world.late = 1;
 	steps(500);
-	while (ring_read(event_reader, &ev, &lost) == RING_OK) {
+	while (ring_read(event_reader, &ev, sizeof(ev), &lost) == RING_OK) {
 		count += ev.id == EVENT_FRAME_LATE;
 	}
 	CHECK_EQ(stats.frames_late, 500);
@@ -471,7 +471,7 @@ static unsigned count_events(enum event_id id)
 	uint64_t lost;
 	unsigned count = 0;
 
-	while (ring_read(event_reader, &ev, &lost) == RING_OK) {
+	while (ring_read(event_reader, &ev, sizeof(ev), &lost) == RING_OK) {
 		count += ev.id == id;
 	}
 	return count;

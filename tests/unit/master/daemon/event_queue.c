@@ -43,7 +43,7 @@ TEST(daemon_event_queue, events_come_out_in_the_order_they_were_pushed)
 	CHECK_EQ(ring_pushed(events), 10);
 	ring_seek(reader, 0);
 	for (int i = 0; i < 10; i++) {
-		CHECK_EQ(ring_read(reader, &ev, &lost), RING_OK);
+		CHECK_EQ(ring_read(reader, &ev, sizeof(ev), &lost), RING_OK);
 		CHECK_EQ(ev.value, i);
 	}
 	ring_reader_destroy(reader);

@@ -407,7 +407,7 @@ TEST(session, events_of_the_service_thread_reach_the_ring_in_order)
 	CHECK_EQ(run(&b, 10, &failure), SESSION_GOES_ON);
 	CHECK_EQ(session_stop(b.session, &failure), 0);
 	session_conclude(b.session, NULL);
-	while (ring_read(reader, &ev, &lost) == RING_OK) {
+	while (ring_read(reader, &ev, sizeof(ev), &lost) == RING_OK) {
 		size_t used = strlen(seen);
 
 		CHECK(ev.mono_ns > 0 && ev.tai_ns > 0);
