@@ -29,7 +29,7 @@ from made_machine import (
 )
 
 
-def test_a_good_machine_has_nothing_to_mend(machine: Machine) -> None:
+def test_a_good_machine_has_nothing_to_fix(machine: Machine) -> None:
     text = works(examine(machine, "--strict"))
     found = checks(machine)
     assert {name for name, check in found.items() if check["level"] != "OK"} == OF_A_RUNNING_ECDAQD
@@ -45,7 +45,7 @@ ALSO_GOOD: list[tuple[str, Files, str]] = [
         {f"{CPU}/isolated": "\n", "/sys/fs/cgroup/cpuset.cpus.isolated": "3\n"},
         "core 3",
     ),
-    ("rcu_nocbs", {"/proc/cmdline": "ro nohz_full=3\n"}, "as nohz_full has it"),
+    ("rcu_nocbs", {"/proc/cmdline": "ro nohz_full=3\n"}, "implied by nohz_full"),
     ("rcu_nocbs", {"/proc/cmdline": "rcu_nocbs=all"}, "rcu_nocbs=all"),
     ("rt_throttling", {"/proc/sys/kernel/sched_rt_runtime_us": "1000000\n"}, "off"),
     ("governor", {f"{CORE}/cpufreq": None}, "does not change"),
@@ -55,17 +55,17 @@ ALSO_GOOD: list[tuple[str, Files, str]] = [
         {f"{CORE}/cpuidle/state1/latency": "133\n", "/dev/cpu_dma_latency": None},
         "while ecdaqd runs",
     ),
-    ("swap", {"/proc/swaps": None}, "has none"),
+    ("swap", {"/proc/swaps": None}, "not built into"),
     ("nic", {f"{NET}/device": None}, "virtual port"),
-    ("nic", {f"{NET}/speed": "-1\n"}, "does not tell"),
+    ("nic", {f"{NET}/speed": "-1\n"}, "speed unknown"),
     ("eee", {"/calls/eee.ecat0": "unsupported\n"}, "no energy-efficient"),
-    ("coalescing", {"/calls/coalesce.ecat0": "unsupported\n"}, "does not collect"),
+    ("coalescing", {"/calls/coalesce.ecat0": "unsupported\n"}, "no interrupt coalescing"),
     ("coalescing", {"/calls/coalesce.ecat0": "rx_us 57\nrx_frames 1\nadaptive 0\n"}, "rx-frames 1"),
-    ("core_users", thread(701, "ksmd (odd)", "0-3", flags=KTHREAD), "nothing else"),
+    ("core_users", thread(701, "ksmd (odd)", "0-3", flags=KTHREAD), "no other thread"),
     (
         "inodes",
         disk(inodes_total=0),
-        "not count",
+        "no inode limit",
     ),
     (
         "nic_irqs",
@@ -116,7 +116,7 @@ RUNNING: list[tuple[str, tuple[str, ...], dict[str, Any], str, str]] = [
     ("cycle_thread", (), {"cores": "0-3"}, "FAIL", "may run on 0-3 instead of core 3 alone"),
     ("page_faults", (), {}, "OK", "0 in"),
     ("page_faults", ("FAULTS=7",), {}, "FAIL", "7 in"),
-    ("core_users", (), {}, "OK", "nothing else"),
+    ("core_users", (), {}, "OK", "no other thread"),
     ("memory_lock", ("DEGRADED=0",), {}, "OK", "131072 KiB"),
     ("memory_lock", ("DEGRADED=4",), {}, "FAIL", "LimitMEMLOCK=infinity"),
 ]
@@ -163,7 +163,7 @@ def test_a_copy_with_an_ecdaqd_in_it_is_judged_without_a_status_page(machine: Ma
     found = checks(machine)
     assert found["cycle_thread"]["value"] == "SCHED_FIFO 80 on core 3"
     assert found["memory_lock"]["value"] == "131072 KiB of ecdaqd are locked"
-    assert found["page_faults"]["value"] == "ecdaqd's status page: not there"
+    assert found["page_faults"]["value"] == "ecdaqd's status page: not found"
     machine.change({"/proc/500/status": "VmLck:\t  0 kB\n"})
     assert checks(machine)["memory_lock"]["level"] == "FAIL"
 
@@ -173,7 +173,9 @@ def test_a_status_page_of_another_version_says_so(machine: Machine, run_dir: Pat
     machine.change(running_threads(500))
     found = checks(machine, run_dir)
     assert found["cycle_thread"]["level"] == "OK"
-    assert found["page_faults"]["value"] == "ecdaqd's status page: of another version of ecdaq"
+    assert (
+        found["page_faults"]["value"] == "ecdaqd's status page: written by another version of ecdaq"
+    )
 
 
 # What ecdaqd was started with, and port, core and priority by it.
@@ -225,7 +227,7 @@ def test_who_is_not_root_is_told_what_could_not_be_read(fake: Callable[..., Fake
     found = {check["name"]: check for check in report(result)["check"]}
     assert found["page_faults"]["level"] == "SKIP" and found["page_faults"]["wants_root"] is True
     text = running("doctor", user=NOBODY).stdout
-    assert "could not be made as this user: run ecdaq doctor as root" in text.splitlines()[-1]
+    assert "could not be read as this user: run ecdaq doctor as root" in text.splitlines()[-1]
 
 
 def test_mistakes_are_named(machine: Machine, tmp_path: Path) -> None:

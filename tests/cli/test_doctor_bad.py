@@ -23,9 +23,9 @@ from made_machine import (
     thread,
 )
 
-# check, what is wrong, what it is called, what is said (value or mend)
+# check, what is wrong, its level, a part of the value or the remedy
 BAD: list[tuple[str, Files, str, str]] = [
-    ("machine", {"/run/systemd/container": "lxc"}, "WARN", "no claims about latency"),
+    ("machine", {"/run/systemd/container": "lxc"}, "WARN", "say nothing about hardware"),
     (
         "machine",
         {"/proc/cpuinfo": "flags\t\t: fpu vme hypervisor\n"},
@@ -47,7 +47,7 @@ BAD: list[tuple[str, Files, str, str]] = [
     ),
     ("isolation", {f"{CPU}/isolated": "\n"}, "FAIL", "isolcpus=managed_irq,domain,3"),
     ("isolation", {f"{CPU}/isolated": "2\n"}, "FAIL", "not isolated (isolated: 2)"),
-    ("isolation", {f"{CPU}/online": "0-2\n"}, "FAIL", "core 3 is not there (online: 0-2)"),
+    ("isolation", {f"{CPU}/online": "0-2\n"}, "FAIL", "core 3 does not exist (online: 0-2)"),
     ("nohz_full", {f"{CPU}/nohz_full": "(null)\n"}, "WARN", "nohz_full=3"),
     (
         "rcu_nocbs",
@@ -59,14 +59,14 @@ BAD: list[tuple[str, Files, str, str]] = [
         "rt_throttling",
         {"/proc/sys/kernel/sched_rt_runtime_us": "950000\n"},
         "WARN",
-        "50000 us in each 1000000 us",
+        "only 950000 us in each 1000000 us",
     ),
     ("timer_migration", {"/proc/sys/kernel/timer_migration": "1\n"}, "WARN", "timer_migration=0"),
     (
         "smt",
         {f"{CORE}/topology/thread_siblings_list": "1,3\n"},
         "WARN",
-        "core 3 shares its hardware with core 1",
+        "core 3 shares its hardware: cores 1,3",
     ),
     ("governor", {f"{CORE}/cpufreq/scaling_governor": "ondemand\n"}, "WARN", "echo performance"),
     (
@@ -79,7 +79,7 @@ BAD: list[tuple[str, Files, str, str]] = [
             "ecdaq.yaml": "bus:\n  interface: ecat0\ncycle:\n  cpu: 3\n  cpu_dma_latency: -1us\n",
         },
         "WARN",
-        "may sleep in C6: 133 us",
+        "may enter C6: exit latency 133 us",
     ),
     (
         "core_users",
@@ -91,7 +91,7 @@ BAD: list[tuple[str, Files, str, str]] = [
         "core_users",
         thread(700, "rogue", "3", (1, 99)),
         "FAIL",
-        "rogue (SCHED_FIFO 99) may run on core 3",
+        "rogue (SCHED_FIFO 99) may preempt the cycle on core 3",
     ),
     (
         "memory_lock",
@@ -103,7 +103,7 @@ BAD: list[tuple[str, Files, str, str]] = [
         "swap",
         {"/proc/swaps": "Filename\tType\n/dev/zram0   partition\t100\t0\t-2\n"},
         "WARN",
-        "/dev/zram0",
+        "memory that is not locked",
     ),
     (
         "huge_pages",
@@ -117,13 +117,13 @@ BAD: list[tuple[str, Files, str, str]] = [
     ("nic", {f"{NET}/duplex": "half\n"}, "FAIL", "half duplex"),
     ("nic", {f"{NET}/speed": "1000\n"}, "WARN", "1000 Mbit/s"),
     ("nic_users", {"/calls/addresses.ecat0": "192.0.2.9 fe80::1\n"}, "WARN", "192.0.2.9 fe80::1"),
-    ("nic_users", {f"{NET}/master": "-> ../br0"}, "FAIL", "a part of br0"),
+    ("nic_users", {f"{NET}/master": "-> ../br0"}, "FAIL", "a port of br0"),
     ("nic_users", {"/run/NetworkManager/devices/2": "[device]\nmanaged=true\n"}, "WARN", "nmcli"),
     (
         "nic_users",
         {"/proc/net/packet": "sk RefCnt Type Proto Iface\nffff 3 3 0003 0 1 0 0 99\n"},
         "WARN",
-        "1 packet socket of others",
+        "1 other packet socket receives",
     ),
     (
         "eee",
@@ -179,7 +179,7 @@ BAD: list[tuple[str, Files, str, str]] = [
         "tai",
         {"/calls/clock": "synchronised 1\nerror_us 850\ntai_offset_s 0\n"},
         "WARN",
-        "TAI - UTC as 0 s, it is 37 s",
+        "TAI - UTC is 0 s instead of 37 s",
     ),
     ("watchdog", {"/sys/class/watchdog": None}, "WARN", "none"),
     (
@@ -192,9 +192,14 @@ BAD: list[tuple[str, Files, str, str]] = [
         "watchdog",
         {"/sys/class/watchdog/watchdog0/identity": "Software Watchdog\n"},
         "WARN",
-        "hangs with the kernel",
+        "stops with the kernel",
     ),
-    ("watchdog", {"/sys/class/watchdog/watchdog0/timeout": "60\n"}, "WARN", "counts to 15 s only"),
+    (
+        "watchdog",
+        {"/sys/class/watchdog/watchdog0/timeout": "60\n"},
+        "WARN",
+        "supports 15 s at most",
+    ),
     (
         "disk",
         disk(read_only=1),
@@ -205,7 +210,7 @@ BAD: list[tuple[str, Files, str, str]] = [
         "disk",
         disk(memory=1),
         "WARN",
-        "memory",
+        "in RAM",
     ),
     (
         "disk",
@@ -223,13 +228,13 @@ BAD: list[tuple[str, Files, str, str]] = [
         "inodes",
         disk(inodes_free=0),
         "FAIL",
-        "0 more files",
+        "0 inodes free",
     ),
     (
         "inodes",
         disk(inodes_free=9),
         "WARN",
-        "9 more files",
+        "9 inodes free",
     ),
     ("power", {"/calls/throttled": "flags 0x50005\n"}, "FAIL", "now: under-voltage, throttled"),
     ("power", {"/calls/throttled": "flags 0x80000\n"}, "WARN", "since boot, now over: hot"),
@@ -256,7 +261,7 @@ BAD: list[tuple[str, Files, str, str]] = [
 
 
 @pytest.mark.parametrize(("name", "wrong", "level", "said"), BAD)
-def test_what_is_wrong_is_named_with_its_mend(
+def test_what_is_wrong_is_named_with_its_remedy(
     machine: Machine, name: str, wrong: Files, level: str, said: str
 ) -> None:
     machine.change(wrong)
@@ -266,7 +271,7 @@ def test_what_is_wrong_is_named_with_its_mend(
     assert said in f"{found[name]['value']} -> {found[name]['mend']}"
     assert found[name]["mend"]
     if level == "FAIL":
-        fails(result, FAILED, "to mend:", name)
+        fails(result, FAILED, "to fix:", name)
     else:
         assert examine(machine, "--strict").returncode == FAILED
 

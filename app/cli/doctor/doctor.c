@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* ecdaq doctor: is this machine fit for the cycle? A table of checks, each with its mend. */
+/* ecdaq doctor: is this machine fit for the cycle? Tables of checks, each with its remedy. */
 #include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
@@ -8,51 +8,15 @@
 #include <unistd.h>
 
 #include "cli/args.h"
-#include "cli/doctor/patient.h"
-#include "cli/doctor/target.h"
+#include "cli/doctor/check.h"
+#include "cli/doctor/resolve.h"
 #include "cli/json.h"
 #include "cli/source.h"
 #include "cli/text.h"
 
 #define CYCLE_THREAD "ecdaqd-cycle"
 
-static const struct {
-	const char *name;
-	check_fn *check;
-} checks[] = {
-	{ "machine", check_machine },
-	{ "kernel", check_kernel },
-	{ "isolation", check_isolation },
-	{ "nohz_full", check_nohz_full },
-	{ "rcu_nocbs", check_rcu_nocbs },
-	{ "rt_throttling", check_rt_throttling },
-	{ "timer_migration", check_timer_migration },
-	{ "smt", check_smt },
-	{ "governor", check_governor },
-	{ "idle_states", check_idle_states },
-	{ "cycle_thread", check_cycle_thread },
-	{ "core_users", check_core_users },
-	{ "page_faults", check_page_faults },
-	{ "memory_lock", check_memory_lock },
-	{ "swap", check_swap },
-	{ "huge_pages", check_huge_pages },
-	{ "nic", check_nic },
-	{ "nic_users", check_nic_users },
-	{ "eee", check_eee },
-	{ "coalescing", check_coalescing },
-	{ "nic_irqs", check_nic_irqs },
-	{ "irq_threads", check_irq_threads },
-	{ "other_irqs", check_other_irqs },
-	{ "clocksource", check_clocksource },
-	{ "ntp", check_ntp },
-	{ "tai", check_tai },
-	{ "watchdog", check_watchdog },
-	{ "disk", check_disk },
-	{ "inodes", check_inodes },
-	{ "power", check_power },
-};
-
-enum { CHECK_COUNT = sizeof(checks) / sizeof(checks[0]) };
+enum { CHECKS_MAX = 40 };
 
 struct doctor {
 	struct cli *cli;
@@ -61,24 +25,26 @@ struct doctor {
 	int is_json;
 	int is_strict;
 	struct config cfg;
-	char config_name[SIGHT_PATH_BYTES];
-	struct patient patient;
-	struct finding finding[CHECK_COUNT];
+	char config_name[PROBE_PATH_BYTES];
+	struct target target;
+	const struct check *check[CHECKS_MAX];
+	struct finding finding[CHECKS_MAX];
+	size_t check_count;
 	unsigned count[FINDING_LEVELS];
 };
 
 /* An ecdaqd that runs; one that has ended is none. One of here has no part in another machine. */
 static enum exit_code find_daemon(struct doctor *d)
 {
-	struct patient *p = &d->patient;
+	struct target *t = &d->target;
 	int is_copy = d->root[0] != '\0';
 	const struct status_page *page;
 	char path[CONFIG_PATH_BYTES];
 	enum exit_code result;
 
 	if (is_copy && d->cli->run_dir == NULL) {
-		p->pid = target_find_daemon(&p->sight);
-		p->page_err = p->pid == 0 ? 0 : -ENOENT;
+		t->pid = resolve_find_daemon(&t->probe);
+		t->page_err = t->pid == 0 ? 0 : -ENOENT;
 		return EXIT_CODE_OK;
 	}
 	result = cli_path(d->cli, CONFIG_RUN_STATUS, path);
@@ -87,11 +53,11 @@ static enum exit_code find_daemon(struct doctor *d)
 	}
 	page = status_open(path, STATUS_MAGIC, sizeof(*page));
 	if (page == NULL && errno != ENOENT) {
-		p->page_err = -errno;
-		p->pid = target_find_daemon(&p->sight);
+		t->page_err = -errno;
+		t->pid = resolve_find_daemon(&t->probe);
 	} else if (page != NULL && source_is_alive(page->pid)) {
-		p->page = page;
-		p->pid = page->pid;
+		t->page = page;
+		t->pid = page->pid;
 	} else if (page != NULL) {
 		source_status_close(page);
 	}
@@ -105,7 +71,7 @@ static enum exit_code load_config(struct doctor *d)
 	char error[512];
 
 	if (path == NULL) {
-		target_load(&d->patient.sight, d->patient.pid, &d->cfg, d->config_name);
+		resolve_load(&d->target.probe, d->target.pid, &d->cfg, d->config_name);
 		return EXIT_CODE_OK;
 	}
 	config_defaults(&d->cfg);
@@ -118,27 +84,26 @@ static enum exit_code load_config(struct doctor *d)
 
 static void keep_cycle(void *ctx, const struct thread *thread)
 {
-	struct patient *p = ctx;
+	struct target *t = ctx;
 
 	if (strcmp(thread->name, CYCLE_THREAD) == 0) {
-		p->cycle = *thread;
+		t->cycle = *thread;
 	}
 }
 
 /* Does ecdaqd see other ports than this program (`build.sh run` gives it a network of its own)? */
 static int has_own_network(const struct doctor *d)
 {
-	char its[SIGHT_TEXT_BYTES];
-	char ours[SIGHT_TEXT_BYTES];
+	char its[PROBE_TEXT_BYTES];
+	char ours[PROBE_TEXT_BYTES];
 
 	return d->root[0] == '\0' &&
-	       sight_link(&d->patient.sight, its, "/proc/%" PRId64 "/ns/net", d->patient.pid) >=
-		       0 &&
-	       sight_link(&d->patient.sight, ours, "/proc/self/ns/net") >= 0 &&
+	       probe_link(&d->target.probe, its, "/proc/%" PRId64 "/ns/net", d->target.pid) >= 0 &&
+	       probe_link(&d->target.probe, ours, "/proc/self/ns/net") >= 0 &&
 	       strcmp(its, ours) != 0;
 }
 
-/* What the configuration leaves open, the status page tells. */
+/* Take from the status page what the configuration leaves open. */
 static void adopt(struct doctor *d, const struct status_page *page)
 {
 	uint32_t cpu = atomic_load_explicit(&page->cycle_cpu, memory_order_relaxed);
@@ -147,99 +112,108 @@ static void adopt(struct doctor *d, const struct status_page *page)
 		snprintf(d->cfg.interface, sizeof(d->cfg.interface), "%.*s",
 			 (int)sizeof(page->interface) - 1, page->interface);
 	}
-	if (d->patient.cpu < 0 && cpu < INT32_MAX) {
-		d->patient.cpu = (int)cpu;
+	if (d->target.cpu < 0 && cpu < INT32_MAX) {
+		d->target.cpu = (int)cpu;
 	}
 }
 
 static void prepare(struct doctor *d)
 {
-	struct patient *p = &d->patient;
+	struct target *t = &d->target;
 
-	p->cfg = &d->cfg;
-	p->cpu = d->cfg.cycle_cpu;
-	if (p->page != NULL) {
-		adopt(d, p->page);
+	t->cfg = &d->cfg;
+	t->cpu = d->cfg.cycle_cpu;
+	if (t->page != NULL) {
+		adopt(d, t->page);
 	}
-	if (p->pid != 0) {
-		thread_each(&p->sight, p->pid, keep_cycle, p);
-		p->is_nic_elsewhere = d->nic == NULL && has_own_network(d);
+	if (t->pid != 0) {
+		thread_each(&t->probe, t->pid, keep_cycle, t);
+		t->is_nic_elsewhere = d->nic == NULL && has_own_network(d);
 	}
-	p->nic = d->nic != NULL ? d->nic : d->cfg.interface;
+	t->nic = d->nic != NULL ? d->nic : d->cfg.interface;
 }
 
 static void examine(struct doctor *d)
 {
-	for (size_t i = 0; i < CHECK_COUNT; i++) {
-		checks[i].check(&d->patient, &d->finding[i]);
-		d->count[d->finding[i].level]++;
+	static const struct check *const tables[] = { checks_of_kernel, checks_of_threads,
+						      checks_of_nic, checks_of_irqs,
+						      checks_of_system };
+
+	for (size_t i = 0; i < sizeof(tables) / sizeof(tables[0]); i++) {
+		for (const struct check *c = tables[i]; c->name != NULL; c++) {
+			struct finding *f = &d->finding[d->check_count];
+
+			check_run(c, &d->target, f);
+			d->check[d->check_count++] = c;
+			d->count[f->level]++;
+		}
 	}
 }
 
-static int wants_root(const struct doctor *d)
+static unsigned unread_count(const struct doctor *d)
 {
-	int count = 0;
+	unsigned count = 0;
 
-	for (size_t i = 0; i < CHECK_COUNT; i++) {
-		count += d->finding[i].wants_root;
+	for (size_t i = 0; i < d->check_count; i++) {
+		count += d->finding[i].needs_root != 0;
 	}
 	return count;
 }
 
-static void say_text(const struct doctor *d)
+static void write_text(const struct doctor *d)
 {
 	char value[FINDING_TEXT_BYTES];
-	char mend[FINDING_TEXT_BYTES];
+	char remedy[FINDING_TEXT_BYTES];
 
 	printf("port %s, cycle core %d, priority %u; configuration: %s\n",
-	       d->patient.nic[0] == '\0' ? "none" : d->patient.nic, d->patient.cpu,
+	       d->target.nic[0] == '\0' ? "none" : d->target.nic, d->target.cpu,
 	       d->cfg.cycle_priority, d->config_name);
-	for (size_t i = 0; i < CHECK_COUNT; i++) {
+	for (size_t i = 0; i < d->check_count; i++) {
 		const struct finding *f = &d->finding[i];
 
 		text_plain(f->value, value, sizeof(value));
-		text_plain(f->mend, mend, sizeof(mend));
-		printf("%-4s  %-15s  %s%s%s\n", finding_level_to_str(f->level), checks[i].name,
-		       value, mend[0] == '\0' ? "" : "  -> ", mend);
+		text_plain(f->remedy, remedy, sizeof(remedy));
+		printf("%-4s  %-15s  %s%s%s\n", finding_level_to_str(f->level), d->check[i]->name,
+		       value, remedy[0] == '\0' ? "" : "  -> ", remedy);
 	}
-	printf("%u checks: %u ok, %u warn, %u fail, %u skipped\n", (unsigned)CHECK_COUNT,
+	printf("%u checks: %u ok, %u warn, %u fail, %u skipped\n", (unsigned)d->check_count,
 	       d->count[FINDING_OK], d->count[FINDING_WARN], d->count[FINDING_FAIL],
 	       d->count[FINDING_SKIP]);
-	if (wants_root(d) > 0) {
-		printf("%d could not be made as this user: run ecdaq doctor as root\n",
-		       wants_root(d));
+	if (unread_count(d) > 0) {
+		printf("%u could not be read as this user: run ecdaq doctor as root\n",
+		       unread_count(d));
 	}
 }
 
-static void say_json(const struct doctor *d)
+static void write_json(const struct doctor *d)
 {
 	struct json js;
 
 	json_init(&js, stdout);
 	json_object_begin(&js, NULL);
-	json_text(&js, "interface", d->patient.nic);
-	json_i64(&js, "cycle_cpu", d->patient.cpu);
+	json_text(&js, "interface", d->target.nic);
+	json_i64(&js, "cycle_cpu", d->target.cpu);
 	json_u64(&js, "cycle_priority", d->cfg.cycle_priority);
 	json_text(&js, "config", d->config_name);
-	json_truth(&js, "running", d->patient.pid != 0);
+	json_truth(&js, "running", d->target.pid != 0);
 	json_u64(&js, "ok", d->count[FINDING_OK]);
 	json_u64(&js, "warn", d->count[FINDING_WARN]);
 	json_u64(&js, "fail", d->count[FINDING_FAIL]);
 	json_u64(&js, "skip", d->count[FINDING_SKIP]);
 	json_array_begin(&js, "check");
-	for (size_t i = 0; i < CHECK_COUNT; i++) {
+	for (size_t i = 0; i < d->check_count; i++) {
 		const struct finding *f = &d->finding[i];
 
 		json_object_begin(&js, NULL);
-		json_text(&js, "name", checks[i].name);
+		json_text(&js, "name", d->check[i]->name);
 		json_text(&js, "level", finding_level_to_str(f->level));
 		json_text(&js, "value", f->value);
-		if (f->mend[0] == '\0') {
+		if (f->remedy[0] == '\0') {
 			json_null(&js, "mend");
 		} else {
-			json_text(&js, "mend", f->mend);
+			json_text(&js, "mend", f->remedy);
 		}
-		json_truth(&js, "wants_root", f->wants_root);
+		json_truth(&js, "wants_root", f->needs_root);
 		json_object_end(&js);
 	}
 	json_array_end(&js);
@@ -254,19 +228,19 @@ static enum exit_code verdict(const struct doctor *d)
 	char names[512] = "";
 	unsigned count = 0;
 
-	for (size_t i = 0; i < CHECK_COUNT; i++) {
+	for (size_t i = 0; i < d->check_count; i++) {
 		enum finding_level level = d->finding[i].level;
 		size_t used = strlen(names);
 
 		if (level == FINDING_FAIL || level == least) {
-			snprintf(names + used, sizeof(names) - used, " %s", checks[i].name);
+			snprintf(names + used, sizeof(names) - used, " %s", d->check[i]->name);
 			count++;
 		}
 	}
 	if (count == 0) {
 		return EXIT_CODE_OK;
 	}
-	return cli_fail(d->cli, EXIT_CODE_FAILED, "%u check%s to mend:%s", count,
+	return cli_fail(d->cli, EXIT_CODE_FAILED, "%u check%s to fix:%s", count,
 			count == 1 ? "" : "s", names);
 }
 
@@ -274,7 +248,7 @@ static enum exit_code run(struct doctor *d)
 {
 	enum exit_code result;
 
-	d->patient.sight.root = d->root;
+	d->target.probe.root = d->root;
 	if (d->root[0] != '\0' && access(d->root, X_OK) < 0) {
 		return cli_fail(d->cli, EXIT_CODE_USAGE, "--root: %s cannot be entered", d->root);
 	}
@@ -288,12 +262,12 @@ static enum exit_code run(struct doctor *d)
 	prepare(d);
 	examine(d);
 	if (d->is_json) {
-		say_json(d);
+		write_json(d);
 	} else {
-		say_text(d);
+		write_text(d);
 	}
-	if (d->patient.page != NULL) {
-		source_status_close(d->patient.page);
+	if (d->target.page != NULL) {
+		source_status_close(d->target.page);
 	}
 	return verdict(d);
 }

@@ -5,7 +5,7 @@
 
 #include <stdint.h>
 
-#include "cli/doctor/sight.h"
+#include "cli/doctor/probe.h"
 
 enum { IRQ_MAX = 512 };
 
@@ -22,9 +22,9 @@ int irq_parse(const char *line, struct irq *ret);
 int irq_is_of(const struct irq *irq, const char *user);
 
 /** All of them, IRQ_MAX at most; the number or -errno. */
-int irq_list(const struct sight *s, struct irq irqs[IRQ_MAX]);
+int irq_list(const struct probe *p, struct irq irqs[IRQ_MAX]);
 
 /** The cores where it fires, "0-2". 0 or -errno. */
-int irq_cores(const struct sight *s, int number, char ret_list[SIGHT_TEXT_BYTES]);
+int irq_cores(const struct probe *p, int number, char ret_list[PROBE_TEXT_BYTES]);
 
 #endif

@@ -5,7 +5,7 @@
 
 #include <stdint.h>
 
-#include "cli/doctor/sight.h"
+#include "cli/doctor/probe.h"
 
 enum { THREAD_FIFO = 1, THREAD_RR = 2 }; /* SCHED_ of sched.h */
 
@@ -16,17 +16,17 @@ struct thread {
 	int is_kernel;
 	int policy;
 	int priority;                 /* of FIFO and RR */
-	char cores[SIGHT_TEXT_BYTES]; /* where it may run: "0-2" */
+	char cores[PROBE_TEXT_BYTES]; /* where it may run: "0-2" */
 };
 
 /** One line of /proc/PID/task/TID/stat. 0 or -EBADMSG. All but pid and cores is filled. */
 int thread_parse_stat(const char *line, struct thread *ret);
 
 /** The thread @tid of @pid; -ENOENT when it has ended. */
-int thread_read(const struct sight *s, int64_t pid, int64_t tid, struct thread *ret);
+int thread_read(const struct probe *p, int64_t pid, int64_t tid, struct thread *ret);
 
 /** Calls @each for all threads of process @pid, or of all processes with @pid 0. 0 or -errno. */
-int thread_each(const struct sight *s, int64_t pid,
+int thread_each(const struct probe *p, int64_t pid,
 		void (*each)(void *ctx, const struct thread *thread), void *ctx);
 
 /** "SCHED_FIFO 80", "SCHED_OTHER". */

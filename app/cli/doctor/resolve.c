@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "cli/doctor/target.h"
+#include "cli/doctor/resolve.h"
 
 #include <ctype.h>
 #include <inttypes.h>
@@ -30,7 +30,7 @@ static const char *value_of(const char *word, const char *next, const char *name
 	return word[2 + len] == '\0' ? next : NULL;
 }
 
-static void take(const char *word, const char *next, struct target_words *words)
+static void take(const char *word, const char *next, struct resolve_words *words)
 {
 	const char *value = value_of(word, next, "config");
 
@@ -42,14 +42,14 @@ static void take(const char *word, const char *next, struct target_words *words)
 		words->interface = value;
 	}
 	value = value_of(word, next, "set");
-	if (value != NULL && words->set_count < TARGET_SETS) {
+	if (value != NULL && words->set_count < RESOLVE_SETS) {
 		words->set[words->set_count++] = value;
 	}
 }
 
-void target_parse(char *text, size_t text_len, char separator, struct target_words *ret)
+void resolve_parse(char *text, size_t text_len, char separator, struct resolve_words *ret)
 {
-	struct target_words words = { .config = NULL };
+	struct resolve_words words = { .config = NULL };
 	const char *last = NULL;
 	char *end = text + text_len;
 
@@ -74,93 +74,94 @@ void target_parse(char *text, size_t text_len, char separator, struct target_wor
 }
 
 struct search {
-	const struct sight *s;
+	const struct probe *probe;
 	int64_t pid;
 };
 
 static void look_at_process(void *ctx, const char *name)
 {
 	struct search *search = ctx;
-	char comm[SIGHT_TEXT_BYTES];
+	char comm[PROBE_TEXT_BYTES];
 
 	if (isdigit((unsigned char)name[0]) &&
-	    sight_text(search->s, comm, "/proc/%s/comm", name) >= 0 && strcmp(comm, DAEMON) == 0) {
+	    probe_text(search->probe, comm, "/proc/%s/comm", name) >= 0 &&
+	    strcmp(comm, DAEMON) == 0) {
 		search->pid = strtoll(name, NULL, 10);
 	}
 }
 
-int64_t target_find_daemon(const struct sight *s)
+int64_t resolve_find_daemon(const struct probe *p)
 {
-	struct search search = { .s = s };
+	struct search search = { .probe = p };
 
-	sight_each(s, "/proc", look_at_process, &search);
+	probe_each(p, "/proc", look_at_process, &search);
 	return search.pid;
 }
 
-static size_t read_all(FILE *file, char text[TARGET_TEXT_BYTES])
+static size_t read_all(FILE *file, char text[RESOLVE_TEXT_BYTES])
 {
 	size_t len;
 
 	if (file == NULL) {
 		return 0;
 	}
-	len = fread(text, 1, TARGET_TEXT_BYTES - 1, file);
+	len = fread(text, 1, RESOLVE_TEXT_BYTES - 1, file);
 	fclose(file);
 	return len;
 }
 
-/* The words that ecdaqd was started with, or would be. 0 if nothing tells. */
-static int find_words(const struct sight *s, int64_t pid, char text[TARGET_TEXT_BYTES],
-		      struct target_words *words)
+/* The words that ecdaqd was started with, or would be. 0 if unknown. */
+static int find_words(const struct probe *p, int64_t pid, char text[RESOLVE_TEXT_BYTES],
+		      struct resolve_words *words)
 {
-	size_t len = pid == 0 ? 0 : read_all(sight_open(s, "/proc/%" PRId64 "/cmdline", pid), text);
+	size_t len = pid == 0 ? 0 : read_all(probe_open(p, "/proc/%" PRId64 "/cmdline", pid), text);
 	char *options;
 
 	if (len > 0) {
-		target_parse(text, len, '\0', words);
+		resolve_parse(text, len, '\0', words);
 		return 1;
 	}
-	if (!sight_exists(s, APPLIANCE_CONFIG)) {
+	if (!probe_exists(p, APPLIANCE_CONFIG)) {
 		return 0;
 	}
-	len = read_all(sight_open(s, APPLIANCE_ENVIRONMENT), text);
+	len = read_all(probe_open(p, APPLIANCE_ENVIRONMENT), text);
 	text[len] = '\0';
 	options = strstr(text, APPLIANCE_OPTIONS);
 	options = options == NULL ? text + len : options + strlen(APPLIANCE_OPTIONS);
-	target_parse(options, strcspn(options, "\n"), ' ', words);
+	resolve_parse(options, strcspn(options, "\n"), ' ', words);
 	words->config = APPLIANCE_CONFIG;
 	return 1;
 }
 
 /* Where the file of a command line is, for us. */
-static int config_path(const struct sight *s, int64_t pid, const char *config,
-		       char path[SIGHT_PATH_BYTES])
+static int config_path(const struct probe *p, int64_t pid, const char *config,
+		       char path[PROBE_PATH_BYTES])
 {
-	return config[0] == '/' ? sight_path(s, path, "%s", config)
-				: sight_path(s, path, "/proc/%" PRId64 "/cwd/%s", pid, config);
+	return config[0] == '/' ? probe_path(p, path, "%s", config)
+				: probe_path(p, path, "/proc/%" PRId64 "/cwd/%s", pid, config);
 }
 
-void target_load(const struct sight *s, int64_t pid, struct config *ret_cfg,
-		 char ret_name[SIGHT_PATH_BYTES])
+void resolve_load(const struct probe *p, int64_t pid, struct config *ret_cfg,
+		  char ret_name[PROBE_PATH_BYTES])
 {
-	struct target_words words = { .config = NULL };
-	char text[TARGET_TEXT_BYTES];
-	char path[SIGHT_PATH_BYTES] = "";
+	struct resolve_words words = { .config = NULL };
+	char text[RESOLVE_TEXT_BYTES];
+	char path[PROBE_PATH_BYTES] = "";
 	char error[ERROR_BYTES];
 	const char *from = NULL;
 
 	config_defaults(ret_cfg);
-	if (!find_words(s, pid, text, &words)) {
-		snprintf(ret_name, SIGHT_PATH_BYTES, "defaults");
+	if (!find_words(p, pid, text, &words)) {
+		snprintf(ret_name, PROBE_PATH_BYTES, "defaults");
 		return;
 	}
-	if (words.config != NULL && config_path(s, pid, words.config, path) == 0) {
+	if (words.config != NULL && config_path(p, pid, words.config, path) == 0) {
 		from = path;
 	}
-	snprintf(ret_name, SIGHT_PATH_BYTES, "%.200s%s", from == NULL ? "defaults" : words.config,
+	snprintf(ret_name, PROBE_PATH_BYTES, "%.200s%s", from == NULL ? "defaults" : words.config,
 		 words.set_count > 0 ? " and its command line" : "");
 	if (config_assemble(from, words.set, words.set_count, ret_cfg, error, sizeof(error)) < 0) {
-		snprintf(ret_name, SIGHT_PATH_BYTES, "defaults, as far as set: %.300s", error);
+		snprintf(ret_name, PROBE_PATH_BYTES, "defaults, with overrides: %.300s", error);
 		config_assemble(NULL, words.set, words.set_count, ret_cfg, error, sizeof(error));
 	}
 	if (words.interface != NULL) {

@@ -1,20 +1,20 @@
 /* SPDX-License-Identifier: MIT */
 /* What of a command line of ecdaqd makes its configuration. */
-#include "cli/doctor/target.h"
+#include "cli/doctor/resolve.h"
 
 #include "harness/test.h"
 
-static struct target_words words;
+static struct resolve_words words;
 
 static void parse(const char *line)
 {
 	static char text[256];
 
 	snprintf(text, sizeof(text), "%s", line);
-	target_parse(text, strlen(text), ' ', &words);
+	resolve_parse(text, strlen(text), ' ', &words);
 }
 
-TEST(doctor_target, options_are_taken_with_their_values_in_both_spellings)
+TEST(doctor_resolve, options_are_taken_with_their_values_in_both_spellings)
 {
 	parse("/usr/bin/ecdaqd --wait --config /etc/e.yaml --set a=1 --set=b=2 --interface=ecat0");
 	CHECK_STR(words.config, "/etc/e.yaml");
@@ -24,7 +24,7 @@ TEST(doctor_target, options_are_taken_with_their_values_in_both_spellings)
 	CHECK_STR(words.set[1], "b=2");
 }
 
-TEST(doctor_target, other_options_and_missing_values_are_passed_over)
+TEST(doctor_resolve, other_options_and_missing_values_are_passed_over)
 {
 	parse("ecdaqd --configure x --settle y --set");
 	CHECK(words.config == NULL);
@@ -36,15 +36,15 @@ TEST(doctor_target, other_options_and_missing_values_are_passed_over)
 	CHECK_EQ(words.set_count, 0);
 }
 
-TEST(doctor_target, more_sets_than_ecdaqd_takes_are_not_taken_either)
+TEST(doctor_resolve, more_sets_than_ecdaqd_takes_are_not_taken_either)
 {
-	static char text[TARGET_TEXT_BYTES];
+	static char text[RESOLVE_TEXT_BYTES];
 	size_t len = 0;
 
-	for (int i = 0; i < TARGET_SETS + 10; i++) {
+	for (int i = 0; i < RESOLVE_SETS + 10; i++) {
 		len += (size_t)snprintf(text + len, sizeof(text) - len, "--set=a=%d ", i);
 	}
-	target_parse(text, len, ' ', &words);
-	CHECK_EQ(words.set_count, TARGET_SETS);
-	CHECK_STR(words.set[TARGET_SETS - 1], "a=255");
+	resolve_parse(text, len, ' ', &words);
+	CHECK_EQ(words.set_count, RESOLVE_SETS);
+	CHECK_STR(words.set[RESOLVE_SETS - 1], "a=255");
 }

@@ -3,36 +3,36 @@
  * What a machine is judged against: the configuration of the ecdaqd that runs there, by its command
  * line; else the appliance's; else the defaults. Context: blocking.
  */
-#ifndef CLI_DOCTOR_TARGET_H
-#define CLI_DOCTOR_TARGET_H
+#ifndef CLI_DOCTOR_RESOLVE_H
+#define CLI_DOCTOR_RESOLVE_H
 
 #include <stddef.h>
 #include <stdint.h>
 
-#include "cli/doctor/sight.h"
+#include "cli/doctor/probe.h"
 #include "config/config.h"
 
-enum { TARGET_TEXT_BYTES = 16384, TARGET_SETS = 256 };
+enum { RESOLVE_TEXT_BYTES = 16384, RESOLVE_SETS = 256 };
 
 /* What of a command line of ecdaqd makes its configuration; strings point into the text. */
-struct target_words {
+struct resolve_words {
 	const char *config; /* NULL: none */
 	const char *interface;
-	const char *set[TARGET_SETS];
+	const char *set[RESOLVE_SETS];
 	size_t set_count;
 };
 
 /** Cut @text at each @separator and find the options; what is unknown is passed over. */
-void target_parse(char *text, size_t text_len, char separator, struct target_words *ret);
+void resolve_parse(char *text, size_t text_len, char separator, struct resolve_words *ret);
 
 /** The process ecdaqd; 0: none is seen. */
-int64_t target_find_daemon(const struct sight *s);
+int64_t resolve_find_daemon(const struct probe *p);
 
 /**
  * The configuration, with the command line of process @pid (0: none runs). In @ret_name where it
  * comes from, for people, and what of it could not be read.
  */
-void target_load(const struct sight *s, int64_t pid, struct config *ret_cfg,
-		 char ret_name[SIGHT_PATH_BYTES]);
+void resolve_load(const struct probe *p, int64_t pid, struct config *ret_cfg,
+		  char ret_name[PROBE_PATH_BYTES]);
 
 #endif
