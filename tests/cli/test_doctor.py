@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ecdaq import NOBODY, OK, USAGE, Fake, ecdaq, fails, works
+from ecdaq import CONFIG, NOBODY, OK, USAGE, Fake, ecdaq, fails, works
 from made_machine import (
     CORE,
     CPU,
@@ -233,7 +233,7 @@ def test_who_is_not_root_is_told_what_could_not_be_read(fake: Callable[..., Fake
 def test_mistakes_are_named(machine: Machine, tmp_path: Path) -> None:
     fails(ecdaq(None, "doctor", "--root", "/nonexistent"), USAGE, "--root: /nonexistent")
     machine.config.write_text("cycle:\n  cpu: many\n")
-    fails(examine(machine), USAGE, "ecdaq.yaml:2: cycle.cpu")
+    fails(examine(machine), CONFIG, "ecdaq.yaml:2: cycle.cpu")
     fails(ecdaq(None, "doctor", "word"), USAGE, "one word too many")
 
 

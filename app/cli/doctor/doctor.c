@@ -76,7 +76,7 @@ static enum exit_code load_config(struct doctor *d)
 	}
 	config_defaults(&d->cfg);
 	if (config_load(path, &d->cfg, error, sizeof(error)) < 0) {
-		return cli_fail(d->cli, EXIT_CODE_USAGE, "--config: %s", error);
+		return cli_fail(d->cli, EXIT_CODE_CONFIG, "--config: %s", error);
 	}
 	snprintf(d->config_name, sizeof(d->config_name), "%s", path);
 	return EXIT_CODE_OK;
