@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import json
 import re
 import signal
@@ -17,9 +18,9 @@ import pandas
 import pytest
 from bench import ROOT, Bench, live, wait_for
 from cyclonedds.idl import types
-from ecdaq import keys
+from ecdaq import keys, remote
 from ecdaq.idl_types import TOPICS, SampleV1, StatusV1
-from ecdaq.link import domain_config
+from ecdaq.link import Channel, domain_config
 
 IDL = (ROOT / "app" / "services" / "publish" / "idl" / "ecdaq.idl").read_text()
 
@@ -88,10 +89,101 @@ def test_a_library_without_security_is_said(tmp_path: Path) -> None:
         ecdaq.connect("lo", security=tmp_path)
 
 
-def test_configuration_takes_no_markup() -> None:
+def test_names_with_markup_are_rejected() -> None:
     assert "<AllowMulticast>false<" in domain_config("lo", True, [], "")
-    with pytest.raises(ValueError, match="is no name"):
+    with pytest.raises(ValueError, match="invalid character"):
         domain_config('eth0"/><x', True, [], "")
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "line"),
+    [
+        (["--interface", "nowhere0"], 5, "nowhere0: no such network interface: use one of "),
+        (["--interface", "lo", "--domain", "999"], 1, "cannot join DDS domain 999: "),
+        (["--interface", "lo", "--tag", "<x>"], 2, "'<x>': invalid character"),
+        (["--interface", "lo", "--security", "/nowhere"], 1, "/nowhere/identity_ca.cert.pem: "),
+    ],
+)
+def test_wrong_arguments_are_one_line_and_no_traceback(
+    capsys: pytest.CaptureFixture[str], words: list[str], code: int, line: str
+) -> None:
+    assert remote.main([*words, "status"]) == code
+    assert re.fullmatch(f"ecdaq-remote: {re.escape(line)}[^\n]*\n", capsys.readouterr().err)
+
+
+def test_raw_values_that_do_not_fit_are_a_value_error() -> None:
+    with ecdaq.connect("lo", domain=230) as link:
+        for value in (-1, 1 << 64):
+            with pytest.raises(ValueError, match=re.escape("0 to 2**64 - 1")):
+                link.send({"piccolo0.led": value}, raw=True)
+
+
+def channel(kind: str, scale: float = 1) -> Channel:
+    return Channel(
+        name=f"piccolo0.{kind.lower()}", unit="", type=kind, slave=0, place=0, is_output=False,
+        scale=scale, offset=0, owner="", timeout_s=0,
+    )  # fmt: skip
+
+
+def test_unscaled_integers_are_exact() -> None:
+    at = 848_625_000_123_456_789
+    found = sample(0, 1)
+    found.raw, found.values = [at], [float(at)]
+    assert channel("UINT64").value(found) == at
+    assert remote.format_value(channel("UINT64").value(found)) == str(at)
+    found.raw, found.values = [0xFFFE], [-2.0]
+    assert channel("INT16").value(found) == -2
+    assert remote.format_value(channel("INT16").value(found)) == "-2"
+    found.values = [-1.25]
+    assert channel("INT16", scale=0.625).value(found) == -1.25
+    assert remote.format_value(channel("FLOAT32").value(found)) == "-1.25"
+
+
+class FakeLink:
+    """What remote.py uses of a link: samples, and the gaps in them."""
+
+    def __init__(self, cycles: list[int]) -> None:
+        self.gaps = ecdaq.Gaps()
+        self.cycles = cycles
+
+    def channels(self) -> Any:
+        return SimpleNamespace(slave_names=["piccolo0"])
+
+    def subscribe(self, seconds: float | None) -> Any:
+        for cycle in self.cycles:
+            found = sample(0, cycle)
+            self.gaps.take(found)
+            yield found
+
+
+def test_report_says_where_the_gaps_are(capsys: pytest.CaptureFixture[str]) -> None:
+    link: Any = FakeLink([1, 2, 5, 6, 7, 9])
+    assert len(list(remote.with_progress(link, None))) == 6
+    assert remote.report_gaps(link) == 1
+    assert capsys.readouterr().err.splitlines() == [
+        "2 gaps, 3 samples missing",
+        "  piccolo0: cycles 3 to 4: 2 missing",
+        "  piccolo0: cycles 8 to 8: 1 missing",
+    ]
+    every_second: Any = FakeLink(list(range(0, 100, 2)))
+    list(remote.with_progress(every_second, None))
+    assert remote.report_gaps(every_second) == 1
+    assert capsys.readouterr().err.splitlines()[-1] == "  and 29 more gaps"
+
+
+def test_progress_is_shown_on_a_terminal_and_only_there(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = itertools.count()
+    monkeypatch.setattr(remote, "time", SimpleNamespace(monotonic=lambda: float(next(clock))))
+    link: Any = FakeLink([1, 2, 4])
+    list(remote.with_progress(link, 9))
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(remote.sys.stderr, "isatty", lambda: True)
+    list(remote.with_progress(link, 9))
+    shown = capsys.readouterr().err
+    assert "\r2 of 9 s, 2 samples, " in shown
+    assert shown.endswith("\r\033[K")  # the line is cleared at the end
 
 
 def test_remote_tool_watches_records_sets_and_tells_status(
@@ -108,8 +200,11 @@ def test_remote_tool_watches_records_sets_and_tells_status(
     ):
         assert bench.module(name, "ecdaq", *tool, *words).wait(40) == 0, bench.logs()
         assert expected in bench.log(name)
-    assert bench.module("refused", "ecdaq", *tool, "set", "piccolo1.led=on").wait(40) == 1
+    assert bench.module("refused", "ecdaq", *tool, "set", "piccolo1.led=on").wait(40) == 17
     assert "owned by local" in bench.log("refused")
+    # Nanoseconds since 2000, every digit.
+    assert re.search(r" sample_time=\d{18}\b", bench.log("watch"))
+    assert re.search(r"piccolo0\.csv: \d{3,} samples\n", bench.log("csv"))
     # Without an end: it is ended as by Ctrl-C, and finishes its file.
     folder = bench.folder / "mcap"
     recorder = bench.module("mcap", "ecdaq", *tool, "record", "--dir", str(folder))
@@ -118,6 +213,7 @@ def test_remote_tool_watches_records_sets_and_tells_status(
     recorder.send_signal(signal.SIGINT)
     assert recorder.wait(40) == 0, bench.logs()
     assert "0 gaps, 0 samples missing" in bench.log("mcap")
+    assert re.search(r"/ecdaq-\S+\.mcap: \d{3,} cycles, \d{4,} bytes\n", bench.log("mcap"))
     frame = pandas.read_csv(bench.folder / "piccolo0.csv")
     assert list(frame.columns)[:6] == ["cycle", "dc_time_ns", "utc_ns", "flags", "is_good", "led"]
     assert len(frame) > 200

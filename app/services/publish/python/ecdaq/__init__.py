@@ -8,7 +8,7 @@ with ecdaq.connect(interface="eth0") as link:
         print(sample.cycle, sample.adc)
 """
 
-from ecdaq.errors import LinkError, RefusedError
+from ecdaq.errors import InterfaceError, LinkError, NoAnswerError, RefusedError
 from ecdaq.link import Channel, Channels, Link, connect
 from ecdaq.series import Gaps, Series
 
@@ -16,8 +16,10 @@ __all__ = [
     "Channel",
     "Channels",
     "Gaps",
+    "InterfaceError",
     "Link",
     "LinkError",
+    "NoAnswerError",
     "RefusedError",
     "Series",
     "connect",

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import re
+import socket
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from types import TracebackType
 from typing import TypeVar
 
 from cyclonedds.core import (
+    DDSException,
     InstanceState,
     Policy,
     Qos,
@@ -27,7 +29,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
-from ecdaq.errors import LinkError, RefusedError
+from ecdaq.errors import InterfaceError, LinkError, NoAnswerError, RefusedError
 from ecdaq.idl_types import (
     TOPICS,
     BlockV1,
@@ -41,7 +43,7 @@ from ecdaq.idl_types import (
     TimeMapV1,
 )
 from ecdaq.keys import security_config
-from ecdaq.series import Gaps
+from ecdaq.series import Gaps, Sampled
 
 State = TypeVar("State", ChannelsV1, IdlV1, StatusV1, TimeMapV1)
 ANY = ViewState.Any | InstanceState.Any | SampleState.Any
@@ -65,8 +67,16 @@ class Channel:
 
     @property
     def entry(self) -> str:
-        """The name behind the slave's: "adc" of "piccolo0.adc"."""
+        """The name without the slave's: "adc" of "piccolo0.adc"."""
         return self.name.rpartition(".")[2]
+
+    def value(self, sample: Sampled) -> int | float:
+        """The physical value; exact, as an int, where the channel is an unscaled integer."""
+        if (self.scale, self.offset) != (1, 0) or self.type.startswith("FLOAT"):
+            return sample.values[self.place]
+        raw = sample.raw[self.place]
+        bits = int(self.type[3:]) if self.type.startswith("INT") else 64
+        return raw - (1 << bits) if self.type.startswith("INT") and raw >> (bits - 1) else raw
 
 
 class Channels:
@@ -120,7 +130,7 @@ def domain_config(interface: str, multicast: bool, peers: list[str], tag: str) -
     """The same configuration as ecdaq-dds makes for itself, but for security."""
     for word in [interface, tag, *peers]:
         if not re.fullmatch(r"[A-Za-z0-9._:-]*", word):
-            raise ValueError(f"{word!r} is no name")
+            raise ValueError(f"{word!r}: invalid character: allowed are letters, digits, . _ : -")
     is_loopback = interface == "lo"
     found = (["localhost"] if is_loopback else []) + peers
     listed = "".join(f'<Peer Address="{peer}"/>' for peer in found)
@@ -147,8 +157,14 @@ def connect(
 ) -> Link:
     """Join the appliance's DDS domain on @interface, and on no other.
 
-    @security: the folder of our keys; without it $ECDAQ_SECURITY, and without that none.
+    @security: the directory with our keys; default: $ECDAQ_SECURITY, or none.
+    Raises InterfaceError, LinkError if the domain cannot be joined, ValueError for bad arguments.
     """
+    names = [name for _, name in socket.if_nameindex()]
+    if interface not in names:
+        raise InterfaceError(
+            f"{interface}: no such network interface: use one of {' '.join(names)}"
+        )
     config = domain_config(interface, multicast, peers or [], tag)
     keys = security or os.environ.get("ECDAQ_SECURITY")
     if keys:
@@ -160,8 +176,14 @@ class Link:
     """A participant of our own; readers of what ecdaq-dds publishes are made when asked for."""
 
     def __init__(self, domain: int, config: str, commander: str = "") -> None:
-        self.domain = Domain(domain, config)
-        self.participant = DomainParticipant(domain)
+        try:
+            self.domain = Domain(domain, config)
+            self.participant = DomainParticipant(domain)
+        except DDSException as error:
+            raise LinkError(
+                f"cannot join DDS domain {domain}: {error.msg}: is the interface up, with an "
+                "address, and is the domain 0 to 230?"
+            ) from error
         self.gaps = Gaps()
         self.commander = commander or f"{os.uname().nodename}-{os.getpid()}"
         self._last_id = 0
@@ -228,7 +250,10 @@ class Link:
                 return found[-1]
             left = end - time.monotonic()
             if left <= 0:
-                raise LinkError(f"no {TOPICS[kind]} within {seconds:g} s: is ecdaq-dds there?")
+                raise NoAnswerError(
+                    f"no {TOPICS[kind]} within {seconds:g} s: is ecdaq-dds running, in the same "
+                    "domain and with the same tag?"
+                )
             waitset = WaitSet(self.participant)
             waitset.attach(ReadCondition(reader, ANY))
             waitset.wait(duration(seconds=left))
@@ -298,7 +323,7 @@ class Link:
         end = time.monotonic() + seconds
         while not (writer.get_matched_subscriptions() and replies.get_matched_publications()):
             if time.monotonic() > end:
-                raise LinkError("nobody takes commands here")
+                raise NoAnswerError("no ecdaq-dds accepts commands in this domain")
             time.sleep(0.01)
 
     def send(
@@ -311,6 +336,9 @@ class Link:
         message_id: int | None = None,
     ) -> int:
         """Send a command and do not wait for its answer; the command's id."""
+        bits = [int(v) for v in values.values()] if raw else []
+        if any(not 0 <= b < 1 << 64 for b in bits):
+            raise ValueError(f"{bits}: a raw value is 0 to 2**64 - 1")
         writer = self._command_writer()
         if message_id is None:
             self._last_id += 1
@@ -324,7 +352,7 @@ class Link:
                 is_raw=raw,
                 channel=list(values),
                 values=[] if raw else [float(v) for v in values.values()],
-                raw=[int(v) for v in values.values()] if raw else [],
+                raw=bits,
             )
         )
         return message_id
@@ -356,4 +384,4 @@ class Link:
                     return reply.cycle
                 if reply.id == number:
                     raise RefusedError(reply.reason)
-        raise LinkError(f"no answer within {seconds:g} s")
+        raise NoAnswerError(f"no reply within {seconds:g} s")

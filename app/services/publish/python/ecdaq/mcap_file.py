@@ -15,12 +15,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from ecdaq.link import Channel, Channels
+from mcap.writer import CompressionType, Writer
 
-try:
-    from mcap.writer import CompressionType, Writer
-except ImportError as why:  # pragma: no cover - said by the program
-    raise ImportError("recording MCAP needs the package mcap: pip install mcap") from why
+from ecdaq.link import Channel, Channels
 
 PACKAGE = "ecdaq_msgs/msg"
 UNKNOWN_SEQUENCE = 2**64 - 1

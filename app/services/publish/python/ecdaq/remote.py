@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""ecdaq-remote: watch, record, set and status, from a PC."""
+"""ecdaq-remote: watch, record, set and status from a PC, over DDS."""
 
 from __future__ import annotations
 
@@ -11,15 +11,18 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from ecdaq.errors import LinkError
+from ecdaq.errors import LinkError, NoAnswerError
+from ecdaq.idl_types import SampleV1
 from ecdaq.link import Channels, Link, connect
+
+GAPS_LISTED = 20
 
 
 def watch(link: Link, options: argparse.Namespace) -> int:
-    """One line for every slave, twice a second."""
+    """Print one line per slave, twice a second."""
     channels = link.channels()
     shown: dict[int, int] = {}
     every = max(1, 500_000_000 // channels.period_ns)
@@ -28,7 +31,8 @@ def watch(link: Link, options: argparse.Namespace) -> int:
             continue
         shown[sample.slave] = sample.cycle + every
         values = " ".join(
-            f"{c.entry}={sample.values[c.place]:g}{c.unit}" for c in channels.of_slave(sample.slave)
+            f"{c.entry}={format_value(c.value(sample))}{c.unit}"
+            for c in channels.of_slave(sample.slave)
         )
         name = channels.slave_names[sample.slave]
         good = "" if sample.is_good else " NOT GOOD"
@@ -36,10 +40,41 @@ def watch(link: Link, options: argparse.Namespace) -> int:
     return report_gaps(link)
 
 
+def format_value(value: float) -> str:
+    """Integers exactly, physical values with six digits."""
+    return str(value) if isinstance(value, int) else f"{value:g}"
+
+
 def report_gaps(link: Link) -> int:
+    """How many samples are missing, and where. The exit code: 1 if any is missing."""
     gaps = link.gaps
     print(f"{gaps.gaps} gaps, {gaps.missing} samples missing", file=sys.stderr)
+    names = link.channels().slave_names if gaps.spans else []
+    for slave, first, count in gaps.spans[:GAPS_LISTED]:
+        name = names[slave] if slave < len(names) else f"slave {slave}"
+        print(f"  {name}: cycles {first} to {first + count - 1}: {count} missing", file=sys.stderr)
+    if len(gaps.spans) > GAPS_LISTED:
+        print(f"  and {len(gaps.spans) - GAPS_LISTED} more gaps", file=sys.stderr)
     return 0 if gaps.gaps == 0 else 1
+
+
+def with_progress(link: Link, seconds: float | None) -> Iterator[SampleV1]:
+    """The samples of link.subscribe(); on a terminal, a line of progress on stderr."""
+    started = shown = time.monotonic()
+    samples = 0
+    try:
+        for sample in link.subscribe(seconds):
+            samples += 1
+            yield sample
+            now = time.monotonic()
+            if now - shown >= 0.5 and sys.stderr.isatty():
+                shown = now
+                limit = "" if seconds is None else f" of {seconds:g}"
+                text = f"{now - started:.0f}{limit} s, {samples} samples, {link.gaps.gaps} gaps"
+                print(f"\r{text}\033[K", end="", file=sys.stderr, flush=True)
+    finally:
+        if shown > started:
+            print("\r\033[K", end="", file=sys.stderr)
 
 
 def header(channels: Channels, slave: int) -> list[str]:
@@ -51,89 +86,86 @@ def record_csv(link: Link, options: argparse.Namespace) -> int:
     channels = link.channels()
     options.dir.mkdir(parents=True, exist_ok=True)
     files = [(options.dir / f"{name}.csv").open("w", newline="") for name in channels.slave_names]
+    rows = [0] * len(files)
     try:
         writers = [csv.writer(file) for file in files]
         for slave, writer in enumerate(writers):
             writer.writerow(header(channels, slave))
-        for s in link.subscribe(options.seconds):
+        for s in with_progress(link, options.seconds):
             if s.session != channels.session:
-                print("the master was restarted: the recording ends here", file=sys.stderr)
+                print("the master has restarted: end of the recording", file=sys.stderr)
                 break
-            values = [
-                s.raw[c.place]
-                if c.scale == 1 and c.offset == 0 and c.type.startswith(("UINT", "B"))
-                else s.values[c.place]
-                for c in channels.of_slave(s.slave)
-            ]
+            values = [c.value(s) for c in channels.of_slave(s.slave)]
             writers[s.slave].writerow(
                 [s.cycle, s.dc_time_ns, s.utc_ns, s.flags, int(s.is_good), *values]
             )
+            rows[s.slave] += 1
     finally:
-        for file in files:
+        for file, count in zip(files, rows, strict=True):
             file.close()
+            print(f"{file.name}: {count} samples", flush=True)
     return report_gaps(link)
 
 
 def next_channels(link: Link, session: int) -> Channels:
-    """The table of a session whose samples have come: it cannot be far."""
+    """The channel table of @session, which is published before its first sample."""
     end = time.monotonic() + 10
     while (channels := link.channels()).session != session:
         if time.monotonic() > end:
-            raise LinkError(f"no channel table of session {session}")
+            raise NoAnswerError(f"no channel table of session {session} within 10 s")
         time.sleep(0.01)
     return channels
 
 
 def record_mcap(link: Link, options: argparse.Namespace) -> int:
     from ecdaq import __version__
-    from ecdaq.mcap_file import McapFile
+    from ecdaq.mcap_file import McapFile  # slow to import
+
+    def finish(file: McapFile, reason: str) -> None:
+        path = file.close(reason)
+        print(f"{path}: {file.cycles} cycles, {path.stat().st_size} bytes", flush=True)
 
     file = McapFile(options.dir, link.channels(), f"ecdaq-remote {__version__}")
-    look_at = 0.0
-    map_told = -1
+    poll_at = 0.0
+    recorded_utc_ns = -1  # of the newest time map in the file
     try:
-        for sample in link.subscribe(options.seconds):
+        for sample in with_progress(link, options.seconds):
             if sample.session != file.session:
-                print(file.close("the master was restarted"), flush=True)
+                finish(file, "the master was restarted")
                 file = McapFile(options.dir, next_channels(link, sample.session), file.program)
             file.add(sample)
-            if time.monotonic() < look_at:
+            if time.monotonic() < poll_at:
                 continue
-            look_at = time.monotonic() + 0.5
+            poll_at = time.monotonic() + 0.5
             for event in link.events(0):
                 file.add_event(event)
             timemap = link.timemap()
-            if timemap.session == file.session and timemap.utc_ns != map_told:
-                map_told = timemap.utc_ns
+            if timemap.session == file.session and timemap.utc_ns != recorded_utc_ns:
+                recorded_utc_ns = timemap.utc_ns
                 file.add_timemap(timemap)
     finally:
-        print(file.close("stopped"), flush=True)
+        finish(file, "stopped")
     return report_gaps(link)
 
 
 def record(link: Link, options: argparse.Namespace) -> int:
-    """MCAP with the topics and fields of the appliance's recordings, or a CSV file for each slave,
-    raw and exact where a channel has no scale."""
-    if options.csv:
-        return record_csv(link, options)
-    try:
-        return record_mcap(link, options)
-    except ImportError as why:
-        raise LinkError(str(why)) from why
+    """Record MCAP with the topics and fields of the appliance's own recordings, or one CSV file
+    per slave. Unscaled integers are exact. Ctrl-C ends it; files and gaps are listed."""
+    return record_csv(link, options) if options.csv else record_mcap(link, options)
 
 
 def set_outputs(link: Link, options: argparse.Namespace) -> int:
-    """Set, and hold for some seconds: without a commander, outputs with a time-out fall back."""
+    """Set outputs and hold them for --hold seconds; outputs with a timeout then go fail-safe."""
     values: dict[str, float] = {}
     for word in options.assignments:
         name, equals, text = word.partition("=")
         if not equals:
-            print(f"ecdaq-remote: {word}: wants OUTPUT=VALUE", file=sys.stderr)
+            print(f"ecdaq-remote: {word}: expected OUTPUT=VALUE", file=sys.stderr)
             return 2
         try:
             values[name] = float({"on": "1", "off": "0"}.get(text, text))
         except ValueError:
-            print(f"ecdaq-remote: {word}: no number", file=sys.stderr)
+            print(f"ecdaq-remote: {word}: the value must be a number, on or off", file=sys.stderr)
             return 2
     cycle = link.command(values)
     print(f"{' '.join(options.assignments)} from cycle {cycle}", flush=True)
@@ -155,30 +187,29 @@ def status(link: Link, options: argparse.Namespace) -> int:
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
-        prog="ecdaq-remote", description="An ecdaq appliance, seen from here over DDS."
+        prog="ecdaq-remote", description="Read and command an ecdaq appliance over DDS."
     )
-    parser.add_argument("--interface", required=True, help="our network interface for DDS")
-    parser.add_argument("--domain", type=int, default=0, help="as dds.domain of the appliance")
-    parser.add_argument("--tag", default="", help="as dds.tag of the appliance")
-    parser.add_argument("--peer", action="append", default=[], help="address of the appliance")
-    parser.add_argument("--no-multicast", action="store_true")
-    parser.add_argument(
-        "--security", type=Path, help="folder of our keys, if the appliance wants any"
-    )
+    add = parser.add_argument
+    add("--interface", required=True, help="network interface of this PC")
+    add("--domain", type=int, default=0, help="dds.domain of the appliance (default: 0)")
+    add("--tag", default="", help="dds.tag of the appliance")
+    add("--peer", action="append", default=[], help="address of the appliance, without multicast")
+    add("--no-multicast", action="store_true", help="discover peers by address only")
+    add("--security", type=Path, help="directory with our keys, if the appliance requires them")
     verbs = parser.add_subparsers(required=True, metavar="VERB")
     for name, function, text in (
-        ("watch", watch, "show values as they come"),
-        ("record", record, "to MCAP, or CSV"),
+        ("watch", watch, "show the values"),
+        ("record", record, "record to MCAP or CSV"),
         ("set", set_outputs, "set outputs of owner remote"),
-        ("status", status, "how the master is"),
+        ("status", status, "show state and counters of the master"),
     ):
         verb = verbs.add_parser(name, help=text, description=function.__doc__)
         verb.set_defaults(function=function)
         if name in ("watch", "record"):
-            verb.add_argument("--seconds", type=float, default=None)
+            verb.add_argument("--seconds", type=float, help="default: until Ctrl-C")
         if name == "record":
-            verb.add_argument("--dir", type=Path, default=Path("."))
-            verb.add_argument("--csv", action="store_true", help="a CSV file for each slave")
+            verb.add_argument("--dir", type=Path, default=Path("."), help="default: this one")
+            verb.add_argument("--csv", action="store_true", help="one CSV file per slave")
         if name == "set":
             verb.add_argument("assignments", nargs="+", metavar="OUTPUT=VALUE")
             verb.add_argument("--hold", type=float, default=0, metavar="SECONDS")
@@ -201,12 +232,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
             for number in (signal.SIGINT, signal.SIGTERM):
                 signal.signal(number, lambda *_: link.stop())
             return options.function(link, options)
-    except LinkError as why:
-        print(f"ecdaq-remote: {why}", file=sys.stderr)
-        return 1
-    except BrokenPipeError:  # who read us has seen enough
+    except (LinkError, ValueError) as error:
+        print(f"ecdaq-remote: {error}", file=sys.stderr)
+        return error.exit_code if isinstance(error, LinkError) else 2
+    except BrokenPipeError:  # the reader of our output has ended
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except OSError as error:
+        print(f"ecdaq-remote: {error.filename}: {error.strerror}", file=sys.stderr)
+        return 1
 
 
 if __name__ == "__main__":

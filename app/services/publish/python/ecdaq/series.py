@@ -67,17 +67,13 @@ class Series:
         self.samples += [s for s in samples if s.slave == self.slave]
 
     def columns(self) -> dict[str, list[Any]]:
-        """One list for each thing; channels by the name behind the dot, where they are known."""
+        """One list per field; channels, where they are known, by their name without the slave's."""
         found: dict[str, list[Any]] = {
             name: [getattr(s, name) for s in self.samples]
             for name in ("cycle", "dc_time_ns", "utc_ns", "flags", "is_good")
         }
-        names = [c.entry for c in self.channels.of_slave(self.slave)] if self.channels else []
-        for place, name in enumerate(names):
-            if name == "sample_time":  # more than a double holds exactly
-                found[name] = [s.raw[place] for s in self.samples]
-            else:
-                found[name] = [s.values[place] for s in self.samples]
+        for channel in self.channels.of_slave(self.slave) if self.channels else []:
+            found[channel.entry] = [channel.value(s) for s in self.samples]
         return found
 
     def to_numpy(self) -> dict[str, Any]:
