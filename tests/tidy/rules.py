@@ -118,11 +118,11 @@ NO_ALLOCATION_MODULES = ("wire", "image", "control", "cycle", "link")
 ALLOCATING_FUNCTION = re.compile(r"_(create|open|start|grow|load|copy)\b|^main$")
 
 FUNCTION_LINES = 70
-FILE_LINES = 400
+# 400 is the aim. Up to 600 where a second file would need a private header.
+FILE_LINES = 600
 # Files that are tables, or a subject that does not fall into two; 800 lines at most. Each with why.
 LONG_FILE_LINES = 800
 LONG_FILES: dict[str, str] = {
-    "app/core/base/ring.c": "producer and reader share one memory layout and its ordering",
     "app/core/config/options.c": "the option table, a line a property",
 }
 # Files whose one function is a table of texts.

@@ -38,7 +38,7 @@ def test_every_test_is_seen_by_cmake() -> None:
 
 
 def test_no_exception_outlives_its_reason() -> None:
-    expect_none(whole_tree.stale_exceptions(sources(), rules.LONG_FILES))
+    expect_none(whole_tree.stale_exceptions(sources(), rules.LONG_FILES, rules.FILE_LINES))
 
 
 def test_nothing_foreign_is_tracked() -> None:

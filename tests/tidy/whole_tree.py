@@ -66,13 +66,15 @@ def unseen_tests(files: Sequence[Source]) -> Iterable[Finding]:
                 yield Finding(source.path, number, "write TEST(module, sentence) on one line")
 
 
-def stale_exceptions(files: Sequence[Source], names: Iterable[str]) -> Iterable[Finding]:
+def stale_exceptions(
+    files: Sequence[Source], names: Iterable[str], limit: int
+) -> Iterable[Finding]:
     """An exception for a file that is gone, or has become small, goes, too."""
     by_path = {f.path: f for f in files}
     for name in names:
         if name not in by_path:
             yield Finding(name, 1, "has an exception, but is not there")
-        elif len(by_path[name].lines) <= 400:
+        elif len(by_path[name].lines) <= limit:
             yield Finding(name, 1, "has an exception for long files and does not need it")
 
 

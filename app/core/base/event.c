@@ -85,7 +85,7 @@ const char *event_severity_to_str(enum event_severity severity)
 	return "error";
 }
 
-const char *event_rt_to_str(uint32_t which)
+static const char *rt_to_str(uint32_t which)
 {
 	static const char *const names[EVENT_RT_COUNT] = {
 		[EVENT_RT_PRIORITY] = "real-time priority",
@@ -358,8 +358,8 @@ int event_format(const struct event *ev, char *buf, size_t buf_len)
 				a[0], sigabbrev_np(a[0]) != NULL ? sigabbrev_np(a[0]) : "unknown",
 				(uint64_t)ev->value);
 	case EVENT_RT_DEGRADED:
-		return snprintf(buf, buf_len, "degraded: no %s: %s",
-				event_rt_to_str((uint32_t)a[0]), reason(a[1]));
+		return snprintf(buf, buf_len, "degraded: no %s: %s", rt_to_str((uint32_t)a[0]),
+				reason(a[1]));
 	case EVENT_EMERGENCY:
 		return format_emergency(ev, buf, buf_len);
 	case EVENT_SDO_ABORT:

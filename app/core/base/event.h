@@ -96,8 +96,6 @@ const char *event_name(uint16_t id);
 enum event_severity event_severity(uint16_t id);
 /** "info", "notice", "warning", "error". */
 const char *event_severity_to_str(enum event_severity severity);
-/** "real-time priority", "core of the cycle thread", ...; "unknown" for a number out of range. */
-const char *event_rt_to_str(uint32_t which);
 /** One line of text without a newline. Returns its length as snprintf does. */
 int event_format(const struct event *ev, char *buf, size_t buf_len);
 

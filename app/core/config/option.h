@@ -28,10 +28,10 @@ enum option_type {
 struct option {
 	const char *name; /* "cycle.period"; in a list "slaves[].mode" */
 	enum option_type type;
-	size_t offset;        /* in struct config; in a list, in its item */
-	size_t bytes;         /* of the field */
-	const char *standard; /* default; NULL: must be given (in lists only) */
-	const char *min;      /* numbers: inclusive bounds; else NULL */
+	size_t offset;             /* in struct config; in a list, in its item */
+	size_t bytes;              /* of the field */
+	const char *default_value; /* NULL: must be given (in lists only) */
+	const char *min;           /* numbers: inclusive bounds; else NULL */
 	const char *max;
 	const char *unit;      /* of a plain number; "" for none */
 	const char *otherwise; /* when the default is another one, for the pages; mostly NULL */

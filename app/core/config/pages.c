@@ -45,12 +45,12 @@ static void write_range(const struct option *option, FILE *out)
 
 static void write_default(const struct option *option, FILE *out)
 {
-	if (option->standard == NULL) {
+	if (option->default_value == NULL) {
 		fputs("must be given", out);
-	} else if (option->standard[0] == '\0') {
+	} else if (option->default_value[0] == '\0') {
 		fputs("empty", out);
 	} else {
-		fprintf(out, "`%s`", option->standard);
+		fprintf(out, "`%s`", option->default_value);
 	}
 	if (option->otherwise != NULL) {
 		fprintf(out, "; %s", option->otherwise);
@@ -135,10 +135,10 @@ static void write_comment(const char *lead, const char *text, FILE *out)
 static void write_value(const struct option *option, FILE *out)
 {
 	/* YAML 1.1 readers take a bare on or off for a boolean, which is what is meant. */
-	if (option->standard[0] == '\0') {
+	if (option->default_value[0] == '\0') {
 		fputs("\"\"", out);
 	} else {
-		fputs(option->standard, out);
+		fputs(option->default_value, out);
 	}
 }
 
@@ -197,7 +197,7 @@ static void write_example(const char *prefix, const char *indent, FILE *out)
 	for (size_t i = 0; i < option_count; i++) {
 		const struct option *option = &option_table[i];
 		const char *name = name_under(option, prefix);
-		const char *value = option->standard;
+		const char *value = option->default_value;
 
 		if (name == NULL) {
 			continue;

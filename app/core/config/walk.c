@@ -87,7 +87,7 @@ static int check_required(struct walk *walk, const struct scope *scope, const ya
 		int is_there = 0;
 
 		if (strncmp(option_table[i].name, scope->pattern, len) != 0 ||
-		    strchr(rest, '.') != NULL || option_table[i].standard != NULL) {
+		    strchr(rest, '.') != NULL || option_table[i].default_value != NULL) {
 			continue;
 		}
 		for (yaml_node_pair_t *p = node->data.mapping.pairs.start;

@@ -7,8 +7,14 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "admin/command_internal.h"
 #include "image/image.h"
+
+/* One item of a set, resolved. */
+struct placed {
+	size_t channel;
+	unsigned output; /* its place on the board */
+	uint64_t raw;
+};
 
 void admin_reply_refuse(struct admin_reply *reply, int result, const char *format, ...)
 {
@@ -20,8 +26,8 @@ void admin_reply_refuse(struct admin_reply *reply, int result, const char *forma
 	va_end(args);
 }
 
-void command_emit(const struct admin_target *t, enum event_id id, uint16_t slave_pos, int64_t value,
-		  int32_t arg0, int32_t arg1)
+static void emit(const struct admin_target *t, enum event_id id, uint16_t slave_pos, int64_t value,
+		 int32_t arg0, int32_t arg1)
 {
 	struct event ev = {
 		.id = (uint16_t)id,
@@ -33,7 +39,7 @@ void command_emit(const struct admin_target *t, enum event_id id, uint16_t slave
 	t->emit(t->ctx, &ev);
 }
 
-int command_has_op(const struct admin_target *t, struct admin_reply *reply)
+static int has_op(const struct admin_target *t, struct admin_reply *reply)
 {
 	if (t->board == NULL || !t->is_op) {
 		admin_reply_refuse(reply, -EAGAIN, "the bus is not in OP");
@@ -53,7 +59,7 @@ static const struct config_output *output_config(const struct config *cfg, const
 }
 
 /* Its place on the board: the n-th output of the channel table (base/board.h). */
-unsigned command_output_index(const struct admin_target *t, size_t channel)
+static unsigned output_index(const struct admin_target *t, size_t channel)
 {
 	unsigned n = 0;
 
@@ -77,8 +83,8 @@ static const char *owner_name(enum config_owner owner)
 }
 
 /* May the local writer put @raw on @channel? 0, or the refusal in @reply. */
-int command_check_output(const struct admin_target *t, size_t channel, uint64_t raw,
-			 struct admin_reply *reply)
+static int check_output(const struct admin_target *t, size_t channel, uint64_t raw,
+			struct admin_reply *reply)
 {
 	const struct channel *ch = &t->channels[channel];
 	const struct config_output *out = output_config(t->cfg, ch->name);
@@ -118,19 +124,19 @@ static int place_item(const struct admin_target *t, const struct admin_item *ite
 		admin_reply_refuse(reply, -ENOENT, "%s: no such channel", item->channel);
 		return reply->result;
 	}
-	r = command_check_output(t, (size_t)channel, item->raw, reply);
+	r = check_output(t, (size_t)channel, item->raw, reply);
 	if (r < 0) {
 		return r;
 	}
 	*ret_placed = (struct placed){
 		.channel = (size_t)channel,
-		.output = command_output_index(t, (size_t)channel),
+		.output = output_index(t, (size_t)channel),
 		.raw = item->raw,
 	};
 	return 0;
 }
 
-uint64_t command_put_all(const struct admin_target *t, const struct placed *placed, size_t count)
+static uint64_t put_all(const struct admin_target *t, const struct placed *placed, size_t count)
 {
 	board_begin(t->board);
 	for (size_t i = 0; i < count; i++) {
@@ -144,9 +150,8 @@ static enum admin_outcome run_set(const struct admin_target *t, const struct adm
 {
 	struct placed placed[ADMIN_ITEMS] = { { .channel = 0 } };
 
-	if (!command_has_op(t, reply)) {
-		command_emit(t, EVENT_COMMAND_REFUSED, EVENT_NO_SLAVE, -1, reply->result,
-			     (int32_t)uid);
+	if (!has_op(t, reply)) {
+		emit(t, EVENT_COMMAND_REFUSED, EVENT_NO_SLAVE, -1, reply->result, (int32_t)uid);
 		return ADMIN_DONE;
 	}
 	/* All or nothing: the board is touched when every item has been found good. */
@@ -155,16 +160,160 @@ static enum admin_outcome run_set(const struct admin_target *t, const struct adm
 			int channel = image_channel_find(t->channels, t->channel_count,
 							 rq->item[i].channel);
 
-			command_emit(t, EVENT_COMMAND_REFUSED, EVENT_NO_SLAVE,
-				     channel < 0 ? -1 : channel, reply->result, (int32_t)uid);
+			emit(t, EVENT_COMMAND_REFUSED, EVENT_NO_SLAVE, channel < 0 ? -1 : channel,
+			     reply->result, (int32_t)uid);
 			return ADMIN_DONE;
 		}
 	}
-	*ret_sequence = command_put_all(t, placed, rq->count);
+	*ret_sequence = put_all(t, placed, rq->count);
 	for (size_t i = 0; i < rq->count; i++) {
-		command_emit(t, EVENT_OUTPUT_SET, t->channels[placed[i].channel].slave_pos,
-			     (int64_t)placed[i].channel, 0, (int32_t)uid);
+		emit(t, EVENT_OUTPUT_SET, t->channels[placed[i].channel].slave_pos,
+		     (int64_t)placed[i].channel, 0, (int32_t)uid);
 	}
+	return ADMIN_DEFERRED;
+}
+
+/* --- one-shot: fire SYNC0 once, in one slave or in all that can, at one DC time --- */
+
+/* Of a slave with a one-shot mode: the DC time at which its SYNC0 shall fire. */
+#define ONESHOT_ENTRY "oneshot_time"
+
+static int find_oneshot(const struct admin_target *t, uint16_t slave_pos)
+{
+	for (size_t i = 0; i < t->channel_count; i++) {
+		const struct channel *ch = &t->channels[i];
+		const char *entry = strrchr(ch->name, '.');
+
+		if (ch->slave_pos == slave_pos && ch->direction == CHANNEL_OUTPUT &&
+		    entry != NULL && strcmp(entry + 1, ONESHOT_ENTRY) == 0) {
+			return (int)i;
+		}
+	}
+	return -ENOENT;
+}
+
+/* The absolute time asked for, if it can still be reached; else the refusal. */
+static int oneshot_time(const struct admin_target *t, const struct admin_request *rq,
+			int64_t *ret_time_ns, struct admin_reply *reply)
+{
+	int64_t margin_ns = ADMIN_ONESHOT_MARGIN_CYCLES * t->cfg->cycle_period_ns;
+	int64_t now_ns;
+	int64_t at_ns = rq->dc_time_ns;
+
+	if (t->dc_now(t->ctx, &now_ns) < 0) {
+		admin_reply_refuse(reply, -EAGAIN, "the DC time is not known yet");
+		return reply->result;
+	}
+	if (rq->is_relative && __builtin_add_overflow(now_ns, rq->dc_time_ns, &at_ns)) {
+		admin_reply_refuse(reply, -ERANGE, "the time is out of range");
+		return reply->result;
+	}
+	if (at_ns <= now_ns) {
+		admin_reply_refuse(reply, -ETIME,
+				   "the time is in the past (DC time is %" PRId64 " ns)", now_ns);
+		return reply->result;
+	}
+	if (at_ns - now_ns < margin_ns) {
+		admin_reply_refuse(reply, -ETIME,
+				   "only %" PRId64 " ns ahead, at least %" PRId64 " ns are needed",
+				   at_ns - now_ns, margin_ns);
+		return reply->result;
+	}
+	if (at_ns - now_ns > ADMIN_ONESHOT_AHEAD_NS) {
+		admin_reply_refuse(reply, -ERANGE,
+				   "%" PRId64 " s ahead, at most %" PRId64 " s are taken",
+				   (at_ns - now_ns) / NS_PER_S, ADMIN_ONESHOT_AHEAD_NS / NS_PER_S);
+		return reply->result;
+	}
+	*ret_time_ns = at_ns;
+	return 0;
+}
+
+static int place_oneshot(const struct admin_target *t, uint16_t slave_pos, int64_t at_ns,
+			 struct placed *ret_placed, struct admin_reply *reply)
+{
+	int channel = find_oneshot(t, slave_pos);
+	int r;
+
+	if (channel < 0) {
+		admin_reply_refuse(reply, -EOPNOTSUPP, "%s: has no output " ONESHOT_ENTRY,
+				   t->slaves[slave_pos].name);
+		return reply->result;
+	}
+	if (!config_is_oneshot(t->cfg, slave_pos)) {
+		admin_reply_refuse(reply, -EOPNOTSUPP,
+				   "%s: is in periodic mode (slaves[%u].mode: oneshot)",
+				   t->slaves[slave_pos].name, slave_pos);
+		return reply->result;
+	}
+	r = check_output(t, (size_t)channel, (uint64_t)at_ns, reply);
+	if (r < 0) {
+		return r;
+	}
+	*ret_placed = (struct placed){
+		.channel = (size_t)channel,
+		.output = output_index(t, (size_t)channel),
+		.raw = (uint64_t)at_ns,
+	};
+	return 0;
+}
+
+/* One slave, or all that have a one-shot output. Returns how many are placed, or the refusal. */
+static int place_oneshots(const struct admin_target *t, const struct admin_request *rq,
+			  struct placed *ret_placed, struct admin_reply *reply)
+{
+	int is_all = rq->slave_pos == ADMIN_ALL_SLAVES;
+	int64_t at_ns = 0;
+	int count = 0;
+
+	if (!has_op(t, reply)) {
+		return reply->result;
+	}
+	if (!is_all && rq->slave_pos >= t->slave_count) {
+		admin_reply_refuse(reply, -ENODEV, "slave %u: there are %zu slaves", rq->slave_pos,
+				   t->slave_count);
+		return reply->result;
+	}
+	for (uint16_t pos = 0; pos < t->slave_count; pos++) {
+		if (is_all ? find_oneshot(t, pos) < 0 : pos != rq->slave_pos) {
+			continue;
+		}
+		/* The time last: what can never be armed is said first. */
+		if (place_oneshot(t, pos, 0, &ret_placed[count], reply) < 0) {
+			return reply->result;
+		}
+		count++;
+	}
+	if (count == 0) {
+		admin_reply_refuse(reply, -EOPNOTSUPP, "no slave has an output " ONESHOT_ENTRY);
+		return reply->result;
+	}
+	if (oneshot_time(t, rq, &at_ns, reply) < 0) {
+		return reply->result;
+	}
+	for (int i = 0; i < count; i++) {
+		ret_placed[i].raw = (uint64_t)at_ns;
+		if (check_output(t, ret_placed[i].channel, (uint64_t)at_ns, reply) < 0) {
+			return reply->result;
+		}
+	}
+	reply->dc_time_ns = at_ns;
+	return count;
+}
+
+static enum admin_outcome run_oneshot(const struct admin_target *t, const struct admin_request *rq,
+				      uint32_t uid, struct admin_reply *reply,
+				      uint64_t *ret_sequence)
+{
+	struct placed placed[LIMIT_SLAVES] = { { .channel = 0 } };
+	int count = place_oneshots(t, rq, placed, reply);
+
+	if (count < 0) {
+		emit(t, EVENT_COMMAND_REFUSED, rq->slave_pos, -1, reply->result, (int32_t)uid);
+		return ADMIN_DONE;
+	}
+	*ret_sequence = put_all(t, placed, (size_t)count);
+	emit(t, EVENT_COMMAND, rq->slave_pos, reply->dc_time_ns, ADMIN_ONESHOT, (int32_t)uid);
 	return ADMIN_DEFERRED;
 }
 
@@ -180,7 +329,7 @@ static void sdo_result(const struct admin_target *t, const struct admin_request 
 		return;
 	}
 	if (reply->sdo_abort != 0) {
-		command_emit(t, EVENT_SDO_ABORT, rq->slave_pos, reply->sdo_abort, object, 0);
+		emit(t, EVENT_SDO_ABORT, rq->slave_pos, reply->sdo_abort, object, 0);
 		admin_reply_refuse(reply, r, "slave %u: SDO %s of 0x%04x:%02x: abort code 0x%08x",
 				   rq->slave_pos, what, rq->index, rq->subindex, reply->sdo_abort);
 		return;
@@ -208,8 +357,8 @@ static void run_sdo(const struct admin_target *t, const struct admin_request *rq
 		r = t->sdo_read(t->ctx, rq, reply->data, &len, &reply->sdo_abort);
 		reply->data_len = r == 0 ? (uint32_t)len : 0;
 	} else {
-		command_emit(t, EVENT_COMMAND, rq->slave_pos,
-			     (int64_t)rq->index << 8 | rq->subindex, ADMIN_SDO_WRITE, (int32_t)uid);
+		emit(t, EVENT_COMMAND, rq->slave_pos, (int64_t)rq->index << 8 | rq->subindex,
+		     ADMIN_SDO_WRITE, (int32_t)uid);
 		r = t->sdo_write(t->ctx, rq, &reply->sdo_abort);
 	}
 	sdo_result(t, rq, r, reply);
@@ -226,17 +375,17 @@ enum admin_outcome admin_command_run(const struct admin_target *target,
 	case ADMIN_SET:
 		return run_set(target, request, uid, reply, ret_sequence);
 	case ADMIN_ONESHOT:
-		return command_oneshot(target, request, uid, reply, ret_sequence);
+		return run_oneshot(target, request, uid, reply, ret_sequence);
 	case ADMIN_SDO_READ:
 	case ADMIN_SDO_WRITE:
 		run_sdo(target, request, uid, reply);
 		return ADMIN_DONE;
 	case ADMIN_STOP:
-		command_emit(target, EVENT_COMMAND, EVENT_NO_SLAVE, 0, ADMIN_STOP, (int32_t)uid);
+		emit(target, EVENT_COMMAND, EVENT_NO_SLAVE, 0, ADMIN_STOP, (int32_t)uid);
 		target->stop(target->ctx);
 		return ADMIN_DONE;
 	case ADMIN_CLEAR:
-		command_emit(target, EVENT_COMMAND, EVENT_NO_SLAVE, 0, ADMIN_CLEAR, (int32_t)uid);
+		emit(target, EVENT_COMMAND, EVENT_NO_SLAVE, 0, ADMIN_CLEAR, (int32_t)uid);
 		target->clear(target->ctx);
 		return ADMIN_DONE;
 	}

@@ -66,6 +66,18 @@ mono_t bus_now(const struct bus *bus)
 	return platform->now(platform->ctx);
 }
 
+void bus_emit_event(struct bus *bus, const struct bus_emit *emit, struct event ev)
+{
+	const struct platform *platform = line_platform(bus->line);
+
+	if (emit->call == NULL) {
+		return;
+	}
+	ev.mono_ns = platform->now(platform->ctx).ns;
+	ev.tai_ns = platform->tai_ns(platform->ctx);
+	emit->call(emit->ctx, &ev);
+}
+
 int bus_fail(struct bus *bus, int code, const char *format, ...)
 {
 	va_list args;

@@ -143,6 +143,8 @@ static inline int is_piccolo(const struct slave_info *info)
 
 mono_t bus_now(const struct bus *bus);
 
+/** Stamp @ev with the time now and hand it over. */
+void bus_emit_event(struct bus *bus, const struct bus_emit *emit, struct event ev);
 /** Write one line to the caller's error buffer. Returns @code. */
 int bus_fail(struct bus *bus, int code, const char *format, ...)
 	__attribute__((format(printf, 3, 4)));
@@ -179,7 +181,6 @@ int bus_sdo_value(struct bus *bus, size_t pos, uint16_t index, uint8_t subindex,
 		  uint64_t *ret_value, uint32_t *ret_abort);
 /** Mode and configured start-up SDOs of one slave, in PRE-OP. */
 int bus_startup_sdos(struct bus *bus, size_t pos);
-const char *bus_abort_text(uint32_t abort);
 /** Take what lies in the mailbox of a slave unasked: emergencies. */
 void bus_take_mail(struct bus *bus, size_t pos);
 
@@ -200,7 +201,13 @@ int bus_sync_limits(struct bus *bus, size_t pos);
 /** SM, FMMU and watchdog of one slave, again, as bus_map() left them. */
 int bus_restore_mapping(struct bus *bus, size_t pos);
 
-/* --- dc.c, dc_restore.c --- */
+/* --- dc_restore.c, dc.c --- */
+
+enum {
+	CLOCK_TIME_FILTER = 0x00,  /* 0x0934: none */
+	CLOCK_SPEED_FILTER = 0x0c, /* 0x0935: the ET1100's own default */
+	CLOCK_SPEED_COUNTER_START = 0x1000,
+};
 
 /** Offset, delay (0 on the reference) and filters of one slave. 0 or -errno, without a line. */
 int bus_clock_write(struct bus *bus, size_t pos, int64_t offset_ns);
@@ -216,8 +223,6 @@ int64_t bus_clock_diff(struct bus *bus, size_t pos);
 
 /** 1 if the slave takes part in the common SYNC0, and it was started. */
 int bus_sync0_is_wanted(const struct bus *bus, size_t pos);
-/** Program and start SYNC0 of one slave. 0 or -errno, without a line. */
-int bus_sync0_program(struct bus *bus, size_t pos, int64_t start_ns);
 /** SYNC unit of a slave that lost it: into the grid of the others, or back to its own controller.
  */
 int bus_sync0_restore(struct bus *bus, size_t pos);
@@ -229,6 +234,5 @@ void bus_sync0_stop(struct bus *bus);
 
 /** One step towards OP for a slave that is not there. */
 void bus_recover(struct bus *bus, size_t pos, const struct bus_emit *emit);
-void bus_emit_event(struct bus *bus, const struct bus_emit *emit, struct event ev);
 
 #endif

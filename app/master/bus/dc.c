@@ -13,9 +13,6 @@
 #include "bus/registers.h"
 
 enum {
-	TIME_FILTER = 0x00,  /* 0x0934: none, as the good masters have it */
-	SPEED_FILTER = 0x0c, /* 0x0935: the ET1100's own default */
-	SPEED_COUNTER_START = 0x1000,
 	BURST_PER_FRAME = 1, /* a slave compares once a frame, at its end (ET1100 data sheet,
 				0x0910) */
 	DIFF_MAGNITUDE = 0x7fffffff,
@@ -36,11 +33,11 @@ static int is_follower(const struct bus *bus, size_t pos)
 static int clear_clocks(struct bus *bus)
 {
 	static const uint8_t zero[8];
-	const uint8_t filters[2] = { TIME_FILTER, SPEED_FILTER };
+	const uint8_t filters[2] = { CLOCK_TIME_FILTER, CLOCK_SPEED_FILTER };
 	uint8_t start[2];
 	int r;
 
-	put_le16(start, SPEED_COUNTER_START);
+	put_le16(start, CLOCK_SPEED_COUNTER_START);
 	r = register_broadcast(bus, ESC_REG_DC_ACTIVATION, zero, 1);
 	if (r >= 0) {
 		r = register_broadcast(bus, ESC_REG_DC_SYSTEM_TIME_OFFSET, zero, 8);
@@ -106,33 +103,6 @@ static int read_latched(struct bus *bus, size_t pos, uint64_t *ret_local_ns)
 }
 
 /* --- offsets --- */
-
-int bus_clock_write(struct bus *bus, size_t pos, int64_t offset_ns)
-{
-	struct bus_slave *sl = &bus->slave[pos];
-	uint8_t offset[8];
-	uint8_t delay[4];
-	uint8_t start[2];
-	const uint8_t filters[2] = { TIME_FILTER, SPEED_FILTER };
-	int r;
-
-	put_le64(offset, (uint64_t)offset_ns);
-	put_le32(delay, (int)pos == bus->reference ? 0 : (uint32_t)sl->clock.delay_ns);
-	put_le16(start, SPEED_COUNTER_START);
-	r = register_write(bus, pos, ESC_REG_DC_SYSTEM_TIME_OFFSET, offset,
-			   sl->is_clock_64bit ? 8 : 4);
-	if (r >= 0) {
-		r = register_write(bus, pos, ESC_REG_DC_SYSTEM_TIME_DELAY, delay, sizeof(delay));
-	}
-	if (r >= 0) {
-		r = register_write(bus, pos, ESC_REG_DC_TIME_FILTER, filters, sizeof(filters));
-	}
-	if (r >= 0) {
-		r = register_write(bus, pos, ESC_REG_DC_SPEED_COUNTER_START, start, sizeof(start));
-	}
-	sl->is_clock_set = r >= 0;
-	return r;
-}
 
 static int solve(struct bus *bus)
 {

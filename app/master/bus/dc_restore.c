@@ -1,11 +1,37 @@
 /* SPDX-License-Identifier: MIT */
-/* The clocks while the cycle runs: what time it is, and a clock that was lost set by one that was
- * not. */
+/* One clock: write its offset; read the reference; set a clock that was lost by one that runs. */
 #include <errno.h>
 
 #include "base/bytes.h"
 #include "bus/bus_internal.h"
 #include "bus/registers.h"
+
+int bus_clock_write(struct bus *bus, size_t pos, int64_t offset_ns)
+{
+	struct bus_slave *sl = &bus->slave[pos];
+	uint8_t offset[8];
+	uint8_t delay[4];
+	uint8_t start[2];
+	const uint8_t filters[2] = { CLOCK_TIME_FILTER, CLOCK_SPEED_FILTER };
+	int r;
+
+	put_le64(offset, (uint64_t)offset_ns);
+	put_le32(delay, (int)pos == bus->reference ? 0 : (uint32_t)sl->clock.delay_ns);
+	put_le16(start, CLOCK_SPEED_COUNTER_START);
+	r = register_write(bus, pos, ESC_REG_DC_SYSTEM_TIME_OFFSET, offset,
+			   sl->is_clock_64bit ? 8 : 4);
+	if (r >= 0) {
+		r = register_write(bus, pos, ESC_REG_DC_SYSTEM_TIME_DELAY, delay, sizeof(delay));
+	}
+	if (r >= 0) {
+		r = register_write(bus, pos, ESC_REG_DC_TIME_FILTER, filters, sizeof(filters));
+	}
+	if (r >= 0) {
+		r = register_write(bus, pos, ESC_REG_DC_SPEED_COUNTER_START, start, sizeof(start));
+	}
+	sl->is_clock_set = r >= 0;
+	return r;
+}
 
 int bus_reference_time(struct bus *bus, int64_t *ret_ns)
 {

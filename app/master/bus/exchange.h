@@ -14,7 +14,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "base/limits.h"
+#include "bus/exchange_plan.h"
 #include "link/line.h"
 
 enum exchange_status {
@@ -23,29 +23,6 @@ enum exchange_status {
 	EXCHANGE_WKC_LOW,  /* all back, but a WKC is not as expected: the image is not touched, or,
 			      of a split one, what is not slaves_low's */
 };
-
-struct exchange_plan {
-	uint32_t image_bytes;
-	uint32_t output_bytes; /* the first of them */
-	uint32_t logical_start;
-	uint32_t chunk_bytes[LIMIT_CHUNKS]; /* how the image is cut into LRW datagrams */
-	unsigned chunk_count;
-	uint16_t chunk_wkc[LIMIT_CHUNKS];    /* expected of each */
-	uint8_t chunk_frame[LIMIT_CHUNKS];   /* which frame carries it, ascending */
-	uint64_t chunk_slaves[LIMIT_CHUNKS]; /* whose data it has, a bit a slave */
-	uint16_t wkc_expected;               /* sum, with every slave in SAFE-OP or OP */
-	uint16_t dc_reference;               /* station address of the reference clock; 0: no DC */
-	uint16_t slave_count;
-	int is_split; /* 1: a chunk a slave; those with a good WKC are taken though others have not
-		       */
-	int monitor;  /* 1: BRD of AL status and DC difference */
-};
-
-/** How many frames an exchange has. */
-static inline unsigned exchange_frame_count(const struct exchange_plan *plan)
-{
-	return plan->chunk_count > 0 ? plan->chunk_frame[plan->chunk_count - 1] + 1u : 1;
-}
 
 struct exchange_result {
 	enum exchange_status status;

@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 #include "base/limits.h"
-#include "bus/exchange.h"
+#include "bus/exchange_plan.h"
 
 enum {
 	EXCHANGE_OVERHEAD = 12, /* header and WKC of a datagram */

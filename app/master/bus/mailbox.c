@@ -22,7 +22,7 @@ int bus_has_coe(const struct bus *bus, size_t pos)
 	return soem->mbx_l > 0 && (soem->mbx_proto & ECT_MBXPROT_COE) != 0;
 }
 
-const char *bus_abort_text(uint32_t abort)
+static const char *abort_text(uint32_t abort)
 {
 	return ec_sdoerror2string(abort);
 }
@@ -200,7 +200,7 @@ static int write_startup(struct bus *bus, size_t pos, const struct config_sdo *s
 				      " (%s:%d) is refused: abort "
 				      "0x%08x, %s",
 				      sdo->index, sdo->subindex, sdo->value, bus->cfg->path,
-				      sdo->line, abort, bus_abort_text(abort));
+				      sdo->line, abort, abort_text(abort));
 	}
 	if (r < 0) {
 		return bus_fail_slave(bus, pos, r, "start-up SDO 0x%04x:%02x (%s:%d): %s",

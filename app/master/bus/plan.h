@@ -9,7 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "bus/exchange.h"
+#include "bus/exchange_plan.h"
 
 /* One SyncManager's buffer in the process image. */
 struct plan_area {

@@ -65,7 +65,7 @@ static int64_t next_start(const struct bus *bus, int64_t dc_now_ns, size_t slave
 	return earliest_ns + period_ns(bus) - mod_floor(earliest_ns, period_ns(bus));
 }
 
-int bus_sync0_program(struct bus *bus, size_t pos, int64_t start_ns)
+static int program(struct bus *bus, size_t pos, int64_t start_ns)
 {
 	const struct bus_slave *sl = &bus->slave[pos];
 	uint8_t control = (uint8_t)sl->assign_activate;
@@ -167,7 +167,7 @@ int bus_sync0_is_running(struct bus *bus, size_t pos)
 static int program_all(struct bus *bus, const uint8_t *wanted, int64_t start_ns)
 {
 	for (size_t i = 0; i < bus->slave_count; i++) {
-		if (wanted[i] && bus_sync0_program(bus, i, start_ns) < 0) {
+		if (wanted[i] && program(bus, i, start_ns) < 0) {
 			return bus_fail_slave(bus, i, -EIO,
 					      "its SYNC unit (0x0980) cannot be programmed");
 		}
@@ -282,7 +282,7 @@ int bus_sync0_restore(struct bus *bus, size_t pos)
 	if (bus_reference_time(bus, &now_ns) < 0) {
 		return -EIO;
 	}
-	return bus_sync0_program(bus, pos, next_start(bus, now_ns, 1));
+	return program(bus, pos, next_start(bus, now_ns, 1));
 }
 
 int bus_sync0_is_wanted(const struct bus *bus, size_t pos)

@@ -66,18 +66,6 @@ static int look_at_all(struct bus *bus, struct look *look)
 	return r;
 }
 
-void bus_emit_event(struct bus *bus, const struct bus_emit *emit, struct event ev)
-{
-	const struct platform *platform = line_platform(bus->line);
-
-	if (emit->call == NULL) {
-		return;
-	}
-	ev.mono_ns = platform->now(platform->ctx).ns;
-	ev.tai_ns = platform->tai_ns(platform->ctx);
-	emit->call(emit->ctx, &ev);
-}
-
 static void note_state(struct bus *bus, size_t pos, const struct look *look,
 		       const struct bus_emit *emit)
 {

@@ -10,12 +10,10 @@
 #include "cycle/cycle_internal.h"
 
 enum {
-	STACK_BYTES = 64 * 1024,    /* touched before the first cycle */
-	FAULT_CHECK_CYCLES = 64,    /* how often the thread's page faults are read */
-	EVENT_WINDOW_CYCLES = 1000, /* in so many cycles ... */
-	EVENT_WINDOW_LIMIT = 20,    /* ... at most so many events of one kind */
-	SETTLE_SHARE = 20, /* slaves have a 20th of the period to put their inputs in place */
-	RIDE_PERCENT = 85, /* service frames until then */
+	STACK_BYTES = 64 * 1024, /* touched before the first cycle */
+	FAULT_CHECK_CYCLES = 64, /* how often the thread's page faults are read */
+	SETTLE_SHARE = 20,       /* slaves have a 20th of the period to put their inputs in place */
+	RIDE_PERCENT = 85,       /* service frames until then */
 };
 
 int cycle_create(const struct cycle_spec *spec, struct cycle **ret_cycle, char *error,
@@ -65,37 +63,6 @@ void cycle_destroy(struct cycle *cycle)
 	free(cycle);
 }
 
-void cycle_emit(struct cycle *cycle, struct event *ev)
-{
-	struct event_gate *gate = &cycle->gate[ev->id < EVENT_COUNT ? ev->id : 0];
-	uint64_t window = cycle->steps / EVENT_WINDOW_CYCLES;
-
-	/* A broken cable must not flood the ring; the counters have every one. */
-	if (gate->window != window) {
-		*gate = (struct event_gate){ .window = window, .count = 0 };
-	}
-	if (gate->count++ >= EVENT_WINDOW_LIMIT) {
-		return;
-	}
-	ev->mono_ns = cycle->sample.wake_mono_ns;
-	ev->tai_ns = cycle->sample.wake_tai_ns;
-	ev->cycle = cycle->sample.cycle;
-	ring_push(cycle->spec.events, ev, sizeof(*ev), NULL, 0);
-}
-
-void cycle_note(struct cycle *cy, enum event_id id, int64_t value, int64_t arg0, int64_t arg1)
-{
-	struct event ev = {
-		.id = (uint16_t)id,
-		.slave_pos = EVENT_NO_SLAVE,
-		.value = value,
-		.arg = { arg0 > INT32_MAX ? INT32_MAX : (int32_t)arg0,
-			 arg1 > INT32_MAX ? INT32_MAX : (int32_t)arg1 },
-	};
-
-	cycle_emit(cy, &ev);
-}
-
 /* --- wake --- */
 
 static void change_phase(struct cycle *cy)
@@ -116,9 +83,20 @@ static void change_phase(struct cycle *cy)
 	cy->phase = wanted;
 }
 
+/*
+ * The deadline moves here and nowhere else: by the periods that a late master has passed over
+ * (wake() and cycle_step()), then by the period and the servo's correction.
+ */
+static void move_deadline(struct cycle *cy, uint64_t periods, int64_t correction_ns)
+{
+	cy->deadline = mono_add(cy->deadline,
+				(span_t){ (int64_t)periods * cy->period.ns + correction_ns });
+}
+
 static mono_t wake(struct cycle *cy)
 {
 	const struct platform *pf = &cy->spec.platform;
+	uint64_t skipped;
 	mono_t now;
 
 	if (!cy->has_started) {
@@ -143,9 +121,11 @@ static mono_t wake(struct cycle *cy)
 		cy->sample.wake_latency_ns = INT32_MAX;
 	}
 	histogram_add(&cy->spec.stats->wake_latency, mono_sub(now, cy->deadline).ns);
-	/* Later than the next SYNC0: the edges in between are lost to this master. */
-	cycle_skip(cy, numbering_skipped(cy->period.ns, cy->set_point_ns,
-					 mono_sub(now, cy->deadline).ns));
+	/* Woken after the next SYNC0: the edges in between are lost to this master. */
+	skipped =
+		numbering_skipped(cy->period.ns, cy->set_point_ns, mono_sub(now, cy->deadline).ns);
+	cycle_skip(cy, skipped);
+	move_deadline(cy, skipped, 0);
 	return now;
 }
 
@@ -199,7 +179,7 @@ void cycle_step(struct cycle *cy)
 	mono_t now = wake(cy);
 	struct exchange_result res;
 	int64_t correction_ns;
-	int is_in_window;
+	struct cycle_place place;
 	mono_t done;
 
 	if (cy->was_fail_safe) {
@@ -208,13 +188,14 @@ void cycle_step(struct cycle *cy)
 	res = exchange_run(cy->spec.exchange, cy->image, receive_deadline(cy, now));
 	cycle_count_frames(cy, &res);
 	correction_ns = cycle_follow(cy, &res);
-	is_in_window = cycle_place(cy, &res);
-	if (!is_in_window && res.status == EXCHANGE_OK) {
+	place = cycle_place(cy, &res);
+	move_deadline(cy, place.late_periods, 0);
+	if (!place.is_in_window && res.status == EXCHANGE_OK) {
 		ADD(st->frames_late, 1);
 		cy->sample.flags |= SAMPLE_LATE;
 	}
 	outputs_sent(&cy->outputs, cy->sample.cycle);
-	cycle_judge(cy, &res, is_in_window);
+	cycle_judge(cy, &res, place.is_in_window);
 
 	cy->sample.dc_time_ns = numbering_dc_time(&cy->numbering, cy->sample.cycle);
 	cy->sample.wkc = res.wkc;
@@ -234,7 +215,7 @@ void cycle_step(struct cycle *cy)
 			  mono_add(cy->deadline, (span_t){ cy->period.ns * RIDE_PERCENT / 100 }))) {
 		ADD(st->rides, 1);
 	}
-	cy->deadline = mono_add(cy->deadline, (span_t){ cy->period.ns + correction_ns });
+	move_deadline(cy, 1, correction_ns);
 	cy->steps++;
 	cycle_count_down(cy);
 }
@@ -264,38 +245,4 @@ int cycle_run(struct cycle *cycle)
 		control_leave(control);
 	}
 	return cycle->result;
-}
-
-int cycle_has_stopped(const struct cycle *cycle, int *ret_result)
-{
-	if (!atomic_load_explicit(&cycle->stop, memory_order_acquire)) {
-		return 0;
-	}
-	*ret_result = cycle->result;
-	return 1;
-}
-
-void cycle_stop(struct cycle *cycle)
-{
-	atomic_store_explicit(&cycle->stop, 1, memory_order_release);
-}
-
-void cycle_slaves_set(struct cycle *cycle, uint64_t slaves)
-{
-	atomic_store_explicit(&cycle->wanted_slaves, slaves, memory_order_release);
-}
-
-void cycle_phase_set(struct cycle *cycle, enum cycle_phase phase)
-{
-	atomic_store_explicit(&cycle->wanted_phase, (int)phase, memory_order_release);
-}
-
-int cycle_output_index(const struct cycle *cycle, size_t channel)
-{
-	for (size_t i = 0; i < cycle->outputs.output_count; i++) {
-		if (cycle->outputs.output[i].channel == &cycle->spec.channels[channel]) {
-			return (int)i;
-		}
-	}
-	return -ENOENT;
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * One millisecond (DESIGN 3): wake, send and wait, servo, check, outputs, sample. cycle_step() is
- * one cycle; cycle_run() repeats it until cycle_stop(). After cycle_create() nothing here
- * allocates, locks, logs, opens or blocks but the platform's sleep and the transport.
+ * The process data cycle. cycle_step() is one: wake, exchange, servo, check, outputs, sample;
+ * cycle_run() repeats it until cycle_stop(). After cycle_create() nothing here allocates, locks,
+ * logs, opens or blocks but the platform's sleep and the transport.
  */
 #ifndef CYCLE_CYCLE_H
 #define CYCLE_CYCLE_H
@@ -10,34 +10,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "base/board.h"
-#include "base/platform.h"
-#include "base/ring.h"
-#include "base/sample.h"
-#include "base/status.h"
-#include "bus/exchange.h"
-#include "config/config.h"
-
-enum cycle_writer { CYCLE_WRITER_LOCAL, CYCLE_WRITER_PROGRAM, CYCLE_WRITER_REMOTE, CYCLE_WRITERS };
-
-struct control;
-
-/* Everything the cycle works on; all of it outlives the cycle. */
-struct cycle_spec {
-	const struct config *cfg;
-	struct platform platform;
-	struct exchange *exchange;
-	const struct exchange_plan *plan;
-	const struct slave_info *slaves;
-	size_t slave_count;
-	const struct channel *channels;
-	size_t channel_count;
-	struct ring *samples;
-	struct ring *events;
-	struct cycle_stats *stats;
-	struct board *boards[CYCLE_WRITERS]; /* NULL: no such writer */
-	struct control *control;             /* the control program; NULL: none */
-};
+#include "cycle/cycle_spec.h"
 
 struct cycle;
 
@@ -75,15 +48,8 @@ void cycle_phase_set(struct cycle *cycle, enum cycle_phase phase);
  */
 void cycle_slaves_set(struct cycle *cycle, uint64_t slaves);
 
-/** Push an event from the cycle's own thread only. RT-safe. */
-struct event;
-void cycle_emit(struct cycle *cycle, struct event *ev);
-
 /** The newest frame's DC time and the host time at which it was sent. 0 or -EAGAIN. Context: any.
  */
 int cycle_dc_now(const struct cycle *cycle, int64_t *ret_dc_ns);
-
-/** Which n-th output @channel is (its place on the boards); -ENOENT for an input. */
-int cycle_output_index(const struct cycle *cycle, size_t channel);
 
 #endif

@@ -57,7 +57,11 @@ struct cycle {
 	_Atomic int64_t dc_mono_ns;     /* [cycle] */
 };
 
-/* Push an event of this cycle without a slave; arguments are clamped to int32. */
+/* --- cycle_event.c --- */
+
+/** Stamp @ev and push it, unless there were too many of its kind lately. */
+void cycle_emit(struct cycle *cy, struct event *ev);
+/** Push an event of this cycle without a slave; arguments are clamped to int32. */
 void cycle_note(struct cycle *cy, enum event_id id, int64_t value, int64_t arg0, int64_t arg1);
 
 /* --- cycle_follow.c: frames and the reference clock --- */
@@ -78,18 +82,23 @@ void cycle_count_down(struct cycle *cy);
 
 /* --- cycle_judge.c: one sample for every SYNC0 edge --- */
 
-/** The mask of all slaves. */
-uint64_t cycle_all_slaves(const struct cycle *cy);
 void cycle_push_sample(struct cycle *cy);
-/** The next @count edges passed while the master was late: each gets a sample with the last known
- * inputs. */
-void cycle_skip(struct cycle *cy, uint64_t count);
 /**
- * Which SYNC0 edge the frame's inputs belong to, by the DC time at which it passed. 1 if it was in
- * its window; 0 if it passed while the slaves were still putting the edge's inputs in place, or
- * brought no time that can be believed.
+ * The next @count edges passed while the master was late: each gets a sample with the last known
+ * inputs. The deadline stays: the caller decides.
  */
-int cycle_place(struct cycle *cy, const struct exchange_result *res);
+void cycle_skip(struct cycle *cy, uint64_t count);
+
+struct cycle_place {
+	/* 1: the frame passed in its edge's window. 0: while the slaves were still updating their
+	 * inputs, or it carries no plausible DC time. */
+	int is_in_window;
+	/* Periods by which the master itself was late: the deadline is to move by them. */
+	uint64_t late_periods;
+};
+
+/** Which SYNC0 edge the frame's inputs belong to, by the DC time at which it passed. */
+struct cycle_place cycle_place(struct cycle *cy, const struct exchange_result *res);
 /** Is each slave's sample good? Flags and counters say so. */
 void cycle_judge(struct cycle *cy, const struct exchange_result *res, int is_in_window);
 

@@ -3,7 +3,7 @@
 
 #include <errno.h>
 
-uint64_t cycle_all_slaves(const struct cycle *cy)
+static uint64_t all_slaves(const struct cycle *cy)
 {
 	return cy->spec.slave_count >= 64 ? UINT64_MAX : (UINT64_C(1) << cy->spec.slave_count) - 1;
 }
@@ -17,7 +17,7 @@ void cycle_push_sample(struct cycle *cy)
 void cycle_skip(struct cycle *cy, uint64_t count)
 {
 	struct sample_header kept = cy->sample;
-	uint64_t all = cycle_all_slaves(cy);
+	uint64_t all = all_slaves(cy);
 
 	if (count == 0) {
 		return;
@@ -50,7 +50,6 @@ void cycle_skip(struct cycle *cy, uint64_t count)
 	}
 	cy->sample = kept;
 	cy->sample.cycle += count;
-	cy->deadline = mono_add(cy->deadline, (span_t){ (int64_t)count * cy->period.ns });
 	if (cy->phase != CYCLE_OP) {
 		return; /* nothing is controlled yet */
 	}
@@ -90,15 +89,17 @@ static uint64_t passed_before_sending(const struct cycle *cy, const struct excha
 	return passed > late ? passed - late : 0;
 }
 
-int cycle_place(struct cycle *cy, const struct exchange_result *res)
+struct cycle_place cycle_place(struct cycle *cy, const struct exchange_result *res)
 {
+	struct cycle_place ret = { .is_in_window = 1, .late_periods = 0 };
 	struct numbering_place place;
 
 	if (cy->phase == CYCLE_CLOCKS || cy->servo.state == DC_OFF) {
-		return 1;
+		return ret;
 	}
 	if (res->dc_time_ns == 0) {
-		return 0; /* whose inputs these are cannot be told */
+		ret.is_in_window = 0; /* the edge of these inputs is unknown */
+		return ret;
 	}
 	place = numbering_place(&cy->numbering, cy->sample.cycle, res->dc_time_ns);
 	if (place.was_rebased) {
@@ -106,14 +107,13 @@ int cycle_place(struct cycle *cy, const struct exchange_result *res)
 		check_restart(&cy->check);
 	}
 	if (place.passed_edges > 0) {
-		mono_t deadline = cy->deadline;
 		uint64_t behind = passed_before_sending(cy, res);
-		uint64_t moved = place.passed_edges > behind ? place.passed_edges - behind : 0;
 
+		ret.late_periods = place.passed_edges > behind ? place.passed_edges - behind : 0;
 		cycle_skip(cy, place.passed_edges);
-		cy->deadline = mono_add(deadline, (span_t){ (int64_t)moved * cy->period.ns });
 	}
-	return place.is_in_window;
+	ret.is_in_window = place.is_in_window;
+	return ret;
 }
 
 /* A slave that is known to be out of OP is not counted, as nobody is while the bus is. */
@@ -144,7 +144,7 @@ static void count_bad(struct cycle *cy, uint64_t bad, int is_explained)
 
 void cycle_judge(struct cycle *cy, const struct exchange_result *res, int is_in_window)
 {
-	uint64_t all = cycle_all_slaves(cy);
+	uint64_t all = all_slaves(cy);
 	int is_fresh = res->status == EXCHANGE_OK ||
 		       (res->status == EXCHANGE_WKC_LOW && cy->spec.plan->is_split);
 	uint64_t stale = (~cy->slaves | res->slaves_low) & all;

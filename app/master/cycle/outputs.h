@@ -13,7 +13,7 @@
 #include "base/board.h"
 #include "base/sample.h"
 #include "config/config.h"
-#include "cycle/cycle.h"
+#include "cycle/cycle_spec.h"
 
 struct output {
 	const struct channel *channel;

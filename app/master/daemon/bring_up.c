@@ -15,14 +15,6 @@ enum {
 		LIMIT_CHANNELS * sizeof(struct channel),
 };
 
-int session_cancelled(const struct session *s, struct failure *failure)
-{
-	return session_is_stop_asked(s)
-		       ? failure_set(failure, EXIT_CODE_OK, -ECANCELED,
-				     "bring-up: told to stop before OP was reached")
-		       : 0;
-}
-
 /* --- the control program --- */
 
 /* Before anything is asked of the segment: a path that is wrong is wrong whatever is out there. */
@@ -97,18 +89,6 @@ static void show_slaves(struct session *s)
 		s->run.page->slave[i].info = slaves[i];
 	}
 	atomic_store_explicit(&s->run.page->slave_count, (uint32_t)count, memory_order_release);
-}
-
-int session_step(struct session *s, int r, enum exit_code late, const char *error,
-		 struct failure *failure)
-{
-	if (s->spec.hooks.alive != NULL) {
-		s->spec.hooks.alive(s->spec.hooks.ctx);
-	}
-	if (r < 0) {
-		return failure_set(failure, failure_code_of_bus(r, late), r, "%s", error);
-	}
-	return session_cancelled(s, failure);
 }
 
 static int prepare_slaves(struct session *s, struct failure *failure)

@@ -124,6 +124,26 @@ void session_wait(struct session *s, span_t span)
 	} while (session_now(s).ns < until.ns && !session_is_stop_asked(s));
 }
 
+int session_cancelled(const struct session *s, struct failure *failure)
+{
+	return session_is_stop_asked(s)
+		       ? failure_set(failure, EXIT_CODE_OK, -ECANCELED,
+				     "bring-up: told to stop before OP was reached")
+		       : 0;
+}
+
+int session_step(struct session *s, int r, enum exit_code late, const char *error,
+		 struct failure *failure)
+{
+	if (s->spec.hooks.alive != NULL) {
+		s->spec.hooks.alive(s->spec.hooks.ctx);
+	}
+	if (r < 0) {
+		return failure_set(failure, failure_code_of_bus(r, late), r, "%s", error);
+	}
+	return session_cancelled(s, failure);
+}
+
 void session_state_set(struct session *s, enum bus_state state)
 {
 	struct event ev = {
@@ -182,19 +202,9 @@ const struct status_page *session_page(const struct session *session)
 	return session->run.page;
 }
 
-struct bus *session_bus(const struct session *session)
-{
-	return session->bus;
-}
-
 struct control *session_control(const struct session *session)
 {
 	return session->control;
-}
-
-struct cycle *session_cycle(const struct session *session)
-{
-	return session->cycle;
 }
 
 const struct run_dir *session_run_dir(const struct session *session)

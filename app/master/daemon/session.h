@@ -111,13 +111,9 @@ void session_say(struct session *session, const char *text);
 
 /** The status page; it lives as long as the session. */
 const struct status_page *session_page(const struct session *session);
-/** The bus, the cycle; NULL while nothing is up. */
-struct bus;
 struct control;
-struct bus *session_bus(const struct session *session);
 /** The control program; NULL: none. */
 struct control *session_control(const struct session *session);
-struct cycle *session_cycle(const struct session *session);
 /** The run directory. */
 const struct run_dir *session_run_dir(const struct session *session);
 

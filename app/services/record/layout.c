@@ -251,11 +251,6 @@ const struct slave_info *layout_slaves(const struct layout *l)
 	return l->slave;
 }
 
-const struct channel *layout_channels(const struct layout *l)
-{
-	return l->channel;
-}
-
 const struct layout_topic *layout_topics(const struct layout *l, size_t *ret_count)
 {
 	*ret_count = l->topic_count;

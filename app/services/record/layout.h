@@ -46,7 +46,6 @@ void layout_destroy(struct layout *l);
 
 const struct sample_meta *layout_meta(const struct layout *l);
 const struct slave_info *layout_slaves(const struct layout *l);
-const struct channel *layout_channels(const struct layout *l);
 /** Topics: one for each slave that has channels. */
 const struct layout_topic *layout_topics(const struct layout *l, size_t *ret_count);
 /** Bytes of the largest slave message, and of all of one cycle together. */

@@ -251,11 +251,6 @@ int record_file_is_full(const struct record_file *f)
 	return mcap_writer_is_full(f->w);
 }
 
-uint64_t record_file_cycles(const struct record_file *f)
-{
-	return f->cycles;
-}
-
 uint64_t record_file_open_cycles(const struct record_file *f)
 {
 	return f->open_cycles;

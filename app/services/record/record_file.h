@@ -81,8 +81,7 @@ uint64_t record_file_bytes(const struct record_file *f);
 uint64_t record_file_final_bytes(const struct record_file *f);
 /** 1: it cannot take more, finish it. */
 int record_file_is_full(const struct record_file *f);
-/** Samples in the file; of those: behind a closed chunk; the number of the last. */
-uint64_t record_file_cycles(const struct record_file *f);
+/** Samples behind the last closed chunk; the number of the last sample. */
 uint64_t record_file_open_cycles(const struct record_file *f);
 uint64_t record_file_last_cycle(const struct record_file *f);
 

@@ -112,11 +112,6 @@ enum sink_state sink_state(const struct sink *s)
 	return s->state;
 }
 
-int sink_has_file(const struct sink *s)
-{
-	return s->file != NULL;
-}
-
 int sink_take_rewind(struct sink *s)
 {
 	int has_rewind = s->has_rewind;

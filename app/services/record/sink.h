@@ -71,7 +71,6 @@ int sink_clock_step(struct sink *s, const struct timemap_state *state);
 /** Count a gap of this session. */
 void sink_count_gap(struct sink *s, uint64_t cycles);
 void sink_count_lost_events(struct sink *s, uint64_t events);
-int sink_has_file(const struct sink *s);
 
 /** Put the sink's figures into the status page. */
 void sink_get_status(struct sink *s, struct record_status *page);

@@ -115,17 +115,6 @@ int64_t grid_mono_ns(const struct grid *grid, int64_t dc_ns)
 	return timemap_utc_ns(grid->map, dc_ns);
 }
 
-int64_t grid_dc_ns(const struct grid *grid, int64_t mono_ns)
-{
-	struct timemap_state s;
-	int64_t since;
-
-	timemap_get(grid->map, &s);
-	since = mono_ns - s.utc_ns;
-	return s.dc_ns + since -
-	       (int64_t)((double)since * (double)s.rate_ppb / (1e9 + (double)s.rate_ppb));
-}
-
 int64_t grid_uncertainty_ns(const struct grid *grid)
 {
 	struct timemap_state s;
@@ -139,9 +128,20 @@ int64_t grid_due_dc_ns(const struct grid *grid, int64_t cycle)
 	return grid->origin_dc_ns + cycle * grid->period_ns;
 }
 
+static int64_t dc_ns_at(const struct grid *grid, int64_t mono_ns)
+{
+	struct timemap_state s;
+	int64_t since;
+
+	timemap_get(grid->map, &s);
+	since = mono_ns - s.utc_ns;
+	return s.dc_ns + since -
+	       (int64_t)((double)since * (double)s.rate_ppb / (1e9 + (double)s.rate_ppb));
+}
+
 int64_t grid_cycle(const struct grid *grid, int64_t mono_ns, int64_t shift_ns, int64_t *ret_late_ns)
 {
-	int64_t since = grid_dc_ns(grid, mono_ns) - grid->origin_dc_ns;
+	int64_t since = dc_ns_at(grid, mono_ns) - grid->origin_dc_ns;
 	int64_t folded = fold_ns(since - shift_ns, grid->period_ns);
 
 	*ret_late_ns = folded + shift_ns;

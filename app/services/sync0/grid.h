@@ -31,9 +31,8 @@ enum grid_news grid_pair(struct grid *grid, int64_t dc_ns, int64_t mono_ns, int6
 /** 1 as soon as one pair was given. */
 int grid_is_ready(const struct grid *grid);
 
-/** CLOCK_MONOTONIC at @dc_ns, and DC time at @mono_ns. The grid must be ready. */
+/** CLOCK_MONOTONIC at @dc_ns. The grid must be ready. */
 int64_t grid_mono_ns(const struct grid *grid, int64_t dc_ns);
-int64_t grid_dc_ns(const struct grid *grid, int64_t mono_ns);
 /** What grid_mono_ns() may be off by. */
 int64_t grid_uncertainty_ns(const struct grid *grid);
 

@@ -81,8 +81,3 @@ void window_clear(struct window *w, int64_t first_cycle)
 		wl->step_cycle = 0;
 	}
 }
-
-int window_holds(const struct window *w, int64_t cycle)
-{
-	return cycle >= w->first_cycle && cycle < w->first_cycle + (int64_t)w->cycles;
-}

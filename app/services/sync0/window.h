@@ -38,6 +38,5 @@ int window_create(uint32_t cycles, size_t line_count, struct window **ret_window
 void window_destroy(struct window *w);
 /** Begin anew, at @first_cycle. */
 void window_clear(struct window *w, int64_t first_cycle);
-int window_holds(const struct window *w, int64_t cycle);
 
 #endif

@@ -83,9 +83,9 @@ TEST(config, every_option_has_sound_bounds_and_a_default_within_them)
 
 		CHECK_EQ(option->min != NULL && option->max != NULL, is_number);
 		CHECK_EQ(option->words != NULL, option->type == OPTION_WORD);
-		CHECK(option->standard != NULL || strstr(option->name, "[]") != NULL);
-		if (option->standard != NULL) {
-			CHECK_EQ(option_parse(option, option->standard, &base, why), 0);
+		CHECK(option->default_value != NULL || strstr(option->name, "[]") != NULL);
+		if (option->default_value != NULL) {
+			CHECK_EQ(option_parse(option, option->default_value, &base, why), 0);
 		}
 		if (is_number) {
 			CHECK_EQ(option_parse(option, option->min, &base, why), 0);

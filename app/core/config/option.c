@@ -1,0 +1,180 @@
+/* SPDX-License-Identifier: MIT */
+#include "config/option.h"
+
+#include <assert.h>
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+const struct option *option_find(const char *name)
+{
+	for (size_t i = 0; i < option_count; i++) {
+		if (strcmp(option_table[i].name, name) == 0) {
+			return &option_table[i];
+		}
+	}
+	return NULL;
+}
+
+/* Is @option a field of the item that @prefix ("slaves[].") names, and not of a list inside it? */
+static int is_under(const struct option *option, const char *prefix)
+{
+	size_t len = strlen(prefix);
+
+	return strncmp(option->name, prefix, len) == 0 && strstr(option->name + len, "[]") == NULL;
+}
+
+void option_fill_defaults(const char *prefix, void *base)
+{
+	char why[OPTION_WHY_BYTES];
+
+	for (size_t i = 0; i < option_count; i++) {
+		const struct option *option = &option_table[i];
+
+		if (is_under(option, prefix) && option->default_value != NULL) {
+			int r = option_parse(option, option->default_value, base, why);
+
+			assert(r == 0);
+			(void)r;
+		}
+	}
+}
+
+void config_defaults(struct config *cfg)
+{
+	memset(cfg, 0, sizeof(*cfg));
+	option_fill_defaults("", cfg);
+}
+
+/* "slaves[2].mode": the pattern "slaves[].mode" and the 2. -EINVAL if the brackets are not right.
+ */
+static int split_index(const char *name, char *ret_pattern, size_t *ret_index)
+{
+	const char *open = strchr(name, '[');
+	char *end;
+	unsigned long index;
+
+	if (strlen(name) >= OPTION_KEY_BYTES || open == NULL || open[1] < '0' || open[1] > '9') {
+		return -EINVAL;
+	}
+	errno = 0;
+	index = strtoul(open + 1, &end, 10);
+	if (errno != 0 || *end != ']' || strchr(end, '[') != NULL) {
+		return -EINVAL;
+	}
+	snprintf(ret_pattern, OPTION_KEY_BYTES, "%.*s[%s", (int)(open - name), name, end);
+	*ret_index = index;
+	return 0;
+}
+
+/* A place for item @index of the list at @count: an old item, or a fresh one behind the last. */
+static void *item_at(struct config *cfg, const char *pattern, size_t index)
+{
+	if (strncmp(pattern, "slaves[].", 9) == 0) {
+		if (index > cfg->slave_count || index >= LIMIT_SLAVES) {
+			return NULL;
+		}
+		if (index == cfg->slave_count) {
+			memset(&cfg->slave[index], 0, sizeof(cfg->slave[index]));
+			option_fill_defaults("slaves[].", &cfg->slave[index]);
+			cfg->slave_count++;
+		}
+		return &cfg->slave[index];
+	}
+	if (index > cfg->output_count || index >= CONFIG_LIMIT_OUTPUTS) {
+		return NULL;
+	}
+	if (index == cfg->output_count) {
+		memset(&cfg->output[index], 0, sizeof(cfg->output[index]));
+		option_fill_defaults("outputs[].", &cfg->output[index]);
+		cfg->output_count++;
+	}
+	return &cfg->output[index];
+}
+
+static int set_value(struct config *cfg, const char *name, const char *value, char *why)
+{
+	char pattern[OPTION_KEY_BYTES];
+	const struct option *option = option_find(name);
+	const char *guess;
+	size_t index;
+	void *base = cfg;
+
+	if (option == NULL && split_index(name, pattern, &index) == 0) {
+		option = option_find(pattern);
+		base = option == NULL ? NULL : item_at(cfg, pattern, index);
+		if (base == NULL && option != NULL) {
+			snprintf(why, OPTION_WHY_BYTES,
+				 "item %zu would leave a hole or is beyond the limit", index);
+			return -EINVAL;
+		}
+	} else if (option != NULL && strchr(name, '[') != NULL) {
+		option = NULL;
+	}
+	if (option == NULL) {
+		guess = option_suggest(name);
+		snprintf(why, OPTION_WHY_BYTES, "unknown option%s%s%s",
+			 guess == NULL ? "" : "; did you mean ", guess == NULL ? "" : guess,
+			 guess == NULL ? "" : "?");
+		return -EINVAL;
+	}
+	return option_parse(option, value, base, why);
+}
+
+int config_set(struct config *cfg, const char *assignment, char *error, size_t error_bytes)
+{
+	const char *equals = strchr(assignment, '=');
+	char why[OPTION_WHY_BYTES] = "";
+	char name[OPTION_KEY_BYTES];
+	struct config work = *cfg;
+	int r;
+
+	if (equals == NULL || equals == assignment ||
+	    (size_t)(equals - assignment) >= sizeof(name)) {
+		snprintf(error, error_bytes, "%.64s: wants OPTION=VALUE", assignment);
+		option_make_plain(error);
+		return -EINVAL;
+	}
+	snprintf(name, sizeof(name), "%.*s", (int)(equals - assignment), assignment);
+	r = set_value(&work, name, equals + 1, why);
+	if (r < 0) {
+		snprintf(error, error_bytes, "%s: %s", name, why);
+		option_make_plain(error);
+		return -EINVAL;
+	}
+	*cfg = work;
+	return 0;
+}
+
+int config_parse_duration(const char *text, int64_t *ret_ns, char *why)
+{
+	static const struct option duration = {
+		.name = "",
+		.type = OPTION_DURATION,
+		.offset = 0,
+		.bytes = sizeof(int64_t),
+		.min = "-36500d",
+		.max = "36500d",
+		.unit = "s",
+	};
+
+	return option_parse(&duration, text, ret_ns, why);
+}
+
+int config_check(const struct config *cfg, char *error, size_t error_bytes)
+{
+	char why[OPTION_WHY_BYTES] = "";
+	const char *key;
+	int line;
+
+	if (option_cross_check(cfg, NULL, &key, &line, why) == 0) {
+		return 0;
+	}
+	if (line > 0 && cfg->path[0] != '\0') {
+		snprintf(error, error_bytes, "%s:%d: %s: %s", cfg->path, line, key, why);
+	} else {
+		snprintf(error, error_bytes, "%s: %s", key, why);
+	}
+	return -EINVAL;
+}
