@@ -325,3 +325,30 @@ TEST(ros2msg, strings_are_bounded_by_the_message)
 	CHECK_EQ(ros2msg_find(&msg, "c"), -ENOENT);
 	ros2msg_done(&msg);
 }
+
+TEST(ros2msg, only_little_endian_cdr_with_a_whole_header_is_decoded)
+{
+	static const uint8_t good[] = { 0, 1, 0, 0, 7 };
+	struct ros2msg_value v[1];
+	struct ros2msg msg;
+	uint8_t bad[sizeof(good)];
+
+	CHECK_EQ(ros2msg_parse("uint8 a\n", 8, &msg), 0);
+	CHECK_EQ(ros2msg_decode(&msg, good, sizeof(good), v), 0);
+	CHECK_EQ(v[0].raw, 7);
+	for (size_t len = 0; len < sizeof(good); len++) {
+		CHECK_EQ(ros2msg_decode(&msg, good, len, v), -EBADMSG);
+	}
+	memcpy(bad, good, sizeof(bad));
+	bad[0] = 1;
+	CHECK_EQ(ros2msg_decode(&msg, bad, sizeof(bad), v), -EBADMSG);
+	memcpy(bad, good, sizeof(bad));
+	bad[1] = 0; /* big-endian */
+	CHECK_EQ(ros2msg_decode(&msg, bad, sizeof(bad), v), -EBADMSG);
+	ros2msg_done(&msg);
+	/* A message without fields has a header, too. */
+	CHECK_EQ(ros2msg_parse("", 0, &msg), 0);
+	CHECK_EQ(ros2msg_decode(&msg, good, 4, v), 0);
+	CHECK_EQ(ros2msg_decode(&msg, good, 3, v), -EBADMSG);
+	ros2msg_done(&msg);
+}

@@ -264,6 +264,40 @@ TEST(log, export_has_a_row_a_cycle_over_all_files)
 	bench_done(&b);
 }
 
+/* The whole number behind @key in the @nth line of @text. */
+static int64_t number_of(const char *text, unsigned nth, const char *key)
+{
+	const char *at = text;
+
+	for (unsigned i = 0; i < nth; i++) {
+		at = strchr(at, '\n');
+		CHECK(at != NULL);
+		at++;
+	}
+	at = strstr(at, key);
+	CHECK(at != NULL);
+	return strtoll(at + strlen(key), NULL, 10);
+}
+
+TEST(log, export_gives_each_cycle_its_utc)
+{
+	const struct log_export_options options = {
+		.channels = "adc.value", .from = 700, .to = 702, .format = LOG_JSON
+	};
+	struct bench b = { .calls = 0 };
+	int64_t utc_ns;
+	char *out;
+
+	record(&b);
+	out = export_of(&b, options, LOG_OK);
+	utc_ns = number_of(out, 0, "\"utc_ns\":");
+	CHECK(utc_ns / NS_PER_S == INT64_C(1766000000)); /* as bench_push() set the host's clock */
+	CHECK_EQ(number_of(out, 1, "\"utc_ns\":") - utc_ns, NS_PER_MS);
+	CHECK_EQ(number_of(out, 2, "\"utc_ns\":") - utc_ns, 2 * NS_PER_MS);
+	free(out);
+	bench_done(&b);
+}
+
 TEST(log, usage_errors_have_their_exit_code)
 {
 	char *none[] = { (char *)"log", NULL };

@@ -4,6 +4,8 @@
 
 #include "base/bytes.h"
 #include "harness/test.h"
+#include "record/mcap_chunk.h"
+#include "record/mcap_index.h"
 #include "record/mcap_reader.h"
 #include "record/mcap_recover.h"
 #include "unit/services/record/sample_file.h"
@@ -325,5 +327,97 @@ TEST(mcap, a_chunk_that_is_full_says_so_before_it_is_too_large)
 	CHECK_EQ(mcap_writer_close_chunk(w), 0);
 	CHECK_EQ(mcap_writer_message(w, &m), 0);
 	mcap_writer_destroy(w);
+	memory_done(&f);
+}
+
+/* A chunk's content: a schema record with id 1 and three texts, the first of @name_len bytes. */
+static size_t put_schema(uint8_t *chunk, uint32_t name_len)
+{
+	uint8_t *at = chunk + MCAP_HEAD_BYTES;
+
+	put_le16(at, 1);
+	put_le32(at + 2, name_len);
+	memcpy(at + 6, "pkg/M", 5);
+	put_le32(at + 11, 0);
+	put_le32(at + 15, 0);
+	chunk[0] = MCAP_OP_SCHEMA;
+	put_le64(chunk + 1, 19);
+	return MCAP_HEAD_BYTES + 19;
+}
+
+TEST(mcap, a_schema_inside_a_chunk_is_checked_by_its_own_bytes)
+{
+	struct mcap_chunk_index *ix = mcap_chunk_index_create();
+	uint8_t chunk[64] = { 0 };
+	size_t len = put_schema(chunk, 5);
+
+	CHECK(ix != NULL);
+	CHECK_EQ(mcap_chunk_index_build(ix, chunk, len), 0);
+	CHECK_EQ(mcap_chunk_index_messages(ix), 0);
+	put_schema(chunk, 500); /* the name is longer than the record */
+	CHECK_EQ(mcap_chunk_index_build(ix, chunk, len), -EBADMSG);
+	mcap_chunk_index_destroy(ix);
+}
+
+TEST(mcap, metadata_whose_name_exceeds_the_record_is_malformed)
+{
+	uint8_t record[MCAP_HEAD_BYTES + 16] = { MCAP_OP_METADATA, 16 };
+	struct mcap_index ix;
+
+	CHECK_EQ(mcap_index_init(&ix), 0);
+	put_le32(record + MCAP_HEAD_BYTES, 4);
+	CHECK_EQ(mcap_index_metadata(&ix, 100, record, sizeof(record)), 0);
+	CHECK_EQ(ix.metadata_count, 1);
+	put_le32(record + MCAP_HEAD_BYTES, 13);
+	CHECK_EQ(mcap_index_metadata(&ix, 200, record, sizeof(record)), -EBADMSG);
+	CHECK_EQ(mcap_index_metadata(&ix, 200, record, MCAP_HEAD_BYTES + 3), -EBADMSG);
+	CHECK_EQ(ix.metadata_count, 1);
+	mcap_index_done(&ix);
+}
+
+TEST(mcap, a_message_has_the_offset_of_its_chunk)
+{
+	struct memory_file f = { .len = 0 };
+	uint64_t chunk_offset = 0;
+	struct mcap_source source;
+	struct mcap_reader *r;
+	struct mcap_item item;
+	unsigned messages = 0;
+
+	sample_file_make(&f, 1);
+	source = memory_source(&f, f.len);
+	CHECK_EQ(mcap_reader_create(&source, &r), 0);
+	while (mcap_reader_next(r, &item) > 0) {
+		if (item.kind == MCAP_ITEM_CHUNK) {
+			CHECK(item.offset > chunk_offset);
+			chunk_offset = item.offset;
+			CHECK_EQ(f.data[chunk_offset], MCAP_OP_CHUNK);
+		} else if (item.kind == MCAP_ITEM_MESSAGE) {
+			CHECK_EQ(item.offset, chunk_offset);
+			messages++;
+		}
+	}
+	CHECK_EQ(messages, SAMPLE_CHUNKS * SAMPLE_CHUNK_MESSAGES);
+	mcap_reader_destroy(r);
+	memory_done(&f);
+}
+
+TEST(mcap, an_ending_that_is_missing_is_no_error)
+{
+	struct memory_file f = { .len = 0 };
+	enum mcap_ending ending = MCAP_ENDING_BAD;
+	struct mcap_source source;
+
+	sample_file_make(&f, 1);
+	source = memory_source(&f, f.len);
+	CHECK_EQ(mcap_ending_check(&source, &ending), 0);
+	CHECK_EQ(ending, MCAP_ENDING_GOOD);
+	source = memory_source(&f, f.len - 1);
+	CHECK_EQ(mcap_ending_check(&source, &ending), 0);
+	CHECK_EQ(ending, MCAP_ENDING_MISSING);
+	source = memory_source(&f, MCAP_MAGIC_BYTES);
+	ending = MCAP_ENDING_BAD;
+	CHECK_EQ(mcap_ending_check(&source, &ending), 0);
+	CHECK_EQ(ending, MCAP_ENDING_MISSING);
 	memory_done(&f);
 }

@@ -1,12 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /* Full and failing disks under a recorder. */
 #include <errno.h>
+#include <signal.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include "base/bytes.h"
 #include "base/clock.h"
 #include "harness/test.h"
+#include "record/recover_file.h"
 #include "record/store.h"
 #include "unit/services/record/bench.h"
 
@@ -232,5 +235,69 @@ TEST(recorder_trouble, an_unfinished_file_without_a_sample_is_removed)
 	bench_read(&b, &finished, &parts);
 	CHECK_EQ(finished + parts, 0);
 	CHECK(strstr(b.said, "removed") != NULL);
+	bench_done(&b);
+}
+
+TEST(recorder_trouble, below_the_reserve_no_file_is_begun)
+{
+	struct bench b = { .calls = 0 };
+	unsigned finished;
+	unsigned parts;
+	struct track t;
+
+	bench_init(&b, 100, 8192);
+	b.options.reserve_bytes = 1000000;
+	b.bytes_free = 999999;
+	CHECK_EQ(bench_start(&b), 0);
+	bench_push(&b, 0, 500);
+	bench_wait(&b, NS_PER_S / 2);
+	CHECK_EQ(recorder_status(b.recorder)->state, RECORD_DISK_FULL);
+	bench_read(&b, &finished, &parts);
+	CHECK_EQ(finished + parts, 0);
+	b.bytes_free = 2000000;
+	bench_wait(&b, 3 * NS_PER_S);
+	CHECK_EQ(recorder_status(b.recorder)->state, RECORD_RUNNING);
+	CHECK_EQ(bench_stop(&b), 0);
+	t = read_all(&b);
+	CHECK_EQ(t.cycles, 500);
+	CHECK_EQ(t.gaps, 0);
+	bench_done(&b);
+}
+
+TEST(recorder_trouble, a_copy_that_fails_leaves_no_file)
+{
+	const struct rlimit small = { .rlim_cur = 2000, .rlim_max = RLIM_INFINITY };
+	const struct sigaction ignore = { .sa_handler = SIG_IGN };
+	struct bench b = { .calls = 0 };
+	struct recover_outcome outcome;
+	struct store_entry *entries;
+	struct sigaction before;
+	struct rlimit usual;
+	char output[600];
+	char path[512];
+	size_t count;
+
+	bench_init(&b, 100, 4096);
+	CHECK_EQ(bench_start(&b), 0);
+	bench_push(&b, 0, 1000);
+	bench_wait(&b, 2 * NS_PER_S);
+	bench_kill(&b);
+	CHECK_EQ(store_list(b.dir, &entries, &count), 0);
+	CHECK_EQ(count, 1);
+	CHECK_EQ(store_path(b.dir, entries[0].name, path, sizeof(path)), 0);
+	snprintf(output, sizeof(output), "%s/copy", b.root);
+	/* The copy grows beyond what this process may write. */
+	CHECK_EQ(sigaction(SIGXFSZ, &ignore, &before), 0);
+	CHECK_EQ(getrlimit(RLIMIT_FSIZE, &usual), 0);
+	CHECK_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+	CHECK_EQ(recover_copy(path, output, &outcome), -EFBIG);
+	CHECK_EQ(setrlimit(RLIMIT_FSIZE, &usual), 0);
+	CHECK_EQ(sigaction(SIGXFSZ, &before, NULL), 0);
+	CHECK(access(output, F_OK) < 0);
+	CHECK_EQ(recover_copy(path, output, &outcome), 0);
+	CHECK_EQ(outcome.result, RECOVER_COPIED);
+	CHECK_EQ(recover_copy(path, output, &outcome), -EEXIST);
+	CHECK_EQ(unlink(output), 0);
+	free(entries);
 	bench_done(&b);
 }
