@@ -15,7 +15,10 @@
 #include "base/clock.h"
 
 static volatile sig_atomic_t is_over;
-static struct termios before; /* of standard input, while keys are read one by one */
+static volatile sig_atomic_t must_suspend; /* Ctrl-Z */
+static volatile sig_atomic_t was_continued;
+static struct termios before; /* of standard input, as it was at screen_begin() */
+static int has_before;
 static int has_keys;
 static int is_taken;
 
@@ -60,21 +63,33 @@ int screen_is_utf8(void)
 
 static void on_signal(int number)
 {
-	(void)number;
-	is_over = 1;
+	switch (number) {
+	case SIGTSTP:
+		must_suspend = 1;
+		break;
+	case SIGCONT:
+		was_continued = 1;
+		break;
+	default:
+		is_over = 1;
+		break;
+	}
+}
+
+/* If it fails, the signal has the effect that it always had. */
+static void catch_signal(int number)
+{
+	struct sigaction action = { .sa_handler = on_signal };
+
+	sigemptyset(&action.sa_mask);
+	sigaction(number, &action, NULL);
 }
 
 void screen_catch_signals(void)
 {
-	struct sigaction action = { .sa_handler = on_signal };
-	static const int numbers[] = { SIGINT, SIGTERM, SIGHUP };
-
-	sigemptyset(&action.sa_mask);
-	for (size_t i = 0; i < sizeof(numbers) / sizeof(numbers[0]); i++) {
-		if (sigaction(numbers[i], &action, NULL) < 0) {
-			return; /* it then ends the program, as it always did */
-		}
-	}
+	catch_signal(SIGINT);
+	catch_signal(SIGTERM);
+	catch_signal(SIGHUP);
 }
 
 int screen_is_over(void)
@@ -82,36 +97,97 @@ int screen_is_over(void)
 	return is_over != 0;
 }
 
-void screen_begin(void)
+static void take_terminal(void)
 {
-	struct termios raw;
+	struct termios keys = before;
 
-	screen_catch_signals();
-	if (isatty(STDIN_FILENO) && tcgetattr(STDIN_FILENO, &before) == 0) {
-		raw = before;
-		raw.c_lflag &= ~(tcflag_t)(ICANON | ECHO);
-		raw.c_cc[VMIN] = 0;
-		raw.c_cc[VTIME] = 0;
-		has_keys = tcsetattr(STDIN_FILENO, TCSANOW, &raw) == 0;
-	}
-	if (!is_taken) {
-		is_taken = 1;
-		atexit(screen_end);
+	if (has_before) {
+		keys.c_lflag &= ~(tcflag_t)(ICANON | ECHO);
+		keys.c_cc[VMIN] = 0;
+		keys.c_cc[VTIME] = 0;
+		/* In the background SIGTTOU stops this process here, until it is in the foreground.
+		 */
+		has_keys = tcsetattr(STDIN_FILENO, TCSANOW, &keys) == 0;
 	}
 	fputs("\033[?1049h\033[?25l\033[2J", stdout);
+	is_taken = 1;
+}
+
+static void give_terminal_back(void)
+{
+	sigset_t ttou;
+	sigset_t mask;
+
+	is_taken = 0;
+	fputs("\033[?25h\033[?1049l", stdout);
+	fflush(stdout);
+	if (has_before) {
+		/* In the background, too: an end must not wait for the foreground. */
+		sigemptyset(&ttou);
+		sigaddset(&ttou, SIGTTOU);
+		sigprocmask(SIG_BLOCK, &ttou, &mask);
+		tcsetattr(STDIN_FILENO, TCSANOW, &before);
+		sigprocmask(SIG_SETMASK, &mask, NULL);
+		has_keys = 0;
+	}
+}
+
+/* Ctrl-Z: stop, with the terminal as the shell wants to find it, and go on with SIGCONT. */
+static void suspend(void)
+{
+	sigset_t stop;
+	sigset_t mask;
+
+	give_terminal_back();
+	sigemptyset(&stop);
+	sigaddset(&stop, SIGTSTP);
+	signal(SIGTSTP, SIG_DFL);
+	raise(SIGTSTP);
+	sigprocmask(SIG_UNBLOCK, &stop, &mask); /* here it stops */
+	sigprocmask(SIG_SETMASK, &mask, NULL);
+	catch_signal(SIGTSTP);
+	must_suspend = 0;
+	was_continued = 0;
+	take_terminal();
+}
+
+/* Job control of the shell. 1 if the screen must be drawn anew. */
+static int attend_job_control(void)
+{
+	if (is_taken && must_suspend) {
+		suspend();
+		return 1;
+	}
+	/* Stopped by SIGSTOP or SIGTTIN: the shell has changed the terminal meanwhile. */
+	if (is_taken && was_continued) {
+		was_continued = 0;
+		take_terminal();
+		return 1;
+	}
+	return 0;
+}
+
+void screen_begin(void)
+{
+	struct sigaction stop;
+
+	screen_catch_signals();
+	/* A shell without job control has it ignored. */
+	if (sigaction(SIGTSTP, NULL, &stop) == 0 && stop.sa_handler != SIG_IGN) {
+		catch_signal(SIGTSTP);
+	}
+	catch_signal(SIGCONT);
+	has_before = isatty(STDIN_FILENO) && tcgetattr(STDIN_FILENO, &before) == 0;
+	atexit(screen_end);
+	take_terminal();
 }
 
 void screen_end(void)
 {
-	if (!is_taken) {
-		return;
-	}
-	is_taken = 0;
-	fputs("\033[?25h\033[?1049l", stdout);
-	fflush(stdout);
-	if (has_keys) {
-		tcsetattr(STDIN_FILENO, TCSANOW, &before);
-		has_keys = 0;
+	if (is_taken) {
+		give_terminal_back();
+		signal(SIGTSTP, SIG_DFL);
+		signal(SIGCONT, SIG_DFL);
 	}
 }
 
@@ -133,21 +209,45 @@ static size_t cut(const char *line, size_t len, int columns)
 	return i;
 }
 
-void screen_draw(const char *text)
+static int line_count(const char *text)
 {
-	struct screen_size size = screen_size();
+	int count = 1;
 
-	fputs("\033[H", stdout);
-	for (int row = 0; row < size.rows && *text != '\0'; row++) {
+	for (; *text != '\0'; text++) {
+		count += *text == '\n';
+	}
+	return count;
+}
+
+/* The first @rows lines of @text, from screen row @row on. The next row. */
+static int draw_lines(const char *text, int row, int rows, int columns)
+{
+	for (; row < rows && *text != '\0'; row++) {
 		size_t len = strcspn(text, "\n");
 
 		if (row > 0) {
 			fputs("\r\n", stdout);
 		}
-		fwrite(text, 1, cut(text, len, size.columns), stdout);
+		fwrite(text, 1, cut(text, len, columns), stdout);
 		fputs("\033[K", stdout);
 		text += len + (text[len] == '\n');
 	}
+	return row;
+}
+
+void screen_draw(const char *text, const char *footer)
+{
+	struct screen_size size = screen_size();
+	int footer_rows = line_count(footer);
+	int row;
+
+	attend_job_control();
+	if (footer_rows > size.rows / 2) {
+		footer_rows = 0; /* no room for it */
+	}
+	fputs("\033[H", stdout);
+	row = draw_lines(text, 0, size.rows - footer_rows, size.columns);
+	draw_lines(footer, row, row + footer_rows, size.columns);
 	fputs("\033[J", stdout);
 	fflush(stdout);
 }
@@ -177,11 +277,20 @@ static int take_key(void)
 
 int screen_wait(int64_t ns)
 {
+	static const int numbers[] = { SIGINT, SIGTERM, SIGHUP, SIGTSTP, SIGCONT };
 	int64_t until_ns = now_ns() + ns;
 	struct pollfd fd = { .fd = STDIN_FILENO, .events = POLLIN };
+	sigset_t caught;
+	sigset_t mask;
 	int key = 0;
 
-	while (!is_over && key == 0) {
+	/* Signals come in ppoll() only: none between a look at their flags and the wait. */
+	sigemptyset(&caught);
+	for (size_t i = 0; i < sizeof(numbers) / sizeof(numbers[0]); i++) {
+		sigaddset(&caught, numbers[i]);
+	}
+	sigprocmask(SIG_BLOCK, &caught, &mask);
+	while (!is_over && key == 0 && !attend_job_control()) {
 		int64_t left_ns = until_ns - now_ns();
 		struct timespec left = { .tv_sec = left_ns / NS_PER_S,
 					 .tv_nsec = left_ns % NS_PER_S };
@@ -189,10 +298,11 @@ int screen_wait(int64_t ns)
 		if (left_ns <= 0) {
 			break;
 		}
-		if (ppoll(&fd, has_keys ? 1 : 0, &left, NULL) > 0) {
+		if (ppoll(&fd, has_keys ? 1 : 0, &left, &mask) > 0) {
 			key = take_key();
 		}
 	}
+	sigprocmask(SIG_SETMASK, &mask, NULL);
 	if (key == 'q' || key == 'Q' || key == 3) {
 		is_over = 1;
 	}

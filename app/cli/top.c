@@ -4,6 +4,8 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
 
 #include "base/clock.h"
 #include "cli/args.h"
@@ -14,14 +16,18 @@
 
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
 
+enum { FOOTER_BYTES = 3 * CONFIG_PATH_BYTES };
+
 struct top {
 	struct cli *cli;
 	int64_t interval_ns;
 	int64_t wait_ns; /* for ecdaqd to appear */
+	const char *leave_text;
+	char footer[FOOTER_BYTES];
 	int is_json;
 	int is_live;    /* a screen, not lines */
-	uint64_t count; /* of looks; 0: no end */
-	uint64_t looks;
+	uint64_t count; /* of updates; 0: no end */
+	uint64_t shown; /* updates */
 	uint64_t cycles_before;
 	uint64_t lost_before;
 };
@@ -42,7 +48,47 @@ static int is_replaced(struct top *top, const struct status_page *page)
 	return is_other;
 }
 
-static void show_screen(const struct report *report)
+/* How a shell in the same working directory calls this program. */
+static void program_path(char path[CONFIG_PATH_BYTES])
+{
+	char cwd[CONFIG_PATH_BYTES];
+	ssize_t path_len = readlink("/proc/self/exe", path, CONFIG_PATH_BYTES - 1);
+	ssize_t cwd_len = readlink("/proc/self/cwd", cwd, sizeof(cwd));
+
+	if (path_len < 0 || strchr(program_invocation_name, '/') == NULL) {
+		snprintf(path, CONFIG_PATH_BYTES, "ecdaq");
+		return;
+	}
+	path[path_len] = '\0';
+	if (cwd_len > 1 && cwd_len < path_len && memcmp(path, cwd, (size_t)cwd_len) == 0 &&
+	    path[cwd_len] == '/') {
+		memmove(path, path + cwd_len + 1, (size_t)(path_len - cwd_len));
+	}
+}
+
+/* What q does, and the line for a second terminal where that must name the run directory. */
+static void make_footer(struct top *top)
+{
+	static const char head[] = "2nd terminal: ";
+	char program[CONFIG_PATH_BYTES];
+	const char *dir = top->cli->dir;
+	int dir_len = (int)strlen(dir);
+	int columns = screen_size().columns;
+	int used = snprintf(top->footer, FOOTER_BYTES, "%s   Ctrl-Z: suspend", top->leave_text);
+	int len;
+
+	if (top->cli->run_dir == NULL && getenv("ECDAQ_RUN_DIR") == NULL) {
+		return;
+	}
+	dir_len -= dir_len > 1 && dir[dir_len - 1] == '/';
+	program_path(program);
+	len = (int)(strlen(head) + strlen(program) + strlen(" --run-dir  status")) + dir_len;
+	snprintf(top->footer + used, (size_t)(FOOTER_BYTES - used),
+		 "\n%s%s%s --run-dir %.*s status", head, program, len > columns ? " \\\n " : "",
+		 dir_len, dir);
+}
+
+static void show_screen(const struct top *top, const struct report *report)
 {
 	char *text = NULL;
 	size_t len = 0;
@@ -52,9 +98,8 @@ static void show_screen(const struct report *report)
 		return;
 	}
 	report_write_screen(report, out);
-	fputs("\nq: leave", out);
 	if (fclose(out) == 0) {
-		screen_draw(text);
+		screen_draw(text, top->footer);
 	}
 	free(text);
 }
@@ -68,7 +113,7 @@ static void show_line(struct top *top, const struct report *report)
 	char trip[TEXT_BYTES];
 	char phase[TEXT_BYTES];
 
-	if (top->looks == 0) {
+	if (top->shown == 0) {
 		printf("%-10s %12s %8s %8s %8s %8s %8s %11s %11s %11s\n", "state", "cycle",
 		       "+cycles", "+lost", "late", "overruns", "bad", "wake p99.9", "trip p99.9",
 		       "phase p99.9");
@@ -76,8 +121,8 @@ static void show_line(struct top *top, const struct report *report)
 	printf("%-10s %12" PRIu64 " %8" PRIu64 " %8" PRIu64 " %8" PRIu64 " %8" PRIu64 " %8" PRIu64
 	       " %11s %11s %11s\n",
 	       bus_state_to_str(GET(report->page->bus_state)), GET(st->cycle_number),
-	       top->looks == 0 ? 0 : cycles - top->cycles_before,
-	       top->looks == 0 ? 0 : lost - top->lost_before, GET(st->frames_late),
+	       top->shown == 0 ? 0 : cycles - top->cycles_before,
+	       top->shown == 0 ? 0 : lost - top->lost_before, GET(st->frames_late),
 	       GET(st->overruns), GET(st->samples_bad),
 	       text_ns(histogram_percentile(&st->wake_latency, 999000), wake),
 	       text_ns(histogram_percentile(&st->round_trip, 999000), trip),
@@ -97,11 +142,11 @@ static void show(struct top *top, const struct report *report)
 		json_end_line(&js);
 		fflush(stdout);
 	} else if (top->is_live) {
-		show_screen(report);
+		show_screen(top, report);
 	} else {
 		show_line(top, report);
 	}
-	top->looks++;
+	top->shown++;
 }
 
 static enum exit_code follow(struct top *top, const struct status_page *page)
@@ -116,7 +161,7 @@ static enum exit_code follow(struct top *top, const struct status_page *page)
 		show(top, &report);
 		report_release(&report);
 		source_record_close(record);
-		if (!report.is_running || is_replaced(top, page) || top->looks == top->count) {
+		if (!report.is_running || is_replaced(top, page) || top->shown == top->count) {
 			break;
 		}
 		screen_wait(top->interval_ns);
@@ -177,18 +222,20 @@ enum exit_code verb_top(struct cli *cli, int argc, char **argv)
 		.interval_ns = NS_PER_S / 2,
 		.is_live = screen_is_terminal(),
 		.wait_ns = screen_is_terminal() ? 10 * NS_PER_S : 0,
+		.leave_text = "q: leave",
 	};
 	const struct args_option options[] = {
 		{ "interval", 'i', ARGS_DURATION, &top.interval_ns, "T",
-		  "time between looks (500ms)" },
-		{ "count", 'n', ARGS_COUNT, &top.count, "N", "end after N looks" },
+		  "time between updates (500ms)" },
+		{ "count", 'n', ARGS_COUNT, &top.count, "N", "end after N updates" },
 		{ "wait", 0, ARGS_DURATION, &top.wait_ns, "T",
-		  "how long to wait for an ecdaqd that has yet to start (10s on a terminal, else "
-		  "0s)" },
+		  "how long to wait for ecdaqd to start (10s on a terminal, else 0s)" },
 		{ "json", 0, ARGS_FLAG, &top.is_json, NULL,
-		  "a line of JSON each look, as of status" },
+		  "a line of JSON each update, as from status" },
+		{ "leave-text", 0, ARGS_TEXT, &top.leave_text, "TEXT",
+		  "what q does, for the last line (q: leave)" },
 	};
-	struct args args = { .options = options, .option_count = 4 };
+	struct args args = { .options = options, .option_count = 5 };
 	const struct status_page *page;
 	enum exit_code result;
 
@@ -206,6 +253,7 @@ enum exit_code verb_top(struct cli *cli, int argc, char **argv)
 		return result;
 	}
 	if (top.is_live) {
+		make_footer(&top);
 		screen_begin();
 	}
 	result = follow(&top, page);

@@ -110,6 +110,7 @@ static void add_to_plot(struct watch *watch, const struct sample_header *header)
 static void draw(struct watch *watch)
 {
 	struct screen_size size = screen_size();
+	char footer[128];
 	char *text = NULL;
 	size_t len = 0;
 	FILE *out;
@@ -123,10 +124,10 @@ static void draw(struct watch *watch)
 		return;
 	}
 	plot_write(watch->plot, size.rows - 1, out);
-	fprintf(out, "q: leave   cycle %" PRIu64 "   missed %" PRIu64, watch->next_cycle - 1,
-		watch->missed);
+	snprintf(footer, sizeof(footer), "q: leave   cycle %" PRIu64 "   missed %" PRIu64,
+		 watch->next_cycle - 1, watch->missed);
 	if (fclose(out) == 0) {
-		screen_draw(text);
+		screen_draw(text, footer);
 	}
 	free(text);
 	watch->drawn_ns = now_ns();

@@ -200,6 +200,8 @@ stop()
 
 	[ -n "${pid[$name]:-}" ] || return 0
 	kill -TERM "${pid[$name]}" 2> /dev/null || true
+	# One that is stopped (job control) could not end.
+	kill -CONT "${pid[$name]}" 2> /dev/null || true
 	wait "${pid[$name]}" || status=$?
 	unset "pid[$name]"
 	case $status in
@@ -210,6 +212,29 @@ stop()
 		[ "$name" = sync0 ] || failed=1
 		;;
 	esac
+}
+
+# The live view stays in this process group: Ctrl-Z and fg reach it, too.
+start_view()
+{
+	setpriv --pdeathsig TERM "$bin/ecdaq" top --leave-text 'q: stop master, segment and recorder' <&3 &
+	pid[view]=$!
+	trap suspend TSTP
+}
+
+# Ctrl-Z: the view gives the terminal back before this script stops, and with it the job of the shell.
+suspend()
+{
+	local state tries
+
+	for ((tries = 0; tries < 100; tries++)); do
+		state=$(awk '/^State:/ { print $2 }' "/proc/${pid[view]:-none}/status" 2> /dev/null) || break
+		[[ $state != [TZ] ]] || break
+		sleep 0.02
+	done
+	trap - TSTP
+	kill -TSTP "$$"
+	trap suspend TSTP
 }
 
 # Does the configuration itself say what ecdaq-sync0 has to look at?
@@ -256,6 +281,7 @@ interrupted=no
 
 end_in_order()
 {
+	trap '' TSTP
 	stop view
 	stop sync0
 	stop daemon
@@ -285,13 +311,15 @@ start_interruptible()
 # Which of the children ended? Waits for the first, ecdaq-sync0 apart: the run goes on without it.
 wait_for_end()
 {
-	local ended='' status
+	local ended status
 
 	while :; do
 		status=0
+		ended=''
 		[ "$interrupted" = no ] || return 0
 		wait -n -p ended "${pid[@]}" || status=$?
 		[ "$interrupted" = no ] || return 0
+		[ -n "${ended:-}" ] || continue # suspended, and resumed
 		[ "$ended" = "${pid[sync0]:-none}" ] || break
 		unset 'pid[sync0]'
 		[ "$status" = 0 ] || note "ecdaq-sync0 ended with $status"
@@ -333,7 +361,7 @@ run_inside()
 	start_sync0
 	adopt_dds
 	if [ "$json" = no ] && [ -t 1 ]; then
-		start view "$bin/ecdaq" top
+		start_view
 	fi
 	wait_for_end
 	end_in_order

@@ -14,11 +14,18 @@ import subprocess
 import termios
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
-from ecdaq import ECDAQ, NO_DAEMON, OK, Fake, environment
+from ecdaq import ECDAQ, FAKE, NO_DAEMON, OK, ROOT, Fake, environment
 
 ENTER, LEAVE = "\x1b[?1049h", "\x1b[?1049l"
+
+
+def own_terminal() -> None:
+    """In a child: a session of its own, with standard input as its terminal."""
+    os.setsid()
+    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 
 
 class Terminal:
@@ -39,6 +46,29 @@ class Terminal:
             stdout=self.slave,
             stderr=subprocess.PIPE,
         )
+
+    def start_shell(self, run_dir: Path, **more: str) -> None:
+        """An interactive shell with job control; its prompt is "READY> "."""
+        self.process = subprocess.Popen(
+            ["bash", "--norc", "--noprofile", "--noediting", "-i"],
+            env=environment(run_dir, LANG="C.UTF-8", PS1="READY> ", **more),
+            stdin=self.slave,
+            stdout=self.slave,
+            stderr=self.slave,
+            preexec_fn=own_terminal,
+            cwd=ROOT,
+        )
+        self.wait_for("READY> ")
+
+    def wait_for_new(self, pattern: str) -> str:
+        """Wait for @pattern in what comes from now on."""
+        self.text = ""
+        self.wait_for(pattern)
+        return self.text
+
+    def has_keys(self) -> bool:
+        """Are keys given one by one, without echo?"""
+        return termios.tcgetattr(self.slave)[3] & (termios.ICANON | termios.ECHO) == 0
 
     def read_some(self) -> bool:
         if not select.select([self.master], [], [], 0.05)[0]:
@@ -78,6 +108,16 @@ class Terminal:
                 self.process.stderr.close()
         os.close(self.master)
         os.close(self.slave)
+
+
+# Stand-ins for what `./build.sh run` starts; the view is the real one.
+DAEMON = """#!/bin/sh
+mkfifo "$ECDAQ_RUN_DIR/never"
+exec {fake} "$ECDAQ_RUN_DIR" SPEED=10 <> "$ECDAQ_RUN_DIR/never"
+"""
+OTHER = """#!/bin/sh
+exec sleep infinity
+"""
 
 
 @pytest.fixture
@@ -126,6 +166,108 @@ def test_top_ends_with_ecdaqd_and_leaves_the_last_state(daemon: Fake, terminal: 
     assert terminal.end() == (OK, "")
     assert terminal.is_restored()
     assert "STOPPED" in terminal.text[terminal.text.rfind(LEAVE) :]
+
+
+def test_the_last_lines_say_what_q_does_and_what_a_second_terminal_calls(
+    daemon: Fake, terminal: Terminal
+) -> None:
+    fcntl.ioctl(terminal.slave, termios.TIOCSWINSZ, struct.pack("HHHH", 12, 400, 0, 0))
+    terminal.start(daemon, "top", "--interval", "20ms", "--leave-text", "q: stop it all")
+    terminal.wait_for(r"(?s)(\x1b\[H.*){4}")
+    frame = screens(terminal.text)[1]
+    terminal.press("q")
+    assert terminal.end() == (OK, "")
+    # Twelve rows are too few for the status: the last lines are there all the same.
+    assert len(frame) == 12
+    assert frame[-2] == "q: stop it all   Ctrl-Z: suspend"
+    label, _, command = frame[-1].partition(": ")
+    assert label == "2nd terminal"
+    assert f"--run-dir {daemon.run_dir} status" in command
+    said = subprocess.run(
+        command, shell=True, env=environment(None), capture_output=True, text=True, check=True
+    )
+    assert "2 slaves" in said.stdout and not said.stderr
+
+
+def test_the_line_for_a_second_terminal_wraps_between_words(
+    daemon: Fake, terminal: Terminal
+) -> None:
+    fcntl.ioctl(terminal.slave, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 60, 0, 0))
+    terminal.start(daemon, "top", "--interval", "20ms")
+    terminal.wait_for(r"(?s)(\x1b\[H.*){4}")
+    frame = screens(terminal.text)[1]
+    terminal.press("q")
+    assert terminal.end() == (OK, "")
+    assert frame[-1].strip() == f"--run-dir {daemon.run_dir} status"
+
+
+@pytest.mark.parametrize("verb", ["top --interval 20ms", "watch piccolo1.adc --plot"])
+def test_ctrl_z_gives_the_terminal_back_and_fg_resumes_the_view(
+    daemon: Fake, terminal: Terminal, verb: str
+) -> None:
+    terminal.start_shell(daemon.run_dir)
+    for _ in range(2):
+        terminal.press(f"{ECDAQ} {verb}\n" if ENTER not in terminal.text else "fg\n")
+        terminal.wait_for_new(r"(?s)\x1b\[\?1049h.*(\x1b\[H.*){3}")
+        assert terminal.has_keys()
+        terminal.press("\x1a")
+        text = terminal.wait_for_new(r"(?s)Stopped.*READY> ")
+        assert text.rfind(LEAVE) > text.rfind("\x1b[H")
+        assert not terminal.has_keys()
+        terminal.text = ENTER
+    # It is stopped, not only silent.
+    terminal.press("jobs -l\n")
+    state = re.search(r"\[1\]\+ +(\d+) Stopped", terminal.wait_for_new(r"(?s)Stopped.*READY> "))
+    assert state and " T " in Path(f"/proc/{state.group(1)}/stat").read_text()
+    terminal.press("fg\n")
+    terminal.wait_for_new(r"(?s)\x1b\[\?1049h.*(\x1b\[H.*){3}")
+    terminal.press("q")
+    text = terminal.wait_for_new("READY> ")
+    assert text.rfind(LEAVE) >= 0 and not terminal.has_keys()
+
+
+def test_a_stop_that_cannot_be_caught_is_repaired_by_sigcont(
+    daemon: Fake, terminal: Terminal
+) -> None:
+    terminal.start(daemon, "top", "--interval", "10s")
+    terminal.wait_for("piccolo1")
+    assert terminal.process is not None
+    terminal.process.send_signal(signal.SIGSTOP)
+    os.waitpid(terminal.process.pid, os.WUNTRACED)
+    termios.tcsetattr(terminal.slave, termios.TCSANOW, terminal.before)
+    terminal.process.send_signal(signal.SIGCONT)
+    terminal.wait_for_new(r"(?s)\x1b\[\?1049h.*piccolo1")
+    assert terminal.has_keys()
+    terminal.press("q")
+    assert terminal.end() == (OK, "")
+    assert termios.tcgetattr(terminal.slave) == terminal.before
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="makes a network namespace, which takes root")
+def test_a_run_is_suspended_with_its_view_and_q_ends_it(
+    run_dir: Path, tmp_path: Path, terminal: Terminal
+) -> None:
+    for name in ("ecdaqd", "ecdaq-record", "ecdaq-sim"):
+        program = tmp_path / name
+        program.write_text(DAEMON.format(fake=FAKE) if name == "ecdaqd" else OTHER)
+        program.chmod(0o755)
+    (tmp_path / "ecdaq").symlink_to(ECDAQ)
+    script = f"{ROOT}/app/tools/run-segment.sh --no-dds --record {tmp_path}/record"
+    terminal.start_shell(run_dir, ECDAQ_BIN_DIR=str(tmp_path))
+    terminal.press(f"{script}\n")
+    for _ in range(2):
+        terminal.wait_for_new(r"(?s)\x1b\[\?1049h.*q: stop master, segment and recorder.*\x1b\[H")
+        terminal.press("\x1a")
+        text = terminal.wait_for_new(r"(?s)Stopped.*READY> ")
+        assert not terminal.has_keys()
+        # The terminal was given back before the shell took it: nothing is drawn behind the prompt.
+        assert text.rfind(LEAVE) > text.rfind("\x1b[H") and LEAVE not in text.split("Stopped")[1]
+        terminal.press("fg\n")
+    terminal.wait_for_new(r"(?s)\x1b\[\?1049h.*(\x1b\[H.*){2}")
+    assert terminal.has_keys()
+    terminal.press("q")
+    text = terminal.wait_for_new("READY> ")
+    assert "2 slaves" in text[text.rfind(LEAVE) :] and not terminal.has_keys()
 
 
 def test_a_live_plot_starts_full_and_scrolls(daemon: Fake, terminal: Terminal) -> None:
