@@ -77,9 +77,9 @@ static void on_signal(int number)
 }
 
 /* If it fails, the signal has the effect that it always had. */
-static void catch_signal(int number)
+static void handle_signal(int number, void (*handler)(int number))
 {
-	struct sigaction action = { .sa_handler = on_signal };
+	struct sigaction action = { .sa_handler = handler };
 
 	sigemptyset(&action.sa_mask);
 	sigaction(number, &action, NULL);
@@ -87,9 +87,9 @@ static void catch_signal(int number)
 
 void screen_catch_signals(void)
 {
-	catch_signal(SIGINT);
-	catch_signal(SIGTERM);
-	catch_signal(SIGHUP);
+	handle_signal(SIGINT, on_signal);
+	handle_signal(SIGTERM, on_signal);
+	handle_signal(SIGHUP, on_signal);
 }
 
 int screen_is_over(void)
@@ -141,11 +141,11 @@ static void suspend(void)
 	give_terminal_back();
 	sigemptyset(&stop);
 	sigaddset(&stop, SIGTSTP);
-	signal(SIGTSTP, SIG_DFL);
+	handle_signal(SIGTSTP, SIG_DFL);
 	raise(SIGTSTP);
 	sigprocmask(SIG_UNBLOCK, &stop, &mask); /* here it stops */
 	sigprocmask(SIG_SETMASK, &mask, NULL);
-	catch_signal(SIGTSTP);
+	handle_signal(SIGTSTP, on_signal);
 	must_suspend = 0;
 	was_continued = 0;
 	take_terminal();
@@ -174,9 +174,9 @@ void screen_begin(void)
 	screen_catch_signals();
 	/* A shell without job control has it ignored. */
 	if (sigaction(SIGTSTP, NULL, &stop) == 0 && stop.sa_handler != SIG_IGN) {
-		catch_signal(SIGTSTP);
+		handle_signal(SIGTSTP, on_signal);
 	}
-	catch_signal(SIGCONT);
+	handle_signal(SIGCONT, on_signal);
 	has_before = isatty(STDIN_FILENO) && tcgetattr(STDIN_FILENO, &before) == 0;
 	atexit(screen_end);
 	take_terminal();
@@ -186,8 +186,8 @@ void screen_end(void)
 {
 	if (is_taken) {
 		give_terminal_back();
-		signal(SIGTSTP, SIG_DFL);
-		signal(SIGCONT, SIG_DFL);
+		handle_signal(SIGTSTP, SIG_DFL);
+		handle_signal(SIGCONT, SIG_DFL);
 	}
 }
 
