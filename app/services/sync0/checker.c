@@ -137,7 +137,6 @@ static void disturb(struct checker *ck, int64_t cycle, int64_t step_ns)
 
 		if (w->first_cycle <= cycle + GRACE_CYCLES) {
 			w->clock_step_ns = step_ns;
-			w->clock_step_cycle = cycle;
 		}
 	}
 }

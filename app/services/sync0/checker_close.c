@@ -104,7 +104,6 @@ static void find_common_step(struct checker *ck, struct window *w)
 		return;
 	}
 	w->clock_step_ns = step_ns;
-	w->clock_step_cycle = cycle;
 	ev = checker_event(ck, 0, EVENT_SYNC0_CLOCK_STEP, cycle);
 	ev.slave_pos = EVENT_NO_SLAVE;
 	ev.line = 0;

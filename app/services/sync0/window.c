@@ -68,7 +68,6 @@ void window_clear(struct window *w, int64_t first_cycle)
 	w->first_cycle = first_cycle;
 	w->dc_diff_ns = -1;
 	w->clock_step_ns = 0;
-	w->clock_step_cycle = 0;
 	memset(w->has_frame, 0, w->cycles * sizeof(w->has_frame[0]));
 	for (size_t i = 0; i < w->line_count; i++) {
 		struct window_line *wl = &w->line[i];

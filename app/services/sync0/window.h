@@ -30,7 +30,6 @@ struct window {
 	int64_t *frame_latency_ns; /* either way */
 	int64_t dc_diff_ns;        /* largest; -1: not read */
 	int64_t clock_step_ns;     /* 0: none */
-	int64_t clock_step_cycle;
 };
 
 /** 0 or -ENOMEM. Free with window_destroy(). */

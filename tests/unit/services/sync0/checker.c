@@ -236,6 +236,28 @@ TEST(sync0, an_overflow_alone_is_a_warning)
 	bench_destroy(b);
 }
 
+static enum bench_fate one_dropped(struct bench *b, unsigned line, int64_t cycle, struct edge *edge)
+{
+	(void)b;
+	(void)edge;
+	return line == 1 && cycle == 4100 ? BENCH_DROP : BENCH_GIVE;
+}
+
+TEST(sync0, one_edge_dropped_by_the_kernel_is_reported)
+{
+	struct bench *b = noisy();
+	struct event ev;
+
+	b->alter = one_dropped;
+	bench_start(b);
+	bench_run(b, 6200);
+	CHECK_EQ(bench_missing(b, 1), 0);
+	CHECK_EQ(bench_count(b, EVENT_SYNC0_OVERFLOW, &ev), 1);
+	CHECK_EQ(ev.arg[0], 1);
+	CHECK(ev.value <= 4100 && ev.value > 4100 - 1000);
+	bench_destroy(b);
+}
+
 TEST(sync0, a_period_that_is_off_by_50_ppm_is_found_and_measured)
 {
 	struct bench *b = noisy();

@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "harness/test.h"
@@ -145,6 +146,36 @@ TEST(sync0_gpio, edges_come_with_time_and_number_and_nobody_waits_for_them)
 	CHECK_EQ(gpio_read(gpio, edges, 4), 0);
 	fake_gpiod_unplug();
 	CHECK_EQ(gpio_read(gpio, edges, 4), -ENODEV);
+	gpio_close(gpio);
+	CHECK_EQ(fake_gpiod.live, 0);
+}
+
+static int64_t mono_ns(void)
+{
+	struct timespec ts;
+
+	clock_gettime(CLOCK_MONOTONIC, &ts);
+	return (int64_t)ts.tv_sec * 1000000000 + ts.tv_nsec;
+}
+
+TEST(sync0_gpio, a_hardware_timestamp_is_converted_to_the_monotonic_clock)
+{
+	struct edge edges[4];
+	int64_t first_ns;
+
+	fake_gpiod_reset();
+	fake_gpiod.has_hte = 1;
+	CHECK_EQ(open_with("pinctrl-test:17", 1, CONFIG_EDGE_AUTO), 0);
+	first_ns = mono_ns();
+	fake_gpiod_edge(1000, 1); /* the engine was started long after the machine */
+	CHECK_EQ(gpio_read(gpio, edges, 4), 1);
+	CHECK(edges[0].mono_ns >= first_ns);
+	CHECK(edges[0].mono_ns <= mono_ns());
+	first_ns = edges[0].mono_ns;
+	/* Of two edges the distance counts that the engine saw, not when they were read. */
+	fake_gpiod_edge(1001, 2);
+	CHECK_EQ(gpio_read(gpio, edges, 4), 1);
+	CHECK_EQ(edges[0].mono_ns - first_ns, 1);
 	gpio_close(gpio);
 	CHECK_EQ(fake_gpiod.live, 0);
 }
