@@ -2,6 +2,8 @@
 /* Full and failing disks under a recorder. */
 #include <errno.h>
 #include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -12,6 +14,9 @@
 #include "record/recover_file.h"
 #include "record/store.h"
 #include "unit/services/record/bench.h"
+
+/* Found nowhere else in a recording. */
+#define FIRST_EVENT UINT64_C(0x5eed0123456789ab)
 
 static struct track read_all(struct bench *b)
 {
@@ -85,7 +90,38 @@ TEST(recorder_trouble, a_disk_that_stays_full_costs_exactly_what_left_the_ring)
 	bench_done(&b);
 }
 
-/* Whatever call fails how: in the end all cycles are there, each once. */
+/* How often the 8 bytes of @number stand in all recordings, which are not compressed. */
+static unsigned occurrences(struct bench *b, uint64_t number)
+{
+	struct store_entry *entries;
+	unsigned found = 0;
+	size_t count;
+
+	CHECK_EQ(store_list(b->dir, &entries, &count), 0);
+	for (size_t i = 0; i < count; i++) {
+		static uint8_t bytes[1 << 20];
+		uint8_t wanted[8];
+		char path[512];
+		size_t len;
+		FILE *f;
+
+		put_le64(wanted, number);
+		CHECK_EQ(store_path(b->dir, entries[i].name, path, sizeof(path)), 0);
+		f = fopen(path, "re");
+		CHECK(f != NULL);
+		len = fread(bytes, 1, sizeof(bytes), f);
+		CHECK(len < sizeof(bytes));
+		fclose(f);
+		for (uint8_t *at = bytes;
+		     (at = memmem(at, len - (size_t)(at - bytes), wanted, 8)) != NULL; at++) {
+			found++;
+		}
+	}
+	free(entries);
+	return found;
+}
+
+/* Whatever call fails how: in the end all cycles and events are there, each once. */
 static void fail_from(unsigned n, unsigned count, int error)
 {
 	struct bench b = { .fail_call = n, .fail_count = count, .error = error };
@@ -93,10 +129,11 @@ static void fail_from(unsigned n, unsigned count, int error)
 
 	bench_init(&b, 100, 8192);
 	b.options.rotate_bytes = 60000;
+	b.options.zstd_level = 0;
 	CHECK_EQ(bench_start(&b), 0);
 	for (uint64_t i = 0; i < 20; i++) {
 		bench_push(&b, i * 100, 100);
-		bench_push_event(&b, i);
+		bench_push_event(&b, FIRST_EVENT + i);
 		bench_wait(&b, 100 * NS_PER_MS);
 	}
 	bench_wait(&b, 8 * NS_PER_S);
@@ -107,6 +144,9 @@ static void fail_from(unsigned n, unsigned count, int error)
 	CHECK_EQ(t.cycles, 2000);
 	CHECK_EQ(t.gaps, 0);
 	CHECK_EQ(t.event_next, 20);
+	for (uint64_t i = 0; i < 20; i++) {
+		CHECK_EQ(occurrences(&b, FIRST_EVENT + i), 1);
+	}
 	CHECK(b.calls >= n);
 	bench_done(&b);
 }
