@@ -43,7 +43,12 @@ DDS_SETTINGS = {
 
 
 # Of a refusal, where the machine does not run the master or the commander for a while.
-PASSING_REASONS = ("did not take it in time", "the commander is gone", "not in OP", "no answer")
+PASSING_REASONS = (
+    "not taken by the master in time",
+    "the commander is not alive",
+    "not in OP",
+    "no answer",
+)
 
 
 class Commander:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Commands from a PC to the outputs: answered once, and taken back when their owner dies."""
+"""Commands from a PC to the outputs: one reply each, reverted when the commander dies."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_answer_names_the_very_cycle_whose_frame_carried_the_value(
     answers = [(value, answer) for value, answer in sent_values if answer["accepted"]]
     # A master that a busy machine does not run for 200 ms says so, and takes the value back.
     assert all(
-        answer["accepted"] or "did not take it in time" in answer["reason"]
+        answer["accepted"] or "not taken by the master in time" in answer["reason"]
         for _, answer in sent_values
     ), sent_values
     assert len(answers) > 90

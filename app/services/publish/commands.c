@@ -12,21 +12,21 @@
 #include "publish/domain.h"
 #include "publish/remote_board.h"
 
-enum { REFUSALS_A_STEP = 32, NEWS = 256 };
+enum { REFUSALS_PER_STEP = 32, CHANGES_MAX = 256 };
 
-/* Longer than any recovery of a cycle, shorter than a person's patience. */
-#define TAKEN_WITHIN_NS (200 * NS_PER_MS)
+/* Longer than any recovery of a cycle. */
+#define TAKE_TIMEOUT_NS (200 * NS_PER_MS)
 
-/* What the listener's thread heard; guarded by lock. */
-struct news {
+/* Reported by the listener's thread; guarded by lock. */
+struct liveliness_change {
 	uint64_t sender;
 	int is_alive;
 };
 
-struct flight {
-	ecdaq_CommandV1 *command; /* NULL: none is on its way */
-	uint64_t sender;
-	uint64_t sequence; /* of its set */
+/* The command that was put on the board and is not answered yet. */
+struct pending {
+	ecdaq_CommandV1 *command; /* NULL: none */
+	uint64_t sequence;        /* of its set on the board */
 	int64_t since_ns;
 	struct gate_item item[GATE_ITEMS];
 };
@@ -35,14 +35,14 @@ struct commands {
 	const struct config *cfg;
 	struct gate *gate;
 	struct remote_board board;
-	struct flight flight;
+	struct pending pending;
 	struct commands_counts counts;
 	uint64_t session;
 	uint64_t alive[GATE_COMMANDERS]; /* 0: free */
 	pthread_mutex_t lock;
-	struct news news[NEWS]; /* [listener] */
-	size_t news_count;      /* [listener] */
-	int has_lost_news;      /* [listener] */
+	struct liveliness_change change[CHANGES_MAX]; /* [listener] */
+	size_t change_count;                          /* [listener] */
+	int has_overflowed;                           /* [listener] changes were dropped */
 };
 
 static void on_liveliness(dds_entity_t reader, const dds_liveliness_changed_status_t status,
@@ -52,12 +52,12 @@ static void on_liveliness(dds_entity_t reader, const dds_liveliness_changed_stat
 
 	(void)reader;
 	pthread_mutex_lock(&c->lock);
-	if (c->news_count == NEWS) {
-		c->has_lost_news = 1;
+	if (c->change_count == CHANGES_MAX) {
+		c->has_overflowed = 1;
 	} else if (status.alive_count_change != 0 || status.not_alive_count_change != 0) {
-		c->news[c->news_count++] =
-			(struct news){ .sender = status.last_publication_handle,
-				       .is_alive = status.alive_count_change > 0 };
+		c->change[c->change_count++] =
+			(struct liveliness_change){ .sender = status.last_publication_handle,
+						    .is_alive = status.alive_count_change > 0 };
 	}
 	pthread_mutex_unlock(&c->lock);
 }
@@ -99,11 +99,12 @@ void commands_follow(struct commands *commands)
 {
 	struct board *board;
 
-	/* Where commands are off the board is not even opened. */
+	/* The board is not opened while commands are disabled. */
 	if (!domain_takes_commands(commands->cfg) || remote_board_follow(&commands->board) != 1) {
 		return;
 	}
-	/* What an ecdaq-dds that was killed left there must not come back with our first beat. */
+	/* A killed ecdaq-dds may have left values there: our first heartbeat must not revive them.
+	 */
 	board = commands->board.board;
 	board_begin(board);
 	for (unsigned i = 0; i < BOARD_OUTPUTS; i++) {
@@ -129,9 +130,11 @@ static uint64_t *find_alive(struct commands *c, uint64_t sender)
 	return NULL;
 }
 
-/* What @sender set goes back to fail-safe, but for outputs without a time-out, which hold. 0: all.
+/*
+ * Revert the outputs that @sender (0: anybody) set to fail-safe. Outputs without a timeout hold
+ * their value, unless there is no @table.
  */
-static void take_back(struct commands *c, const struct slave_table *table, uint64_t sender)
+static void revert_outputs(struct commands *c, const struct slave_table *table, uint64_t sender)
 {
 	struct board *board = c->board.board;
 
@@ -150,18 +153,18 @@ static void take_back(struct commands *c, const struct slave_table *table, uint6
 	board_commit(board);
 }
 
-static void lose(struct commands *c, const struct slave_table *table, uint64_t sender)
+static void remove_commander(struct commands *c, const struct slave_table *table, uint64_t sender)
 {
 	uint64_t *place = find_alive(c, sender);
 
 	if (place != NULL) {
 		*place = 0;
 	}
-	take_back(c, table, sender);
-	gate_lose(c->gate, sender);
+	revert_outputs(c, table, sender);
+	gate_remove(c->gate, sender);
 }
 
-static void gain(struct commands *c, uint64_t sender)
+static void add_commander(struct commands *c, uint64_t sender)
 {
 	uint64_t *place = find_alive(c, sender);
 
@@ -171,35 +174,36 @@ static void gain(struct commands *c, uint64_t sender)
 	}
 }
 
-static void hear(struct commands *c, const struct slave_table *table)
+static void handle_liveliness(struct commands *c, const struct slave_table *table)
 {
-	struct news news[NEWS];
+	struct liveliness_change change[CHANGES_MAX];
 	size_t count;
-	int has_lost;
+	int has_overflowed;
 
 	pthread_mutex_lock(&c->lock);
-	count = c->news_count;
-	has_lost = c->has_lost_news;
-	memcpy(news, c->news, count * sizeof(news[0]));
-	c->news_count = 0;
-	c->has_lost_news = 0;
+	count = c->change_count;
+	has_overflowed = c->has_overflowed;
+	memcpy(change, c->change, count * sizeof(change[0]));
+	c->change_count = 0;
+	c->has_overflowed = 0;
 	pthread_mutex_unlock(&c->lock);
 	for (size_t i = 0; i < count; i++) {
-		if (news[i].is_alive) {
-			gain(c, news[i].sender);
+		if (change[i].is_alive) {
+			add_commander(c, change[i].sender);
 		} else {
-			lose(c, table, news[i].sender);
+			remove_commander(c, table, change[i].sender);
 		}
 	}
-	/* More came than we could hear: nobody is known to be alive any more. */
-	for (size_t i = 0; has_lost && i < GATE_COMMANDERS; i++) {
+	/* Changes were dropped: no commander is known to be alive. */
+	for (size_t i = 0; has_overflowed && i < GATE_COMMANDERS; i++) {
 		if (c->alive[i] != 0) {
-			lose(c, table, c->alive[i]);
+			remove_commander(c, table, c->alive[i]);
 		}
 	}
 }
 
-static void beat(struct commands *c)
+/* The cycle reverts remote outputs when this stops. */
+static void heartbeat(struct commands *c)
 {
 	for (unsigned i = 0; c->board.board != NULL && i < BOARD_OUTPUTS; i++) {
 		if (gate_setter(c->gate, i) != 0) {
@@ -209,7 +213,7 @@ static void beat(struct commands *c)
 	}
 }
 
-/* --- answers --- */
+/* --- replies --- */
 
 static void reply(struct commands *c, const struct topics *topics, const ecdaq_CommandV1 *command,
 		  uint64_t cycle, char *reason)
@@ -228,61 +232,61 @@ static void reply(struct commands *c, const struct topics *topics, const ecdaq_C
 	c->counts.refused += !m.is_accepted;
 }
 
-static void land(struct commands *c)
+static void finish(struct commands *c)
 {
-	ecdaq_CommandV1_free(c->flight.command, DDS_FREE_ALL);
-	c->flight.command = NULL;
+	ecdaq_CommandV1_free(c->pending.command, DDS_FREE_ALL);
+	c->pending.command = NULL;
 }
 
-/* Has the cycle taken the set that is on its way? */
-static void look_after_flight(struct commands *c, const struct topics *topics, int64_t now_ns)
+/* Answer the pending command once the cycle has taken it, or after the timeout. */
+static void check_pending(struct commands *c, const struct topics *topics, int64_t now_ns)
 {
-	struct flight *f = &c->flight;
+	struct pending *p = &c->pending;
 	struct board *board = c->board.board;
 	char no_reason[1] = "";
-	char late[] = "the master did not take it in time; taken back";
+	char timed_out[] = "not taken by the master in time: reverted";
 
-	if (f->command == NULL) {
+	if (p->command == NULL) {
 		return;
 	}
 	if (board != NULL &&
-	    atomic_load_explicit(&board->taken_sequence, memory_order_acquire) >= f->sequence) {
-		reply(c, topics, f->command,
+	    atomic_load_explicit(&board->taken_sequence, memory_order_acquire) >= p->sequence) {
+		reply(c, topics, p->command,
 		      atomic_load_explicit(&board->taken_cycle, memory_order_relaxed), no_reason);
-		land(c);
+		finish(c);
 		return;
 	}
-	if (board != NULL && now_ns - f->since_ns < TAKEN_WITHIN_NS) {
+	if (board != NULL && now_ns - p->since_ns < TAKE_TIMEOUT_NS) {
 		return;
 	}
 	if (board != NULL) {
 		board_begin(board);
-		for (uint32_t i = 0; i < f->command->channel._length; i++) {
-			board_unset(board, f->item[i].output);
-			gate_note_set(c->gate, f->item[i].output, 0);
+		for (uint32_t i = 0; i < p->command->channel._length; i++) {
+			board_unset(board, p->item[i].output);
+			gate_note_set(c->gate, p->item[i].output, 0);
 		}
 		board_commit(board);
 	}
-	reply(c, topics, f->command, 0, late);
-	land(c);
+	reply(c, topics, p->command, 0, timed_out);
+	finish(c);
 }
 
 /* --- commands --- */
 
-static void launch(struct commands *c, ecdaq_CommandV1 *command, uint64_t sender, int64_t now_ns)
+/* Put the checked @command on the board; it is pending from now on. */
+static void send_set(struct commands *c, ecdaq_CommandV1 *command, uint64_t sender, int64_t now_ns)
 {
-	struct flight *f = &c->flight;
+	struct pending *p = &c->pending;
 	struct board *board = c->board.board;
 
 	board_begin(board);
 	for (uint32_t i = 0; i < command->channel._length; i++) {
-		board_put(board, f->item[i].output, f->item[i].raw);
-		gate_note_set(c->gate, f->item[i].output, sender);
+		board_put(board, p->item[i].output, p->item[i].raw);
+		gate_note_set(c->gate, p->item[i].output, sender);
 	}
-	f->sequence = board_commit(board);
-	f->command = command;
-	f->sender = sender;
-	f->since_ns = now_ns;
+	p->sequence = board_commit(board);
+	p->command = command;
+	p->since_ns = now_ns;
 }
 
 static int check(struct commands *c, const ecdaq_CommandV1 *m, uint64_t sender,
@@ -301,10 +305,11 @@ static int check(struct commands *c, const ecdaq_CommandV1 *m, uint64_t sender,
 		.values = m->values._buffer,
 		.raw = m->raw._buffer,
 	};
-	int r = gate_check(c->gate, &command, view, c->flight.item, reason);
+	int r = gate_check(c->gate, &command, view, c->pending.item, reason);
 
 	if (r == 0 && find_alive(c, sender) == NULL) {
-		snprintf(reason, GATE_REASON_BYTES, "the commander is gone, or one too many");
+		snprintf(reason, GATE_REASON_BYTES,
+			 "the commander is not alive, or there are too many");
 		r = -EPERM;
 	}
 	if (r == 0 && c->board.board == NULL) {
@@ -316,24 +321,23 @@ static int check(struct commands *c, const ecdaq_CommandV1 *m, uint64_t sender,
 }
 
 /* Returns 1 if there may be more. */
-static int take_one(struct commands *c, const struct topics *topics, const struct gate_view *view)
+static int take_command(struct commands *c, const struct topics *topics,
+			const struct gate_view *view)
 {
-	ecdaq_CommandV1 *command = ecdaq_CommandV1__alloc();
-	void *message = command;
-	dds_sample_info_t info;
+	ecdaq_CommandV1 *command;
+	uint64_t sender;
 	char reason[GATE_REASON_BYTES] = "";
-	int taken = dds_take(topics->command, &message, &info, 1, 1);
 
-	if (taken == 1 && info.valid_data &&
-	    check(c, command, info.publication_handle, view, reason) == 0) {
-		launch(c, command, info.publication_handle, view->now_ns);
+	if (!topics_take_command(topics, &command, &sender)) {
 		return 0;
 	}
-	if (taken == 1 && info.valid_data) {
-		reply(c, topics, command, 0, reason);
+	if (check(c, command, sender, view, reason) == 0) {
+		send_set(c, command, sender, view->now_ns);
+		return 0;
 	}
+	reply(c, topics, command, 0, reason);
 	ecdaq_CommandV1_free(command, DDS_FREE_ALL);
-	return taken == 1;
+	return 1;
 }
 
 int commands_step(struct commands *commands, const struct topics *topics,
@@ -342,22 +346,22 @@ int commands_step(struct commands *commands, const struct topics *topics,
 	struct commands *c = commands;
 	uint64_t session = view->table == NULL ? 0 : view->table->meta->session;
 
-	hear(c, view->table);
-	look_after_flight(c, topics, view->now_ns);
+	handle_liveliness(c, view->table);
+	check_pending(c, topics, view->now_ns);
 	if (session != c->session) {
-		/* Another run of the master, with a board that knows nothing of the last one's. */
+		/* Another run of the master, with a new board: nothing is set on it. */
 		for (unsigned i = 0; i < BOARD_OUTPUTS; i++) {
 			gate_note_set(c->gate, i, 0);
 		}
 		c->session = session;
 	}
-	for (int n = 0; c->flight.command == NULL && n < REFUSALS_A_STEP; n++) {
-		if (!take_one(c, topics, view)) {
+	for (int n = 0; c->pending.command == NULL && n < REFUSALS_PER_STEP; n++) {
+		if (!take_command(c, topics, view)) {
 			break;
 		}
 	}
-	beat(c);
-	return c->flight.command != NULL;
+	heartbeat(c);
+	return c->pending.command != NULL;
 }
 
 void commands_destroy(struct commands *commands)
@@ -366,7 +370,7 @@ void commands_destroy(struct commands *commands)
 		return;
 	}
 	if (commands->gate != NULL) {
-		take_back(commands, NULL, 0);
+		revert_outputs(commands, NULL, 0);
 	}
 	remote_board_close(&commands->board);
 	gate_destroy(commands->gate);

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * ecdaq/command -> checks (publish/gate.h) -> remote board -> ecdaq/reply. One command travels at a
- * time, so that its answer names the very cycle whose frame carried it. While a commander lives,
- * the board beats; when it is lost, what it set is taken back. Context: the publisher's thread.
+ * ecdaq/command -> checks (publish/gate.h) -> remote board -> ecdaq/reply. One command is pending
+ * at a time, so that its reply names the cycle whose frame carried it. While an output is set by a
+ * commander, the board gets a heartbeat; when the commander is lost, its outputs are reverted.
+ * Context: the publisher's thread.
  */
 #ifndef PUBLISH_COMMANDS_H
 #define PUBLISH_COMMANDS_H
@@ -20,16 +21,17 @@ struct commands_counts {
 
 /** @cfg is kept by the caller. 0 or -errno. */
 int commands_create(const struct config *cfg, struct commands **ret_commands);
-/** Takes back what was set. */
+/** Reverts all outputs that commanders set; the pending command is not answered. */
 void commands_destroy(struct commands *commands);
 
-/** To be given to topics_open(): it hears of commanders that come and go. Delete it afterwards. */
+/** The listener for topics_open(), notified when commanders appear and disappear. Caller deletes.
+ */
 dds_listener_t *commands_listener(struct commands *commands);
 
-/** Follow the master's board through restarts. */
+/** Open the master's board, again after a restart of the master. */
 void commands_follow(struct commands *commands);
 
-/** One step. @view: how the master is now. 1 while a command is on its way, else 0. */
+/** Process liveliness changes and commands. @view: the master now. 1 while a command is pending. */
 int commands_step(struct commands *commands, const struct topics *topics,
 		  const struct gate_view *view);
 

@@ -116,7 +116,7 @@ static struct commander *admit(struct gate *gate, uint64_t sender, int64_t now_n
 	return c;
 }
 
-void gate_lose(struct gate *gate, uint64_t sender)
+void gate_remove(struct gate *gate, uint64_t sender)
 {
 	struct commander *c = sender == 0 ? NULL : find(gate, sender);
 

@@ -62,7 +62,7 @@ int gate_check(struct gate *gate, const struct gate_command *cmd, const struct g
  * @sender is not heard of: it owns nothing any more. Its ids are remembered (it may be heard of
  * again, and an old command must not pass then) until its place is needed for another.
  */
-void gate_lose(struct gate *gate, uint64_t sender);
+void gate_remove(struct gate *gate, uint64_t sender);
 
 /** Who last set @output (0: nobody), and whether a lost owner leaves it fail-safe (has a time-out).
  */

@@ -34,13 +34,6 @@ static int have_page(struct own_status *own, const struct config *cfg)
 	return 1;
 }
 
-static uint64_t readers_of(dds_entity_t writer)
-{
-	dds_return_t count = dds_get_matched_subscriptions(writer, NULL, 0);
-
-	return count < 0 ? 0 : (uint64_t)count;
-}
-
 void own_status_put(struct own_status *own, const struct config *cfg, const struct topics *topics,
 		    uint64_t session, const struct samples_counts *samples,
 		    struct commands_counts commands)
@@ -55,7 +48,8 @@ void own_status_put(struct own_status *own, const struct config *cfg, const stru
 	set(&page->published_cycles, samples->published);
 	set(&page->missed_cycles, samples->missed);
 	set(&page->failed_messages, samples->failed);
-	set(&page->subscribers, readers_of(topics->sample) + readers_of(topics->block));
+	set(&page->subscribers,
+	    topics_reader_count(topics->sample) + topics_reader_count(topics->block));
 	set(&page->commands_accepted, commands.accepted);
 	set(&page->commands_refused, commands.refused);
 	atomic_fetch_add_explicit(&page->heartbeat, 1, memory_order_relaxed);

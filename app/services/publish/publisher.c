@@ -23,13 +23,12 @@
 #include "publish/topics.h"
 
 #define LOOK_NS (NS_PER_S / 10) /* for rings and pages */
-#define FLIGHT_LOOK_NS (200 * NS_PER_US)
+#define PENDING_POLL_NS (200 * NS_PER_US)
 enum { SAMPLES_A_STEP = 64, LOOKS_A_STATUS = 10 };
 
 struct publisher {
 	const struct config *cfg;
 	struct topics topics;
-	dds_entity_t waitset;
 	struct commands *commands;
 	struct events events;
 	struct events sync0_events; /* its alarms go to ecdaq/event, too */
@@ -101,13 +100,6 @@ static int open_topics(struct publisher *p, char *error, size_t error_bytes)
 	dds_delete_listener(listener);
 	if (r < 0) {
 		return r;
-	}
-	p->waitset = dds_create_waitset(p->topics.participant);
-	dds_set_status_mask(p->topics.command,
-			    DDS_DATA_AVAILABLE_STATUS | DDS_LIVELINESS_CHANGED_STATUS);
-	if (p->waitset < 0 || dds_waitset_attach(p->waitset, p->topics.command, 1) < 0) {
-		snprintf(error, error_bytes, "DDS: no waitset is to be had");
-		return -EIO;
 	}
 	state_put_idl(&p->topics);
 	return 0;
@@ -293,15 +285,15 @@ static int publish(struct publisher *p)
 	return result == SAMPLES_MORE;
 }
 
-static void wait_for_news(const struct publisher *p, int is_in_flight)
+static void wait_for_work(const struct publisher *p, int is_pending)
 {
-	/* Data that waits while a command is on its way would end the wait at once. */
-	struct timespec pause = { .tv_nsec = FLIGHT_LOOK_NS };
+	/* Commands that are queued behind the pending one would end topics_wait() at once. */
+	struct timespec pause = { .tv_nsec = PENDING_POLL_NS };
 
-	if (is_in_flight) {
+	if (is_pending) {
 		ppoll(NULL, 0, &pause, NULL);
 	} else {
-		(void)dds_waitset_wait(p->waitset, NULL, 0, p->cfg->cycle_period_ns / 2);
+		topics_wait(&p->topics, p->cfg->cycle_period_ns / 2);
 	}
 }
 
@@ -311,7 +303,7 @@ int publisher_step(struct publisher *publisher, char *error, size_t error_bytes)
 	int64_t now = now_ns();
 	struct gate_view view = { .now_ns = now };
 	int has_more;
-	int is_in_flight;
+	int is_pending;
 	int r = now - p->looked_ns >= LOOK_NS ? look(p, now, error, error_bytes) : 0;
 
 	if (r < 0) {
@@ -323,12 +315,12 @@ int publisher_step(struct publisher *publisher, char *error, size_t error_bytes)
 		view.cycle = samples_cycle(p->samples);
 		view.is_op = is_op(p, view.table);
 	}
-	is_in_flight = commands_step(p->commands, &p->topics, &view);
+	is_pending = commands_step(p->commands, &p->topics, &view);
 	events_step(&p->events, &p->topics, p->samples);
 	events_step(&p->sync0_events, &p->topics, p->samples);
 	sync0_step(&p->sync0, &p->topics, p->samples);
 	if (!has_more) {
-		wait_for_news(p, is_in_flight);
+		wait_for_work(p, is_pending);
 	}
 	return 0;
 }

@@ -135,6 +135,16 @@ static int open_all(struct topics *t, const struct config *cfg, const dds_listen
 	return 0;
 }
 
+static int open_waitset(struct topics *t, char *error, size_t error_bytes)
+{
+	dds_return_t r;
+
+	t->waitset = dds_create_waitset(t->participant);
+	dds_set_status_mask(t->command, DDS_DATA_AVAILABLE_STATUS | DDS_LIVELINESS_CHANGED_STATUS);
+	r = t->waitset < 0 ? t->waitset : dds_waitset_attach(t->waitset, t->command, 1);
+	return r < 0 ? fail("cannot create waitset", r, error, error_bytes) : 0;
+}
+
 static int find_plugins(char *ret_dir, size_t dir_bytes, char *error, size_t error_bytes)
 {
 	Dl_info library = { .dli_fname = NULL };
@@ -175,7 +185,8 @@ int topics_open(struct topics *topics, const struct config *cfg, const dds_liste
 	if (topics->participant < 0) {
 		return fail("participant", topics->participant, error, error_bytes);
 	}
-	return open_all(topics, cfg, on_command, error, error_bytes);
+	r = open_all(topics, cfg, on_command, error, error_bytes);
+	return r < 0 ? r : open_waitset(topics, error, error_bytes);
 }
 
 void topics_close(struct topics *topics)
@@ -194,4 +205,36 @@ int topics_write_now(dds_entity_t writer, const void *message)
 int topics_write(dds_entity_t writer, const void *message, int64_t utc_ns)
 {
 	return writer != 0 && dds_write_ts(writer, message, utc_ns < 0 ? 0 : utc_ns) < 0 ? -EIO : 0;
+}
+
+int topics_take_command(const struct topics *topics, ecdaq_CommandV1 **ret_command,
+			uint64_t *ret_sender)
+{
+	ecdaq_CommandV1 *command = ecdaq_CommandV1__alloc();
+	void *message = command;
+	dds_sample_info_t info;
+	int taken;
+
+	do {
+		taken = dds_take(topics->command, &message, &info, 1, 1);
+	} while (taken == 1 && !info.valid_data);
+	if (taken != 1) {
+		ecdaq_CommandV1_free(command, DDS_FREE_ALL);
+		return 0;
+	}
+	*ret_command = command;
+	*ret_sender = info.publication_handle;
+	return 1;
+}
+
+void topics_wait(const struct topics *topics, int64_t timeout_ns)
+{
+	(void)dds_waitset_wait(topics->waitset, NULL, 0, timeout_ns);
+}
+
+uint32_t topics_reader_count(dds_entity_t writer)
+{
+	dds_return_t count = dds_get_matched_subscriptions(writer, NULL, 0);
+
+	return count < 0 ? 0 : (uint32_t)count;
 }

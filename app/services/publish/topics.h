@@ -7,6 +7,7 @@
 
 #include "config/config.h"
 #include "dds/dds.h"
+#include "ecdaq.h"
 #include "keystore/dds_topics.h"
 
 #define TOPIC_MEMBER(member, ...) dds_entity_t member;
@@ -15,6 +16,7 @@
 struct topics {
 	dds_entity_t domain;
 	dds_entity_t participant;
+	dds_entity_t waitset;
 	DDS_TOPICS(TOPIC_MEMBER)
 };
 
@@ -27,9 +29,19 @@ int topics_open(struct topics *topics, const struct config *cfg, const dds_liste
 		char *error, size_t error_bytes);
 void topics_close(struct topics *topics);
 
-/** Write @message with @utc_ns as its source time stamp. 0 or -EIO. Never waits for a reader. */
+/** Write @message with @utc_ns as its source timestamp. 0 or -EIO. Never blocks on a reader. */
 int topics_write(dds_entity_t writer, const void *message, int64_t utc_ns);
-/** The same, stamped with the time now. */
+/** The same with the current time. */
 int topics_write_now(dds_entity_t writer, const void *message);
+
+/** 1 and the next command with its writer, to be freed with ecdaq_CommandV1_free(); 0: none. */
+int topics_take_command(const struct topics *topics, ecdaq_CommandV1 **ret_command,
+			uint64_t *ret_sender);
+
+/** Return when a command has arrived, or after @timeout_ns. */
+void topics_wait(const struct topics *topics, int64_t timeout_ns);
+
+/** How many readers are matched with @writer. */
+uint32_t topics_reader_count(dds_entity_t writer);
 
 #endif

@@ -133,7 +133,7 @@ TEST(publish_gate, ids_go_up_for_each_sender_by_itself_also_after_it_was_lost)
 	CHECK_EQ(ask(s, 1, 5, "s.led", 1), -EALREADY);
 	CHECK_EQ(ask(s, 1, 4, "s.led", 1), -ESTALE);
 	CHECK_EQ(ask(s, 2, 1, "s.led", 1), 0);
-	gate_lose(s->gate, 1);
+	gate_remove(s->gate, 1);
 	CHECK_EQ(ask(s, 1, 5, "s.led", 1), -EALREADY);
 	CHECK_EQ(ask(s, 1, 6, "s.led", 1), 0);
 }
@@ -146,7 +146,7 @@ TEST(publish_gate, places_of_lost_commanders_go_to_new_ones)
 		CHECK_EQ(ask(s, sender, 1, "s.led", 1), 0);
 	}
 	CHECK_EQ(ask(s, 1000, 1, "s.led", 1), -EUSERS);
-	gate_lose(s->gate, 3);
+	gate_remove(s->gate, 3);
 	CHECK_EQ(ask(s, 1000, 1, "s.led", 1), 0);
 }
 
@@ -236,4 +236,15 @@ TEST(publish_gate, lease_is_half_the_shortest_time_out_within_bounds)
 	s->cfg.output[0].timeout_ns = 0;
 	CHECK_EQ(gate_lease_ns(&s->cfg), NS_PER_S);
 	CHECK_EQ(gate_has_timeout(&s->table, &s->cfg, 0), 0);
+}
+
+TEST(publish_gate, lease_is_half_the_shortest_timeout_of_all_outputs)
+{
+	struct scene *s = scene();
+
+	s->cfg.output[0].timeout_ns = 200 * NS_PER_MS;
+	s->cfg.output[1].timeout_ns = 80 * NS_PER_MS;
+	CHECK_EQ(gate_lease_ns(&s->cfg), 40 * NS_PER_MS);
+	s->cfg.output[1].timeout_ns = 300 * NS_PER_MS;
+	CHECK_EQ(gate_lease_ns(&s->cfg), 100 * NS_PER_MS);
 }

@@ -6,11 +6,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/mman.h>
-#include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include "harness/test.h"
+#include "unit/services/publish/master_socket.h"
 
 /* A master's socket, with a descriptor of the test's choice behind it. */
 struct bench {
@@ -21,13 +20,7 @@ struct bench {
 
 static void listen_anew(struct bench *b)
 {
-	struct sockaddr_un address = { .sun_family = AF_UNIX };
-
-	snprintf(address.sun_path, sizeof(address.sun_path), "%s/commands-remote", b->dir);
-	unlink(address.sun_path);
-	b->listener = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-	CHECK_EQ(bind(b->listener, (const struct sockaddr *)&address, sizeof(address)), 0);
-	CHECK_EQ(listen(b->listener, 4), 0);
+	b->listener = master_socket_listen(b->dir);
 }
 
 static void bench_open(struct bench *b)
@@ -46,29 +39,9 @@ static void bench_close(struct bench *b)
 	CHECK_EQ(rmdir(b->dir), 0);
 }
 
-/* Take whoever has connected, and send one byte with @given; -1: without a descriptor. */
 static void serve(const struct bench *b, int given)
 {
-	int client = accept4(b->listener, NULL, NULL, SOCK_CLOEXEC);
-	char byte = 0;
-	struct iovec data = { .iov_base = &byte, .iov_len = 1 };
-	union {
-		struct cmsghdr header;
-		char bytes[CMSG_SPACE(sizeof(int))];
-	} control = { .bytes = { 0 } };
-	struct msghdr message = { .msg_iov = &data, .msg_iovlen = 1 };
-
-	CHECK(client >= 0);
-	if (given >= 0) {
-		message.msg_control = &control;
-		message.msg_controllen = sizeof(control.bytes);
-		control.header.cmsg_level = SOL_SOCKET;
-		control.header.cmsg_type = SCM_RIGHTS;
-		control.header.cmsg_len = CMSG_LEN(sizeof(int));
-		memcpy(CMSG_DATA(&control.header), &given, sizeof(given));
-	}
-	CHECK_EQ(sendmsg(client, &message, 0), 1);
-	close(client);
+	master_socket_serve(b->listener, given);
 }
 
 TEST(remote_board, it_comes_by_the_socket_and_anew_after_a_restart_of_the_master)
