@@ -2,10 +2,11 @@
 /* ecdaq channels */
 #include <stdio.h>
 
-#include "cli/args.h"
+#include "cli/cli.h"
 #include "cli/json.h"
 #include "cli/source.h"
 #include "image/image.h"
+#include "program/args.h"
 
 static void show(const struct channel *ch)
 {
@@ -50,14 +51,14 @@ enum exit_code verb_channels(struct cli *cli, int argc, char **argv)
 {
 	int is_json = 0;
 	const struct args_option options[] = {
-		{ "json", 0, ARGS_FLAG, &is_json, NULL, "a JSON array" },
+		{ "json", 0, args_flag, &is_json, NULL, "a JSON array" },
 	};
 	struct args args = { .options = options, .option_count = 1 };
 	struct samples samples;
 	enum exit_code result;
 	struct json js;
 
-	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
+	if (!cli_parse(cli, &args, argc, argv, &result)) {
 		return result;
 	}
 	result = samples_open(cli, &samples);

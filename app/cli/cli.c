@@ -8,24 +8,71 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "program/error.h"
+
 enum exit_code cli_fail(const struct cli *cli, enum exit_code code, const char *format, ...)
 {
-	char text[1024];
+	char prefix[64];
 	va_list args;
 
+	snprintf(prefix, sizeof(prefix), "ecdaq%s%s", cli->verb == NULL ? "" : ": ",
+		 cli->verb == NULL ? "" : cli->verb->name);
 	va_start(args, format);
-	vsnprintf(text, sizeof(text), format, args);
+	error_vprint(prefix, format, args);
 	va_end(args);
-	/* One line, whatever a user, a file or a slave put into it. */
-	for (char *p = text; *p != '\0'; p++) {
-		if ((unsigned char)*p < 0x20 || *p == 0x7f) {
-			*p = '?';
-		}
-	}
-	fflush(stdout);
-	fprintf(stderr, "ecdaq: %s%s%s\n", cli->verb == NULL ? "" : cli->verb->name,
-		cli->verb == NULL ? "" : ": ", text);
 	return code;
+}
+
+static void help(const struct verb *verb, const struct args *args)
+{
+	printf("usage: ecdaq %s%s%s%s\n\n%s\n", verb->name,
+	       args->option_count > 0 ? " [OPTION...]" : "", verb->operands[0] == '\0' ? "" : " ",
+	       verb->operands, verb->summary);
+	if (verb->detail != NULL) {
+		printf("\n%s", verb->detail);
+	}
+	if (args->option_count > 0) {
+		putchar('\n');
+	}
+	args_help(stdout, args->options, args->option_count);
+}
+
+enum args_result cli_take(struct cli *cli, struct args *args, int argc, char **argv, char *error)
+{
+	const struct args_option globals[] = {
+		{ "run-dir", 0, args_text, &cli->run_dir, "DIR", NULL },
+		{ "config", 0, args_text, &cli->config, "FILE", NULL },
+	};
+	enum args_result result;
+
+	args->shared = globals;
+	args->shared_count = sizeof(globals) / sizeof(globals[0]);
+	result = args_parse(args, argc, argv, error);
+	args->shared_count = 0;
+	return result;
+}
+
+int cli_parse(struct cli *cli, struct args *args, int argc, char **argv, enum exit_code *ret_code)
+{
+	char error[ARGS_ERROR_BYTES];
+
+	*ret_code = EXIT_CODE_OK;
+	args->operands_usage = cli->verb->operands;
+	switch (cli_take(cli, args, argc, argv, error)) {
+	case ARGS_OK:
+		return 1;
+	case ARGS_HELP:
+		help(cli->verb, args);
+		return 0;
+	case ARGS_VERSION:
+		puts("ecdaq " ECDAQ_VERSION);
+		return 0;
+	case ARGS_ERROR:
+		*ret_code = cli_fail(cli, EXIT_CODE_USAGE, "%s (see ecdaq %s --help)", error,
+				     cli->verb->name);
+		return 0;
+	}
+	return 0;
 }
 
 enum exit_code cli_exit_of(int errno_value)

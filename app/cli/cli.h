@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What all verbs of ecdaq share: where the run directory is, how a failure is said, the table of
- * verbs. A failure is one line on standard error, "ecdaq: VERB: what: why"; the exit code says of
- * what kind it is.
+ * What all verbs of ecdaq share: their command line, the run directory, how an error is reported,
+ * the table of verbs. An error is one line on standard error, "ecdaq: VERB: object: problem".
  */
 #ifndef CLI_CLI_H
 #define CLI_CLI_H
 
 #include "config/config.h"
+#include "program/args.h"
 #include "program/exit_code.h"
 
 struct verb;
@@ -28,9 +28,18 @@ struct verb {
 	enum exit_code (*run)(struct cli *cli, int argc, char **argv);
 };
 
-/** Say "ecdaq: VERB: ..." on standard error, as one printable line. Returns @code. */
+/** Report "ecdaq: VERB: ..." on standard error, as one printable line. Returns @code. */
 enum exit_code cli_fail(const struct cli *cli, enum exit_code code, const char *format, ...)
 	__attribute__((format(printf, 3, 4)));
+
+/**
+ * Sort the words behind the verb by @args and the global options. 1; 0 when --help or --version was
+ * answered or an error reported, with the exit code in @ret_code.
+ */
+int cli_parse(struct cli *cli, struct args *args, int argc, char **argv, enum exit_code *ret_code);
+
+/** args_parse() with the global options, which go to @cli. */
+enum args_result cli_take(struct cli *cli, struct args *args, int argc, char **argv, char *error);
 
 /** EXIT_CODE_PERMISSION for EACCES and EPERM, EXIT_CODE_NO_DAEMON for what is not there, else
  * EXIT_CODE_FAILED. */

@@ -4,9 +4,10 @@
 
 #include "base/clock.h"
 #include "cli/admin_client.h"
-#include "cli/args.h"
+#include "cli/cli.h"
 #include "cli/screen.h"
 #include "cli/source.h"
+#include "program/args.h"
 
 enum exit_code verb_clear(struct cli *cli, int argc, char **argv)
 {
@@ -15,7 +16,7 @@ enum exit_code verb_clear(struct cli *cli, int argc, char **argv)
 	struct admin_reply reply;
 	enum exit_code result;
 
-	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
+	if (!cli_parse(cli, &args, argc, argv, &result)) {
 		return result;
 	}
 	return admin_do(cli, &request, &reply);
@@ -41,7 +42,7 @@ enum exit_code verb_stop(struct cli *cli, int argc, char **argv)
 {
 	int64_t wait_ns = 0;
 	const struct args_option options[] = {
-		{ "wait", 0, ARGS_DURATION, &wait_ns, "T",
+		{ "wait", 0, args_duration, &wait_ns, "T",
 		  "wait at most so long until ecdaqd is gone" },
 	};
 	struct args args = { .options = options, .option_count = 1 };
@@ -51,7 +52,7 @@ enum exit_code verb_stop(struct cli *cli, int argc, char **argv)
 	enum exit_code result;
 	int64_t pid = 0;
 
-	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
+	if (!cli_parse(cli, &args, argc, argv, &result)) {
 		return result;
 	}
 	if (wait_ns > 0) {

@@ -9,10 +9,11 @@
 #include "base/clock.h"
 #include "base/event.h"
 #include "base/ring.h"
-#include "cli/args.h"
+#include "cli/cli.h"
 #include "cli/json.h"
 #include "cli/screen.h"
 #include "cli/text.h"
+#include "program/args.h"
 
 struct events {
 	struct cli *cli;
@@ -245,17 +246,17 @@ enum exit_code verb_events(struct cli *cli, int argc, char **argv)
 {
 	struct events events = { .cli = cli };
 	const struct args_option options[] = {
-		{ "follow", 'f', ARGS_FLAG, &events.is_follow, NULL, "go on with what comes" },
-		{ "count", 'n', ARGS_COUNT, &events.count, "N", "begin with the last N" },
-		{ "level", 'l', ARGS_TEXT, &events.level, "LEVEL",
+		{ "follow", 'f', args_flag, &events.is_follow, NULL, "go on with what comes" },
+		{ "count", 'n', args_count, &events.count, "N", "begin with the last N" },
+		{ "level", 'l', args_text, &events.level, "LEVEL",
 		  "info, notice, warning or error: this and worse" },
-		{ "json", 0, ARGS_FLAG, &events.is_json, NULL, "a JSON object an event" },
+		{ "json", 0, args_flag, &events.is_json, NULL, "a JSON object an event" },
 	};
 	struct args args = { .options = options, .option_count = 4 };
 	enum exit_code result;
 	uint64_t oldest;
 
-	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
+	if (!cli_parse(cli, &args, argc, argv, &result)) {
 		return result;
 	}
 	result = parse_level(&events);

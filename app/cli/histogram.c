@@ -7,12 +7,13 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "cli/args.h"
 #include "cli/bars.h"
+#include "cli/cli.h"
 #include "cli/json.h"
 #include "cli/screen.h"
 #include "cli/source.h"
 #include "cli/text.h"
+#include "program/args.h"
 
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
 
@@ -136,7 +137,7 @@ enum exit_code verb_histogram(struct cli *cli, int argc, char **argv)
 {
 	int is_json = 0;
 	const struct args_option options[] = {
-		{ "json", 0, ARGS_FLAG, &is_json, NULL, "all buckets as a JSON object" },
+		{ "json", 0, args_flag, &is_json, NULL, "all buckets as a JSON object" },
 	};
 	struct args args = {
 		.options = options, .option_count = 1, .operands_min = 1, .operands_max = 1
@@ -145,7 +146,7 @@ enum exit_code verb_histogram(struct cli *cli, int argc, char **argv)
 	const struct histogram *h;
 	enum exit_code result;
 
-	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
+	if (!cli_parse(cli, &args, argc, argv, &result)) {
 		return result;
 	}
 	result = source_status(cli, &page);

@@ -4,8 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "cli/args.h"
 #include "cli/cli.h"
+#include "program/args.h"
 #include "program/exit_code.h"
 
 static enum exit_code verb_version(struct cli *cli, int argc, char **argv)
@@ -13,7 +13,7 @@ static enum exit_code verb_version(struct cli *cli, int argc, char **argv)
 	struct args args = { .options = NULL };
 	enum exit_code result;
 
-	if (args_parse(cli, &args, argc, argv, &result) == ARGS_GO) {
+	if (cli_parse(cli, &args, argc, argv, &result)) {
 		puts("ecdaq " ECDAQ_VERSION);
 		result = EXIT_CODE_OK;
 	}
@@ -121,35 +121,25 @@ static enum exit_code finish(const struct cli *cli, enum exit_code result)
 int main(int argc, char **argv)
 {
 	struct cli cli = { .verb = NULL };
-	int i = 1;
+	struct args args = { .operands_min = 1, .operands_usage = "command", .ends_at_operand = 1 };
+	char error[ARGS_ERROR_BYTES];
 
-	while (i < argc && argv[i][0] == '-') {
-		int taken = args_take_global(&cli, argc, argv, i);
-
-		if (taken < 0) {
-			return EXIT_CODE_USAGE;
-		}
-		if (strcmp(argv[i], "--help") == 0 || strcmp(argv[i], "-h") == 0) {
-			help();
-			return (int)finish(&cli, EXIT_CODE_OK);
-		}
-		if (strcmp(argv[i], "--version") == 0) {
-			puts("ecdaq " ECDAQ_VERSION);
-			return (int)finish(&cli, EXIT_CODE_OK);
-		}
-		if (taken == 0) {
-			return (int)cli_fail(&cli, EXIT_CODE_USAGE,
-					     "%s: unknown option (see ecdaq --help)", argv[i]);
-		}
-		i += taken;
+	switch (cli_take(&cli, &args, argc - 1, argv + 1, error)) {
+	case ARGS_OK:
+		break;
+	case ARGS_HELP:
+		help();
+		return (int)finish(&cli, EXIT_CODE_OK);
+	case ARGS_VERSION:
+		puts("ecdaq " ECDAQ_VERSION);
+		return (int)finish(&cli, EXIT_CODE_OK);
+	case ARGS_ERROR:
+		return (int)cli_fail(&cli, EXIT_CODE_USAGE, "%s (see ecdaq --help)", error);
 	}
-	if (i == argc) {
-		return (int)cli_fail(&cli, EXIT_CODE_USAGE, "wants a verb (see ecdaq --help)");
-	}
-	cli.verb = find_verb(argv[i]);
+	cli.verb = find_verb(args.operands[0]);
 	if (cli.verb == NULL) {
-		return (int)cli_fail(&cli, EXIT_CODE_USAGE, "%s: no such verb (see ecdaq --help)",
-				     argv[i]);
+		return (int)cli_fail(&cli, EXIT_CODE_USAGE,
+				     "%s: unknown command (see ecdaq --help)", args.operands[0]);
 	}
-	return (int)finish(&cli, cli.verb->run(&cli, argc - i - 1, argv + i + 1));
+	return (int)finish(&cli, cli.verb->run(&cli, args.operand_count - 1, args.operands + 1));
 }

@@ -6,12 +6,13 @@
 
 #include "base/clock.h"
 #include "cli/admin_client.h"
-#include "cli/args.h"
+#include "cli/cli.h"
 #include "cli/follow.h"
 #include "cli/json.h"
 #include "cli/screen.h"
 #include "cli/text.h"
 #include "image/image.h"
+#include "program/args.h"
 
 /* Entries of the FB1111-Piccolo (DESIGN 5). */
 #define ENTRY_TIME "oneshot_time"
@@ -274,19 +275,19 @@ enum exit_code verb_oneshot(struct cli *cli, int argc, char **argv)
 {
 	struct oneshot one = { .cli = cli, .at_ns = INT64_MIN };
 	const struct args_option options[] = {
-		{ "at", 0, ARGS_DC_TIME, &one.at_ns, "DC_NS",
+		{ "at", 0, args_dc_time, &one.at_ns, "DC_NS",
 		  "the instant, DC time in ns since 2000-01-01" },
-		{ "in", 0, ARGS_DURATION, &one.in_ns, "T", "the instant, from now on" },
-		{ "wait", 0, ARGS_FLAG, &one.is_wait, NULL,
+		{ "in", 0, args_duration, &one.in_ns, "T", "the instant, from now on" },
+		{ "wait", 0, args_flag, &one.is_wait, NULL,
 		  "wait for the conversion and show its value" },
-		{ "json", 0, ARGS_FLAG, &one.is_json, NULL, "answer as a JSON object" },
+		{ "json", 0, args_flag, &one.is_json, NULL, "answer as a JSON object" },
 	};
 	struct args args = {
 		.options = options, .option_count = 4, .operands_min = 1, .operands_max = 1
 	};
 	enum exit_code result;
 
-	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
+	if (!cli_parse(cli, &args, argc, argv, &result)) {
 		return result;
 	}
 	one.has_at = one.at_ns != INT64_MIN;

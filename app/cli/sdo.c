@@ -10,11 +10,12 @@
 
 #include "base/bytes.h"
 #include "cli/admin_client.h"
-#include "cli/args.h"
+#include "cli/cli.h"
 #include "cli/json.h"
 #include "cli/sdo_abort.h"
 #include "cli/source.h"
 #include "config/sdo_value.h"
+#include "program/args.h"
 
 struct sdo {
 	struct cli *cli;
@@ -269,15 +270,15 @@ enum exit_code verb_sdo(struct cli *cli, int argc, char **argv)
 {
 	struct sdo sdo = { .cli = cli };
 	const struct args_option options[] = {
-		{ "type", 't', ARGS_TEXT, &sdo.type, "TYPE", "data type of the object" },
-		{ "json", 0, ARGS_FLAG, &sdo.is_json, NULL, "what was read as a JSON object" },
+		{ "type", 't', args_text, &sdo.type, "TYPE", "data type of the object" },
+		{ "json", 0, args_flag, &sdo.is_json, NULL, "what was read as a JSON object" },
 	};
 	struct args args = {
 		.options = options, .option_count = 2, .operands_min = 3, .operands_max = 4
 	};
 	enum exit_code result;
 
-	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
+	if (!cli_parse(cli, &args, argc, argv, &result)) {
 		return result;
 	}
 	return run(&sdo, &args);

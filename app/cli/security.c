@@ -5,8 +5,9 @@
 #include <string.h>
 #include <time.h>
 
-#include "cli/args.h"
+#include "cli/cli.h"
 #include "keystore/keystore.h"
+#include "program/args.h"
 
 enum { DAYS = 3650, DAYS_MAX = 36500 };
 
@@ -137,8 +138,8 @@ enum exit_code verb_security(struct cli *cli, int argc, char **argv)
 {
 	struct security security = { .cli = cli, .dir = "security", .days = DAYS };
 	const struct args_option options[] = {
-		{ "dir", 0, ARGS_TEXT, &security.dir, "DIR", "the store (security)" },
-		{ "days", 0, ARGS_COUNT, &security.days, "N",
+		{ "dir", 0, args_text, &security.dir, "DIR", "the store (security)" },
+		{ "days", 0, args_count, &security.days, "N",
 		  "how long a participant's key holds (3650)" },
 	};
 	struct args args = {
@@ -146,7 +147,7 @@ enum exit_code verb_security(struct cli *cli, int argc, char **argv)
 	};
 	enum exit_code result;
 
-	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
+	if (!cli_parse(cli, &args, argc, argv, &result)) {
 		return result;
 	}
 	if (security.days > DAYS_MAX) {

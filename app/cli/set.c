@@ -7,11 +7,12 @@
 #include <string.h>
 
 #include "cli/admin_client.h"
-#include "cli/args.h"
 #include "cli/choose.h"
+#include "cli/cli.h"
 #include "cli/json.h"
 #include "cli/source.h"
 #include "image/image.h"
+#include "program/args.h"
 
 struct setting {
 	struct cli *cli;
@@ -135,15 +136,15 @@ enum exit_code verb_set(struct cli *cli, int argc, char **argv)
 {
 	struct setting setting = { .cli = cli, .request = { .verb = ADMIN_SET } };
 	const struct args_option options[] = {
-		{ "raw", 0, ARGS_FLAG, &setting.is_raw, NULL, "VALUE is in raw counts" },
-		{ "json", 0, ARGS_FLAG, &setting.is_json, NULL, "answer as a JSON object" },
+		{ "raw", 0, args_flag, &setting.is_raw, NULL, "VALUE is in raw counts" },
+		{ "json", 0, args_flag, &setting.is_json, NULL, "answer as a JSON object" },
 	};
 	struct args args = {
 		.options = options, .option_count = 2, .operands_min = 1, .operands_max = 4096
 	};
 	enum exit_code result;
 
-	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
+	if (!cli_parse(cli, &args, argc, argv, &result)) {
 		return result;
 	}
 	result = samples_open(cli, &setting.samples);

@@ -3,10 +3,11 @@
 #include <inttypes.h>
 #include <stdio.h>
 
-#include "cli/args.h"
+#include "cli/cli.h"
 #include "cli/report.h"
 #include "cli/source.h"
 #include "cli/text.h"
+#include "program/args.h"
 #include "wire/al.h"
 
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
@@ -79,8 +80,8 @@ enum exit_code verb_slaves(struct cli *cli, int argc, char **argv)
 	int is_json = 0;
 	int is_verbose = 0;
 	const struct args_option options[] = {
-		{ "json", 0, ARGS_FLAG, &is_json, NULL, "a JSON array" },
-		{ "verbose", 'v', ARGS_FLAG, &is_verbose, NULL,
+		{ "json", 0, args_flag, &is_json, NULL, "a JSON array" },
+		{ "verbose", 'v', args_flag, &is_verbose, NULL,
 		  "identity, clock and error counters" },
 	};
 	struct args args = { .options = options, .option_count = 2 };
@@ -88,7 +89,7 @@ enum exit_code verb_slaves(struct cli *cli, int argc, char **argv)
 	enum exit_code result;
 	struct json js;
 
-	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
+	if (!cli_parse(cli, &args, argc, argv, &result)) {
 		return result;
 	}
 	result = source_status(cli, &page);

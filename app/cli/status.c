@@ -1,17 +1,18 @@
 /* SPDX-License-Identifier: MIT */
 /* ecdaq status */
-#include "cli/args.h"
+#include "cli/cli.h"
 #include "cli/report.h"
 #include "cli/source.h"
+#include "program/args.h"
 
 enum exit_code verb_status(struct cli *cli, int argc, char **argv)
 {
 	int is_json = 0;
 	int is_summary = 0;
 	const struct args_option options[] = {
-		{ "json", 0, ARGS_FLAG, &is_json, NULL,
+		{ "json", 0, args_flag, &is_json, NULL,
 		  "all of it as one JSON object in one line" },
-		{ "summary", 0, ARGS_FLAG, &is_summary, NULL,
+		{ "summary", 0, args_flag, &is_summary, NULL,
 		  "only what one asks at the end of a run" },
 	};
 	struct args args = { .options = options, .option_count = 2 };
@@ -21,7 +22,7 @@ enum exit_code verb_status(struct cli *cli, int argc, char **argv)
 	struct json js;
 	enum exit_code result;
 
-	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
+	if (!cli_parse(cli, &args, argc, argv, &result)) {
 		return result;
 	}
 	result = source_status(cli, &page);

@@ -9,12 +9,13 @@
 #include <unistd.h>
 
 #include "base/ring.h"
-#include "cli/args.h"
 #include "cli/bars.h"
+#include "cli/cli.h"
 #include "cli/json.h"
 #include "cli/source.h"
 #include "cli/sync0_source.h"
 #include "cli/text.h"
+#include "program/args.h"
 
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
 
@@ -308,14 +309,14 @@ enum exit_code verb_sync0(struct cli *cli, int argc, char **argv)
 	int is_json = 0;
 	int is_histogram = 0;
 	const struct args_option options[] = {
-		{ "json", 0, ARGS_FLAG, &is_json, NULL, "all of it as one JSON object" },
-		{ "histogram", 0, ARGS_FLAG, &is_histogram, NULL,
+		{ "json", 0, args_flag, &is_json, NULL, "all of it as one JSON object" },
+		{ "histogram", 0, args_flag, &is_histogram, NULL,
 		  "the periods of each line as bars" },
 	};
 	struct args args = { .options = options, .option_count = 2, .operands_max = 1 };
 	enum exit_code result;
 
-	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
+	if (!cli_parse(cli, &args, argc, argv, &result)) {
 		return result;
 	}
 	if (is_json && is_histogram) {

@@ -8,11 +8,12 @@
 #include <unistd.h>
 
 #include "base/clock.h"
-#include "cli/args.h"
+#include "cli/cli.h"
 #include "cli/report.h"
 #include "cli/screen.h"
 #include "cli/source.h"
 #include "cli/text.h"
+#include "program/args.h"
 
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
 
@@ -225,21 +226,21 @@ enum exit_code verb_top(struct cli *cli, int argc, char **argv)
 		.leave_text = "q: leave",
 	};
 	const struct args_option options[] = {
-		{ "interval", 'i', ARGS_DURATION, &top.interval_ns, "T",
+		{ "interval", 'i', args_duration, &top.interval_ns, "T",
 		  "time between updates (500ms)" },
-		{ "count", 'n', ARGS_COUNT, &top.count, "N", "end after N updates" },
-		{ "wait", 0, ARGS_DURATION, &top.wait_ns, "T",
+		{ "count", 'n', args_count, &top.count, "N", "end after N updates" },
+		{ "wait", 0, args_duration, &top.wait_ns, "T",
 		  "how long to wait for ecdaqd to start (10s on a terminal, else 0s)" },
-		{ "json", 0, ARGS_FLAG, &top.is_json, NULL,
+		{ "json", 0, args_flag, &top.is_json, NULL,
 		  "a line of JSON each update, as from status" },
-		{ "leave-text", 0, ARGS_TEXT, &top.leave_text, "TEXT",
+		{ "leave-text", 0, args_text, &top.leave_text, "TEXT",
 		  "what q does, for the last line (q: leave)" },
 	};
 	struct args args = { .options = options, .option_count = 5 };
 	const struct status_page *page;
 	enum exit_code result;
 
-	if (args_parse(cli, &args, argc, argv, &result) == ARGS_DONE) {
+	if (!cli_parse(cli, &args, argc, argv, &result)) {
 		return result;
 	}
 	top.is_live = top.is_live && !top.is_json;

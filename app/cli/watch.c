@@ -8,14 +8,15 @@
 #include <time.h>
 
 #include "base/clock.h"
-#include "cli/args.h"
 #include "cli/choose.h"
+#include "cli/cli.h"
 #include "cli/follow.h"
 #include "cli/json.h"
 #include "cli/lines.h"
 #include "cli/plot.h"
 #include "cli/screen.h"
 #include "image/image.h"
+#include "program/args.h"
 
 #define DRAW_PERIOD_NS (NS_PER_S / 15)
 
@@ -311,16 +312,16 @@ enum exit_code verb_watch(struct cli *cli, int argc, char **argv)
 {
 	struct watch watch = { .cli = cli, .every = 1, .window_ns = 5 * NS_PER_S };
 	const struct args_option options[] = {
-		{ "plot", 'p', ARGS_FLAG, &watch.is_plot, NULL,
+		{ "plot", 'p', args_flag, &watch.is_plot, NULL,
 		  "curves that scroll, a panel a channel" },
-		{ "window", 'w', ARGS_DURATION, &watch.window_ns, "T",
+		{ "window", 'w', args_duration, &watch.window_ns, "T",
 		  "time across the plot (5s)" },
-		{ "count", 'n', ARGS_COUNT, &watch.count, "N", "end after N samples" },
-		{ "every", 0, ARGS_COUNT, &watch.every, "N", "only each N-th cycle" },
-		{ "rate", 0, ARGS_NUMBER, &watch.rate_hz, "HZ", "only about so many a second" },
-		{ "raw", 0, ARGS_FLAG, &watch.is_raw, NULL,
+		{ "count", 'n', args_count, &watch.count, "N", "end after N samples" },
+		{ "every", 0, args_count, &watch.every, "N", "only each N-th cycle" },
+		{ "rate", 0, args_number, &watch.rate_hz, "HZ", "only about so many a second" },
+		{ "raw", 0, args_flag, &watch.is_raw, NULL,
 		  "raw counts, not in the channel's unit" },
-		{ "json", 0, ARGS_FLAG, &watch.is_json, NULL, "a JSON object a sample" },
+		{ "json", 0, args_flag, &watch.is_json, NULL, "a JSON object a sample" },
 	};
 	enum exit_code result;
 
@@ -330,7 +331,7 @@ enum exit_code verb_watch(struct cli *cli, int argc, char **argv)
 		.operands_min = 1,
 		.operands_max = INT_MAX,
 	};
-	if (args_parse(cli, &watch.args, argc, argv, &result) == ARGS_DONE) {
+	if (!cli_parse(cli, &watch.args, argc, argv, &result)) {
 		return result;
 	}
 	if (watch.is_plot && watch.is_json) {

@@ -250,9 +250,9 @@ def test_a_second_recorder_is_refused_in_one_line(bench: Bench) -> None:
 @pytest.mark.parametrize(
     ("options", "code", "why"),
     [
-        (["--loud"], 2, "no such option"),
-        (["--dir"], 2, "needs a value"),
-        (["somewhere"], 2, "takes no operand"),
+        (["--loud"], 2, "--loud: unknown option"),
+        (["--dir"], 2, "--dir: missing value"),
+        (["somewhere"], 2, "somewhere: unexpected argument"),
         (["--set", "record.compression=99"], 3, "record.compression"),
         (["--set", "record.nothing=1"], 3, "record.nothing"),
         (["--config", "/nowhere/ecdaq.yaml"], 3, "/nowhere/ecdaq.yaml"),

@@ -36,7 +36,7 @@ def test_a_store_is_made_filled_and_looked_at(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        ([], 2, "wants"),
+        ([], 2, "missing init|"),
         (["open"], 2, "open: wants init, add-appliance, add-subscriber, add-commander or check"),
         (["init", "twice"], 2, "init: wants no word"),
         (["add-commander"], 2, "add-commander: wants NAME"),

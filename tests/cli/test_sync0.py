@@ -153,11 +153,11 @@ def test_an_empty_or_foreign_file_is_refused_in_one_line(tmp_path: Path) -> None
 
 def test_mistakes_on_the_command_line_are_one_line(tmp_path: Path) -> None:
     one_line(check("--nonsense"), USAGE, "--nonsense")
-    one_line(check("word"), USAGE, "takes no operand")
-    one_line(check("--replay"), USAGE, "needs a value")
-    one_line(check("--json"), USAGE, "--json is for --replay")
-    one_line(check("--replay", "x", "--dump", "y"), USAGE, "--dump does not go with")
-    one_line(check("--calibrate", "--edges", "y"), USAGE, "--edges does not go with")
+    one_line(check("word"), USAGE, "word: unexpected argument")
+    one_line(check("--replay"), USAGE, "--replay: missing value")
+    one_line(check("--json"), USAGE, "--json: requires --replay")
+    one_line(check("--replay", "x", "--dump", "y"), USAGE, "--dump: cannot be combined with")
+    one_line(check("--calibrate", "--edges", "y"), USAGE, "--edges: cannot be combined with")
     same = ["--set", "slaves[0].sync0_line=A", "--set", "slaves[1].sync0_line=A"]
     one_line(check(*same), CONFIG, "sync0_line: is that of slave 0 already")
     one_line(check("--set", "sync0.windw=1s"), CONFIG, "sync0.window")

@@ -83,7 +83,7 @@ FOREIGN_HEADERS: list[tuple[str, set[str]]] = [
 ]
 
 # Programs talk to a person; what is not matched here is library code.
-PROGRAM = r"^app/(?:cli|master/daemon|services|sim|examples)/|_main\.c$"
+PROGRAM = r"^app/(?:cli|core/program|master/daemon|services|sim|examples)/|_main\.c$"
 # Calls, what to use instead, and the paths where they are all right.
 BANNED_CALLS: list[tuple[str, str, str]] = [
     (

@@ -7,12 +7,13 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "cli/args.h"
+#include "cli/cli.h"
 #include "cli/doctor/check.h"
 #include "cli/doctor/resolve.h"
 #include "cli/json.h"
 #include "cli/source.h"
 #include "cli/text.h"
+#include "program/args.h"
 
 #define CYCLE_THREAD "ecdaqd-cycle"
 
@@ -283,16 +284,16 @@ enum exit_code verb_doctor(struct cli *cli, int argc, char **argv)
 	*d = (struct doctor){ .cli = cli, .root = "" };
 
 	const struct args_option options[] = {
-		{ "interface", 0, ARGS_TEXT, &d->nic, "NIC",
+		{ "interface", 0, args_text, &d->nic, "NIC",
 		  "the EtherCAT port, if not as configured" },
-		{ "strict", 0, ARGS_FLAG, &d->is_strict, NULL, "a WARN fails, too" },
-		{ "root", 0, ARGS_TEXT, &d->root, "DIR",
+		{ "strict", 0, args_flag, &d->is_strict, NULL, "a WARN fails, too" },
+		{ "root", 0, args_text, &d->root, "DIR",
 		  "judge the copy of another machine's files in DIR" },
-		{ "json", 0, ARGS_FLAG, &d->is_json, NULL, "all of it as a JSON object" },
+		{ "json", 0, args_flag, &d->is_json, NULL, "all of it as a JSON object" },
 	};
 	struct args args = { .options = options, .option_count = 4 };
 
-	if (args_parse(cli, &args, argc, argv, &result) == ARGS_GO) {
+	if (cli_parse(cli, &args, argc, argv, &result)) {
 		result = run(d);
 	}
 	free(d);

@@ -116,6 +116,9 @@ static int check_dds(const struct config *cfg, const struct option_lines *lines,
 		return 0;
 	}
 	*ret_line = line_of(lines, *ret_key);
+	if (*ret_line == 0 && cfg->dds_interface[0] == '\0') {
+		*ret_line = line_of(lines, "dds.enable");
+	}
 	snprintf(why, OPTION_WHY_BYTES, "%s", fault);
 	return -EINVAL;
 }

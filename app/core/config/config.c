@@ -7,21 +7,6 @@
 #include <string.h>
 #include <unistd.h>
 
-int config_assemble(const char *path, const char *const *set, size_t set_count, struct config *cfg,
-		    char *error, size_t error_bytes)
-{
-	int r = 0;
-
-	config_defaults(cfg);
-	if (path != NULL) {
-		r = config_load(path, cfg, error, error_bytes);
-	}
-	for (size_t i = 0; r == 0 && i < set_count; i++) {
-		r = config_set(cfg, set[i], error, error_bytes);
-	}
-	return r;
-}
-
 /* FB1111-Piccolo: 1 converts on command. */
 enum { MODE_INDEX = 0x8000, MODE_SUBINDEX = 1 };
 

@@ -168,7 +168,8 @@ int config_parse(const char *name, const char *text, size_t text_len, struct con
 int config_set(struct config *cfg, const char *assignment, char *error, size_t error_bytes);
 /**
  * What a command line asks for: the defaults, the file @path over them (NULL: none), then
- * @set_count assignments in order. Same errors. config_check() has not been asked for what was set.
+ * @set_count assignments in order, and only then the check that the options fit to each other. Same
+ * errors; an error of the check names the line of the file, unless the option was set over it.
  */
 int config_assemble(const char *path, const char *const *set, size_t set_count, struct config *cfg,
 		    char *error, size_t error_bytes);

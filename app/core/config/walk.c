@@ -312,15 +312,22 @@ static int read_mapping(struct walk *walk, const struct scope *scope, const yaml
 	return 0;
 }
 
-int walk_document(struct walk *walk)
+/* The line of what @assignment sets is no longer the one to blame. */
+static void forget_line(struct walk *walk, const char *assignment)
+{
+	for (size_t i = 0; i < option_count; i++) {
+		size_t len = strlen(option_table[i].name);
+
+		if (strncmp(option_table[i].name, assignment, len) == 0 && assignment[len] == '=') {
+			walk->lines.line[i] = 0;
+		}
+	}
+}
+
+static int read_root(struct walk *walk)
 {
 	const yaml_node_t *root = yaml_document_get_root_node(walk->doc);
-	const struct option *presence = option_find("bus.presence");
 	struct scope scope = { .pattern = "", .shown = "", .base = walk->cfg };
-	char why[OPTION_WHY_BYTES] = "";
-	const char *key = "";
-	int line = 0;
-	int r;
 
 	if (root == NULL || is_null(root)) {
 		return 0; /* nothing but comments */
@@ -329,15 +336,32 @@ int walk_document(struct walk *walk)
 		return walk_fail(walk, line_of(root), "",
 				 "wants sections: lines such as \"cycle:\"");
 	}
-	r = read_mapping(walk, &scope, root);
-	if (r < 0) {
-		return r;
-	}
-	if (walk->cfg->slave_count > 0 && walk->lines.line[presence - option_table] == 0) {
+	return read_mapping(walk, &scope, root);
+}
+
+int walk_document(struct walk *walk)
+{
+	const struct option *presence = option_find("bus.presence");
+	char why[OPTION_WHY_BYTES] = "";
+	const char *key = "";
+	int line = 0;
+	int r = read_root(walk);
+
+	if (r == 0 && walk->cfg->slave_count > 0 &&
+	    walk->lines.line[presence - option_table] == 0) {
 		walk->cfg->bus_presence = CONFIG_EXACT_SLAVES;
 	}
-	if (option_cross_check(walk->cfg, &walk->lines, &key, &line, why) < 0) {
-		return walk_fail(walk, line, key, why);
+	for (size_t i = 0; r == 0 && i < walk->set_count; i++) {
+		r = config_set(walk->cfg, walk->set[i], walk->error, walk->error_bytes);
+		forget_line(walk, walk->set[i]);
 	}
-	return 0;
+	if (r == 0 && option_cross_check(walk->cfg, &walk->lines, &key, &line, why) < 0) {
+		r = -EINVAL;
+		if (line > 0) {
+			walk_fail(walk, line, key, why);
+		} else {
+			snprintf(walk->error, walk->error_bytes, "%s: %s", key, why);
+		}
+	}
+	return r;
 }

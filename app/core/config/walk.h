@@ -14,11 +14,14 @@ struct walk {
 	yaml_document_t *doc;
 	struct config *cfg;
 	struct option_lines lines;
+	const char *const *set; /* assignments over the document */
+	size_t set_count;
 	char *error;
 	size_t error_bytes;
 };
 
-/** The document's options into @walk->cfg, checked. 0, or -EINVAL with the line in @walk->error. */
+/** The document's options and what is set over them into @walk->cfg, checked. 0, or -EINVAL with
+ * the line in @walk->error. */
 int walk_document(struct walk *walk);
 
 /** Put "NAME:LINE: key: why" into @walk->error. Returns -EINVAL. */

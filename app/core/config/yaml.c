@@ -57,33 +57,53 @@ static int read_documents(struct walk *walk, yaml_parser_t *parser)
 	return r;
 }
 
-int config_parse(const char *name, const char *text, size_t text_len, struct config *cfg,
-		 char *error, size_t error_bytes)
+/* What a file holds, and what is set over it. */
+struct source {
+	const char *name;
+	const char *text;
+	size_t text_len;
+	const char *const *set;
+	size_t set_count;
+};
+
+static int parse(const struct source *source, struct config *cfg, char *error, size_t error_bytes)
 {
 	struct config work;
-	struct walk walk = {
-		.name = name, .cfg = &work, .error = error, .error_bytes = error_bytes
-	};
+	struct walk walk = { .name = source->name,
+			     .cfg = &work,
+			     .set = source->set,
+			     .set_count = source->set_count,
+			     .error = error,
+			     .error_bytes = error_bytes };
 	yaml_parser_t parser;
 	int r;
 
-	if (text_len > FILE_LIMIT_BYTES) {
+	if (source->text_len > FILE_LIMIT_BYTES) {
 		walk_fail(&walk, 1, "", "larger than 1 MiB");
 		return -E2BIG;
 	}
 	config_defaults(&work);
-	snprintf(work.path, sizeof(work.path), "%s", name);
+	snprintf(work.path, sizeof(work.path), "%s", source->name);
 	if (!yaml_parser_initialize(&parser)) {
 		walk_fail(&walk, 0, "", "out of memory");
 		return -ENOMEM;
 	}
-	yaml_parser_set_input_string(&parser, (const unsigned char *)text, text_len);
+	yaml_parser_set_input_string(&parser, (const unsigned char *)source->text,
+				     source->text_len);
 	r = read_documents(&walk, &parser);
 	yaml_parser_delete(&parser);
 	if (r == 0) {
 		*cfg = work;
 	}
 	return r;
+}
+
+int config_parse(const char *name, const char *text, size_t text_len, struct config *cfg,
+		 char *error, size_t error_bytes)
+{
+	const struct source source = { .name = name, .text = text, .text_len = text_len };
+
+	return parse(&source, cfg, error, error_bytes);
 }
 
 /* All of @fd, at most one byte more than allowed. Length or -errno. */
@@ -108,10 +128,12 @@ static ssize_t read_all(int fd, char *buf, size_t capacity)
 	return (ssize_t)len;
 }
 
-int config_load(const char *path, struct config *cfg, char *error, size_t error_bytes)
+static int load(const char *path, const char *const *set, size_t set_count, struct config *cfg,
+		char *error, size_t error_bytes)
 {
 	static char text[FILE_LIMIT_BYTES + 1]; /* a program reads its file once, before its threads
 						 */
+	struct source source;
 	ssize_t len = -1;
 	int fd = open(path, O_RDONLY | O_CLOEXEC);
 	int r = fd < 0 ? -errno : 0;
@@ -126,5 +148,30 @@ int config_load(const char *path, struct config *cfg, char *error, size_t error_
 			 strerror(-r));
 		return r;
 	}
-	return config_parse(path, text, (size_t)len, cfg, error, error_bytes);
+	source = (struct source){ .name = path,
+				  .text = text,
+				  .text_len = (size_t)len,
+				  .set = set,
+				  .set_count = set_count };
+	return parse(&source, cfg, error, error_bytes);
+}
+
+int config_load(const char *path, struct config *cfg, char *error, size_t error_bytes)
+{
+	return load(path, NULL, 0, cfg, error, error_bytes);
+}
+
+int config_assemble(const char *path, const char *const *set, size_t set_count, struct config *cfg,
+		    char *error, size_t error_bytes)
+{
+	int r = 0;
+
+	if (path != NULL) {
+		return load(path, set, set_count, cfg, error, error_bytes);
+	}
+	config_defaults(cfg);
+	for (size_t i = 0; r == 0 && i < set_count; i++) {
+		r = config_set(cfg, set[i], error, error_bytes);
+	}
+	return r < 0 ? r : config_check(cfg, error, error_bytes);
 }

@@ -6,11 +6,18 @@
 
 #include "config/config.h"
 #include "daemon/notify.h"
-#include "daemon/options.h"
 #include "daemon/realtime.h"
 #include "daemon/session.h"
 #include "daemon/supervisor.h"
 #include "link/packet_socket.h"
+
+/* What the command line asks for beside the configuration. */
+struct options {
+	uint64_t cycles;  /* stop after so many in OP; 0: no limit */
+	uint64_t seconds; /* the same in seconds */
+	int can_wait;     /* retry while there is no slave or no link */
+	int is_simulated;
+};
 
 struct program {
 	struct options options;

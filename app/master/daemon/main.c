@@ -8,22 +8,21 @@
 #include <unistd.h>
 
 #include "daemon/machine.h"
+#include "program/command_line.h"
+#include "program/error.h"
+#include "program/stop.h"
 
 /* How long the service loop sleeps when nothing presses. */
 #define SERVICE_PERIOD_MS 20
 #define BACK_OFF_MIN_NS (250 * NS_PER_MS)
 #define BACK_OFF_MAX_NS (5 * NS_PER_S)
 
-static _Atomic int signals_taken;
 static struct session *_Atomic signalled;
 
-static void on_signal(int number)
+static void stop_session(void)
 {
 	struct session *session = atomic_load(&signalled);
 
-	if (atomic_fetch_add(&signals_taken, 1) > 0) {
-		_exit(128 + number);
-	}
 	if (session != NULL) {
 		session_stop_ask(session);
 	}
@@ -33,14 +32,11 @@ static void on_signal(int number)
 
 static void catch_signals(void)
 {
-	struct sigaction action = { .sa_handler = on_signal };
+	struct sigaction ignore = { .sa_handler = SIG_IGN };
 
-	sigfillset(&action.sa_mask);
-	sigaction(SIGTERM, &action, NULL);
-	sigaction(SIGINT, &action, NULL);
-	action.sa_handler = SIG_IGN;
-	sigaction(SIGPIPE, &action, NULL);
-	sigaction(SIGHUP, &action, NULL);
+	stop_catch(STOP_REPEAT_EXITS, stop_session);
+	sigaction(SIGPIPE, &ignore, NULL);
+	sigaction(SIGHUP, &ignore, NULL);
 }
 
 /* --- the bus, again and again --- */
@@ -82,8 +78,8 @@ static int is_time_over(const struct program *pg)
 	if (pg->options.cycles > 0 && cycles_in_op(pg) >= pg->options.cycles) {
 		return 1;
 	}
-	return pg->options.seconds > 0 &&
-	       mono_sub(machine_now(), pg->op_since).ns >= (int64_t)pg->options.seconds * NS_PER_S;
+	return pg->options.seconds > 0 && (uint64_t)(mono_sub(machine_now(), pg->op_since).ns /
+						     NS_PER_S) >= pg->options.seconds;
 }
 
 static void sleep_a_pass(const struct program *pg)
@@ -112,7 +108,7 @@ static int serve(struct program *pg, struct failure *failure)
 	return r;
 }
 
-/* Nothing is up: let @span pass, answering the admin socket. 1 if told to stop. */
+/* Link down: wait for @span_ns while serving the admin socket. Returns 1 on a stop request. */
 static int idle(struct program *pg, int64_t span_ns)
 {
 	mono_t until = mono_add(machine_now(), (span_t){ span_ns });
@@ -146,7 +142,7 @@ static int bring_up(struct program *pg, struct failure *failure)
 		notify_send(&pg->notify, "STATUS=waiting: %s", failure->text);
 		if (idle(pg, back_off_ns)) {
 			return failure_set(failure, EXIT_CODE_OK, -ECANCELED,
-					   "bring-up: told to stop before OP was reached");
+					   "bring-up: stopped before OP was reached");
 		}
 		back_off_ns = back_off_ns * 2 > BACK_OFF_MAX_NS ? BACK_OFF_MAX_NS : back_off_ns * 2;
 	}
@@ -208,7 +204,7 @@ static void summarize(const struct program *pg)
 
 static int fail(const struct failure *failure)
 {
-	fprintf(stderr, "ecdaqd: %s\n", failure->text);
+	error_print("ecdaqd", "%s", failure->text);
 	return (int)failure->code;
 }
 
@@ -216,8 +212,8 @@ static int run_session(struct program *pg, struct failure *failure)
 {
 	int r;
 
-	/* A signal that came before there was anything to ask. */
-	if (atomic_load(&signals_taken) > 0) {
+	/* A signal that arrived before the session was there. */
+	if (stop_requested()) {
 		session_stop_ask(pg->session);
 	}
 	machine_open(pg);
@@ -260,30 +256,50 @@ static int run(struct program *pg)
 	return (int)failure.code;
 }
 
+static const char notes[] =
+	"SIGTERM or SIGINT: outputs to fail-safe, slaves to INIT, a summary. A second one exits "
+	"at\n"
+	"once; then the slaves' watchdogs switch the outputs to safe.\n"
+	"\n"
+	"environment: ECDAQ_RUN_DIR (run directory where none is configured), NOTIFY_SOCKET and\n"
+	"WATCHDOG_USEC (set by systemd for Type=notify)\n";
+
 int main(int argc, char **argv)
 {
 	static struct program program;
-	struct failure failure;
+	struct options *op = &program.options;
+	const char *interface = NULL;
+	const struct args_option options[] = {
+		{ "interface", 0, args_text, &interface, "NIC",
+		  "network interface of the segment (bus.interface)" },
+		{ "cycles", 0, args_count, &op->cycles, "N", "stop after N cycles in OP" },
+		{ "seconds", 0, args_count, &op->seconds, "N", "stop after N seconds in OP" },
+		{ "wait", 0, args_flag, &op->can_wait, NULL,
+		  "while there is no interface, link or slave yet: report it once and retry; "
+		  "READY=1 is "
+		  "sent when the waiting begins" },
+		{ "simulated", 0, args_flag, &op->is_simulated, NULL,
+		  "mark the segment as simulated in the status page" },
+	};
+	const struct command_line_override overrides[] = { { "bus.interface", &interface } };
+	struct command_line line = {
+		.program = "ecdaqd",
+		.summary = "The EtherCAT master: finds the slaves on one network interface, brings "
+			   "them to "
+			   "OP and\n"
+			   "exchanges process data in every cycle; samples go to a ring in the run "
+			   "directory.\n",
+		.options = options,
+		.option_count = sizeof(options) / sizeof(options[0]),
+		.overrides = overrides,
+		.override_count = 1,
+		.notes = notes,
+		.exit_codes = (EXIT_CODE_BIT(CONTROL) << 1) - 1,
+	};
+	enum exit_code code;
 
-	if (options_parse(argc, (const char *const *)argv, &program.options, &failure) < 0) {
-		return fail(&failure);
+	if (command_line_read(&line, argc, argv, &program.cfg, &code) == COMMAND_LINE_EXIT) {
+		return (int)code;
 	}
-	if (program.options.verb == OPTIONS_HELP) {
-		options_help(stdout);
-		return EXIT_CODE_OK;
-	}
-	if (program.options.verb == OPTIONS_VERSION) {
-		puts("ecdaqd " ECDAQ_VERSION);
-		return EXIT_CODE_OK;
-	}
-	if (options_apply(&program.options, &program.cfg, &failure) < 0) {
-		return fail(&failure);
-	}
-	if (program.options.verb == OPTIONS_CHECK) {
-		printf("%s: good\n", program.options.config_path != NULL
-					     ? program.options.config_path
-					     : "configuration");
-		return EXIT_CODE_OK;
-	}
-	return run(&program);
+	return line.is_check ? (int)command_line_valid(&line) : run(&program);
 }

@@ -1,33 +1,22 @@
 /* SPDX-License-Identifier: MIT */
-/* ecdaq-record: follows the sample ring of ecdaqd and records it, until it is told to stop. */
+/* ecdaq-record: follows the sample ring of ecdaqd and records it, until it is stopped. */
 #include <errno.h>
-#include <getopt.h> /* IWYU pragma: keep */
-#include <inttypes.h>
-#include <poll.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "config/config.h"
-#include "program/exit_code.h"
+#include "program/command_line.h"
+#include "program/error.h"
+#include "program/stop.h"
 #include "record/recorder.h"
 
-enum { IDLE_MS = 5, CONFIG_TEXT_BYTES = 1 << 20, ERROR_BYTES = 512, SETS = 256 };
+enum { IDLE_NS = 5000000, CONFIG_TEXT_BYTES = 1 << 20, ERROR_BYTES = 512 };
 
-struct arguments {
-	const char *config_path;
-	const char *run_dir;
-	const char *dir;
-	const char *set[SETS];
-	size_t set_count;
-	int is_once;
-	int is_help;
-	int is_version;
-};
+static const char program[] = "ecdaq-record";
 
-struct program {
+struct recording {
 	struct config cfg;
 	char ring_path[CONFIG_PATH_BYTES];
 	char events_path[CONFIG_PATH_BYTES];
@@ -36,125 +25,6 @@ struct program {
 	char status_path[CONFIG_PATH_BYTES];
 	char *config_text;
 };
-
-static volatile sig_atomic_t has_stopped;
-
-static void on_signal(int number)
-{
-	(void)number;
-	has_stopped = 1;
-}
-
-static void help(FILE *out)
-{
-	fputs("usage: ecdaq-record [OPTION...]\n"
-	      "\n"
-	      "Records every cycle of ecdaqd to MCAP files. Waits for the master, follows it "
-	      "through "
-	      "restarts,\n"
-	      "and goes on behind the last recorded cycle after it was killed itself.\n"
-	      "\n"
-	      "  --config FILE        ecdaq.yaml (default: built-in defaults)\n"
-	      "  --set OPTION=VALUE   set one option over the file, as often as needed:\n"
-	      "                       --set record.rotate_size=64MiB\n"
-	      "  --run-dir DIR        where ecdaqd has its rings (runtime.run_dir)\n"
-	      "  --dir DIR            where the recordings go (record.dir)\n"
-	      "  --once               end after the master has ended\n"
-	      "  --version            print the version\n"
-	      "  --help               this\n"
-	      "\n"
-	      "Exit codes: 0 stopped in order; 1 recording failed; 2 command line; 3 "
-	      "configuration;\n"
-	      "4 a right is missing; 6 another ecdaq-record works in the directory.\n",
-	      out);
-}
-
-static int parse_arguments(int argc, char **argv, struct arguments *a)
-{
-	static const struct option known[] = {
-		{ "config", required_argument, NULL, 'c' },
-		{ "set", required_argument, NULL, 's' },
-		{ "run-dir", required_argument, NULL, 'r' },
-		{ "dir", required_argument, NULL, 'd' },
-		{ "once", no_argument, NULL, 'o' },
-		{ "version", no_argument, NULL, 'v' },
-		{ "help", no_argument, NULL, 'h' },
-		{ NULL, 0, NULL, 0 },
-	};
-	int c;
-
-	opterr = 0;
-	while ((c = getopt_long(argc, argv, ":h", known, NULL)) != -1) {
-		switch (c) {
-		case 'c':
-			a->config_path = optarg;
-			break;
-		case 's':
-			if (a->set_count == SETS) {
-				fprintf(stderr, "ecdaq-record: --set: more than %d of them\n",
-					SETS);
-				return -EINVAL;
-			}
-			a->set[a->set_count++] = optarg;
-			break;
-		case 'r':
-			a->run_dir = optarg;
-			break;
-		case 'd':
-			a->dir = optarg;
-			break;
-		case 'o':
-			a->is_once = 1;
-			break;
-		case 'v':
-			a->is_version = 1;
-			break;
-		case 'h':
-			a->is_help = 1;
-			break;
-		default:
-			fprintf(stderr, "ecdaq-record: %s: %s (see ecdaq-record --help)\n",
-				argv[optind - 1],
-				c == ':' ? "needs a value" : "no such option, or a value too many");
-			return -EINVAL;
-		}
-	}
-	if (optind < argc) {
-		fprintf(stderr, "ecdaq-record: %s: takes no operand (see ecdaq-record --help)\n",
-			argv[optind]);
-		return -EINVAL;
-	}
-	return 0;
-}
-
-static int put_path(char *field, size_t field_bytes, const char *option, const char *value)
-{
-	if (value == NULL) {
-		return 0;
-	}
-	if (value[0] == '\0' || strlen(value) >= field_bytes) {
-		fprintf(stderr, "ecdaq-record: %s: empty or too long\n", option);
-		return -EINVAL;
-	}
-	memcpy(field, value, strlen(value) + 1);
-	return 0;
-}
-
-static int configure(const struct arguments *a, struct config *cfg)
-{
-	char error[ERROR_BYTES] = "";
-	int r = config_assemble(a->config_path, a->set, a->set_count, cfg, error, sizeof(error));
-
-	if (r == 0) {
-		r = config_check(cfg, error, sizeof(error));
-	}
-	if (r < 0) {
-		fprintf(stderr, "ecdaq-record: %s\n", error);
-		return r;
-	}
-	r = put_path(cfg->run_dir, sizeof(cfg->run_dir), "--run-dir", a->run_dir);
-	return r < 0 ? r : put_path(cfg->record_dir, sizeof(cfg->record_dir), "--dir", a->dir);
-}
 
 /* The file as it is, for the recordings. */
 static char *read_text(const char *path)
@@ -171,7 +41,7 @@ static char *read_text(const char *path)
 	return text;
 }
 
-static int find_paths(struct program *pg)
+static int find_paths(struct recording *pg)
 {
 	int r = config_run_path(&pg->cfg, CONFIG_RUN_SAMPLES, pg->ring_path, sizeof(pg->ring_path));
 
@@ -188,7 +58,7 @@ static int find_paths(struct program *pg)
 		  : config_run_path(&pg->cfg, CONFIG_RUN_SYNC0_EVENTS, pg->sync0_events_path,
 				    sizeof(pg->sync0_events_path));
 	if (r < 0) {
-		fprintf(stderr, "ecdaq-record: run directory: %s\n", strerror(-r));
+		error_print(program, "run directory: %s", strerror(-r));
 	}
 	return r;
 }
@@ -196,10 +66,10 @@ static int find_paths(struct program *pg)
 static void report(void *ctx, const char *line)
 {
 	(void)ctx;
-	fprintf(stderr, "ecdaq-record: %s\n", line);
+	error_print(program, "%s", line);
 }
 
-static struct recorder_options recorder_options(const struct program *pg)
+static struct recorder_options recorder_options(const struct recording *pg)
 {
 	const struct config *cfg = &pg->cfg;
 
@@ -227,81 +97,93 @@ static struct recorder_options recorder_options(const struct program *pg)
 
 static int run(struct recorder *rec, int is_once)
 {
-	struct sigaction action = { .sa_handler = on_signal };
-	sigset_t stops;
-	sigset_t others;
 	int r;
 
-	/* Blocked but for the wait below, so that none is missed between the question and the wait.
-	 */
-	sigemptyset(&stops);
-	sigaddset(&stops, SIGTERM);
-	sigaddset(&stops, SIGINT);
-	sigprocmask(SIG_BLOCK, &stops, &others);
-	sigaction(SIGTERM, &action, NULL);
-	sigaction(SIGINT, &action, NULL);
-	while (!has_stopped) {
+	stop_catch(STOP_REPEAT_IGNORED, NULL);
+	stop_block();
+	while (!stop_requested()) {
 		enum recorder_result result = recorder_step(rec);
-		struct timespec wait = { .tv_nsec =
-						 result == RECORDER_IDLE ? IDLE_MS * 1000000L : 0 };
 
 		if (result == RECORDER_ENDED && is_once) {
 			break;
 		}
-		ppoll(NULL, 0, &wait, &others);
+		stop_wait(result == RECORDER_IDLE ? IDLE_NS : 0);
 	}
 	r = recorder_finish(rec);
 	if (r < 0) {
-		fprintf(stderr, "ecdaq-record: %s: not finished: %s; the next start mends it\n",
-			recorder_status(rec)->path, strerror(-r));
+		error_print(program, "%s: left incomplete: %s; repaired at next start",
+			    recorder_status(rec)->path, strerror(-r));
 	}
 	return r;
 }
 
-static int exit_status(int error)
+static enum exit_code code_of(int error)
 {
 	return error == -EBUSY                                          ? EXIT_CODE_BUSY
 	       : error == -EACCES || error == -EPERM || error == -EROFS ? EXIT_CODE_PERMISSION
 									: EXIT_CODE_FAILED;
 }
 
-int main(int argc, char **argv)
+static enum exit_code record(struct recording *pg, int is_once)
 {
-	static struct program pg;
-	struct arguments arguments = { .config_path = NULL };
 	struct recorder_options options;
 	struct recorder *rec;
 	char error[ERROR_BYTES];
 	int r;
 
-	if (parse_arguments(argc, argv, &arguments) < 0) {
-		return EXIT_CODE_USAGE;
+	pg->config_text = read_text(pg->cfg.path);
+	if (pg->config_text == NULL) {
+		error_print(program, "%s", strerror(ENOMEM));
+		return EXIT_CODE_FAILED;
 	}
-	if (arguments.is_help || arguments.is_version) {
-		arguments.is_help ? help(stdout) : (void)puts("ecdaq-record " ECDAQ_VERSION);
-		return EXIT_CODE_OK;
+	options = recorder_options(pg);
+	r = recorder_create(&options, &rec, error, sizeof(error));
+	if (r < 0) {
+		error_print(program, "%s", error);
+		free(pg->config_text);
+		return code_of(r);
 	}
-	if (configure(&arguments, &pg.cfg) < 0 || find_paths(&pg) < 0) {
+	r = run(rec, is_once);
+	recorder_destroy(rec);
+	free(pg->config_text);
+	return r < 0 ? EXIT_CODE_FAILED : EXIT_CODE_OK;
+}
+
+int main(int argc, char **argv)
+{
+	static struct recording pg;
+	const char *dir = NULL;
+	int is_once = 0;
+	const struct args_option options[] = {
+		{ "dir", 0, args_text, &dir, "DIR", "directory of the recordings (record.dir)" },
+		{ "once", 0, args_flag, &is_once, NULL, "exit when the master has ended" },
+	};
+	const struct command_line_override overrides[] = { { "record.dir", &dir } };
+	struct command_line line = {
+		.program = program,
+		.summary =
+			"Records every cycle of ecdaqd to MCAP files. Waits for the master, "
+			"follows it "
+			"through\n"
+			"restarts, and continues after the last recorded cycle when it was killed "
+			"itself.\n",
+		.options = options,
+		.option_count = 2,
+		.overrides = overrides,
+		.override_count = 1,
+		.exit_codes = EXIT_CODE_COMMON | EXIT_CODE_BIT(CONFIG) | EXIT_CODE_BIT(PERMISSION) |
+			      EXIT_CODE_BIT(BUSY) | EXIT_CODE_BIT(DISABLED),
+	};
+	enum exit_code code;
+
+	if (command_line_read(&line, argc, argv, &pg.cfg, &code) == COMMAND_LINE_EXIT) {
+		return (int)code;
+	}
+	if (find_paths(&pg) < 0) {
 		return EXIT_CODE_CONFIG;
 	}
 	if (!pg.cfg.record_enable) {
-		fputs("ecdaq-record: record.enable is off, there is nothing to do\n", stderr);
-		return EXIT_CODE_OK;
+		return (int)command_line_disabled(&line, "record.enable");
 	}
-	pg.config_text = read_text(pg.cfg.path);
-	if (pg.config_text == NULL) {
-		fprintf(stderr, "ecdaq-record: %s\n", strerror(ENOMEM));
-		return EXIT_CODE_FAILED;
-	}
-	options = recorder_options(&pg);
-	r = recorder_create(&options, &rec, error, sizeof(error));
-	if (r < 0) {
-		fprintf(stderr, "ecdaq-record: %s\n", error);
-		free(pg.config_text);
-		return exit_status(r);
-	}
-	r = run(rec, arguments.is_once);
-	recorder_destroy(rec);
-	free(pg.config_text);
-	return r < 0 ? EXIT_CODE_FAILED : EXIT_CODE_OK;
+	return (int)(line.is_check ? command_line_valid(&line) : record(&pg, is_once));
 }

@@ -1,200 +1,47 @@
 /* SPDX-License-Identifier: MIT */
-/* ecdaq-sync0: checks the SYNC0 pulses of the slaves on GPIO lines, until it is told to stop. */
+/* ecdaq-sync0: checks the SYNC0 pulses of the slaves on GPIO lines, until it is stopped. */
 #include <errno.h>
-#include <getopt.h> /* IWYU pragma: keep */
 #include <sched.h>
-#include <signal.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "config/config.h"
-#include "program/exit_code.h"
+#include "program/command_line.h"
+#include "program/error.h"
+#include "program/stop.h"
 #include "sync0/listen.h"
 #include "sync0/replay.h"
 #include "sync0/watch.h"
 
-enum { ERROR_BYTES = 512, SETS = 256 };
+enum { ERROR_BYTES = 512 };
+
+static const char program[] = "ecdaq-sync0";
 
 struct arguments {
-	const char *config_path;
-	const char *run_dir;
 	const char *edges;
 	const char *replay;
 	const char *dump;
 	const char *dev_dir;
-	const char *set[SETS];
-	size_t set_count;
 	int is_calibrate;
 	int is_json;
-	int is_help;
-	int is_version;
 };
 
-static volatile sig_atomic_t has_stopped;
-
-static void on_signal(int number)
+/* 1 if the options exclude each other: reported. */
+static int is_conflict(const struct arguments *a)
 {
-	(void)number;
-	has_stopped = 1;
-}
-
-static const char help_text[] =
-	"usage: ecdaq-sync0 [OPTION...]\n"
-	"\n"
-	"Checks the SYNC0 pulses of the slaves, wired to GPIO lines (slaves[].sync0_line), "
-	"against\n"
-	"the cycles of ecdaqd. Waits for the master and follows it through restarts.\n"
-	"\n"
-	"  --config FILE        ecdaq.yaml (default: built-in defaults)\n"
-	"  --set OPTION=VALUE   set one option over the file, as often as needed\n"
-	"  --run-dir DIR        where ecdaqd has its rings (runtime.run_dir)\n"
-	"  --edges FILE         follow the edge file of ecdaq-sim instead of lines (sync0.edges);\n"
-	"                       results are marked \"simulated edges\"\n"
-	"  --dump FILE          write every edge and cycle to FILE, for --replay\n"
-	"  --replay FILE        analyse recorded edges, print what is found and end\n"
-	"  --calibrate          the same signal is on the first two lines: measure the noise of "
-	"this\n"
-	"                       board, store it in sync0.calibration and end; with --replay, from\n"
-	"                       the first two slaves of the file\n"
-	"  --json               with --replay: one JSON object a line\n"
-	"  --version            print the version\n"
-	"  --help               this\n"
-	"\n"
-	"Exit codes: 0 stopped in order, or nothing bad in the file; 1 failed; 2 command line;\n"
-	"3 configuration; 4 a right is missing; 5 a check failed in the file; 6 a line is in "
-	"use,\n"
-	"or another ecdaq-sync0 runs here.\n";
-
-static int take_option(struct arguments *a, int c)
-{
-	switch (c) {
-	case 'c':
-		a->config_path = optarg;
-		return 0;
-	case 's':
-		if (a->set_count == SETS) {
-			fprintf(stderr, "ecdaq-sync0: --set: more than %d of them\n", SETS);
-			return -EINVAL;
-		}
-		a->set[a->set_count++] = optarg;
-		return 0;
-	case 'r':
-		a->run_dir = optarg;
-		return 0;
-	case 'e':
-		a->edges = optarg;
-		return 0;
-	case 'd':
-		a->dump = optarg;
-		return 0;
-	case 'p':
-		a->replay = optarg;
-		return 0;
-	case 'D':
-		a->dev_dir = optarg;
-		return 0;
-	case 'k':
-		a->is_calibrate = 1;
-		return 0;
-	case 'j':
-		a->is_json = 1;
-		return 0;
-	case 'v':
-		a->is_version = 1;
-		return 0;
-	case 'h':
-		a->is_help = 1;
-		return 0;
-	default:
-		return -ENOENT;
-	}
-}
-
-static int parse_arguments(int argc, char **argv, struct arguments *a)
-{
-	static const struct option known[] = {
-		{ "config", required_argument, NULL, 'c' },
-		{ "set", required_argument, NULL, 's' },
-		{ "run-dir", required_argument, NULL, 'r' },
-		{ "edges", required_argument, NULL, 'e' },
-		{ "dump", required_argument, NULL, 'd' },
-		{ "replay", required_argument, NULL, 'p' },
-		{ "dev-dir", required_argument, NULL, 'D' }, /* for tests */
-		{ "calibrate", no_argument, NULL, 'k' },
-		{ "json", no_argument, NULL, 'j' },
-		{ "version", no_argument, NULL, 'v' },
-		{ "help", no_argument, NULL, 'h' },
-		{ NULL, 0, NULL, 0 },
-	};
-	int c;
-
-	opterr = 0;
-	while ((c = getopt_long(argc, argv, ":h", known, NULL)) != -1) {
-		int r = take_option(a, c);
-
-		if (r == -ENOENT) {
-			fprintf(stderr, "ecdaq-sync0: %s: %s (see ecdaq-sync0 --help)\n",
-				argv[optind - 1],
-				c == ':' ? "needs a value" : "no such option, or a value too many");
-		}
-		if (r < 0) {
-			return r;
-		}
-	}
-	if (optind < argc) {
-		fprintf(stderr, "ecdaq-sync0: %s: takes no operand (see ecdaq-sync0 --help)\n",
-			argv[optind]);
-		return -EINVAL;
-	}
-	return 0;
-}
-
-static int do_fit(const struct arguments *a)
-{
-	const char *said = NULL;
+	const char *message = NULL;
 
 	if (a->is_json && a->replay == NULL) {
-		said = "--json is for --replay (else: ecdaq sync0 --json)";
+		message = "--json: requires --replay (else: ecdaq sync0 --json)";
 	} else if (a->dump != NULL && (a->replay != NULL || a->is_calibrate)) {
-		said = "--dump does not go with --replay or --calibrate";
+		message = "--dump: cannot be combined with --replay or --calibrate";
 	} else if (a->edges != NULL && (a->replay != NULL || a->is_calibrate)) {
-		said = "--edges does not go with --replay or --calibrate";
+		message = "--edges: cannot be combined with --replay or --calibrate";
 	}
-	if (said != NULL) {
-		fprintf(stderr, "ecdaq-sync0: %s\n", said);
+	if (message != NULL) {
+		error_print(program, "%s", message);
 	}
-	return said == NULL;
-}
-
-static int put_path(char *field, size_t field_bytes, const char *option, const char *value)
-{
-	if (value == NULL) {
-		return 0;
-	}
-	if (value[0] == '\0' || strlen(value) >= field_bytes) {
-		fprintf(stderr, "ecdaq-sync0: %s: empty or too long\n", option);
-		return -EINVAL;
-	}
-	memcpy(field, value, strlen(value) + 1);
-	return 0;
-}
-
-static int configure(const struct arguments *a, struct config *cfg)
-{
-	char error[ERROR_BYTES] = "";
-	int r = config_assemble(a->config_path, a->set, a->set_count, cfg, error, sizeof(error));
-
-	if (r == 0) {
-		r = config_check(cfg, error, sizeof(error));
-	}
-	if (r < 0) {
-		fprintf(stderr, "ecdaq-sync0: %s\n", error);
-		return r;
-	}
-	r = put_path(cfg->run_dir, sizeof(cfg->run_dir), "--run-dir", a->run_dir);
-	return r < 0 ? r
-		     : put_path(cfg->sync0_edges, sizeof(cfg->sync0_edges), "--edges", a->edges);
+	return message != NULL;
 }
 
 /* Its own core, or any but the cycle's: the check must never be in the way of what it checks. */
@@ -214,18 +61,18 @@ static void choose_core(const struct config *cfg)
 		return;
 	}
 	if (sched_setaffinity(0, sizeof(set), &set) < 0) {
-		fprintf(stderr, "ecdaq-sync0: sync0.cpu: %s\n", strerror(errno));
+		error_print(program, "sync0.cpu: %s", strerror(errno));
 	}
 }
 
-static int exit_status(int error)
+static enum exit_code code_of(int error)
 {
 	return error == -EACCES || error == -EPERM ? EXIT_CODE_PERMISSION
 	       : error == -EBUSY                   ? EXIT_CODE_BUSY
 						   : EXIT_CODE_FAILED;
 }
 
-static int run_replay(const struct arguments *a, const struct config *cfg)
+static enum exit_code run_replay(const struct arguments *a, const struct config *cfg)
 {
 	const struct replay_spec spec = {
 		.cfg = cfg,
@@ -243,33 +90,26 @@ static int run_replay(const struct arguments *a, const struct config *cfg)
 		snprintf(why, sizeof(why), "standard output: %s", strerror(-r));
 	}
 	if (r < 0) {
-		fprintf(stderr, "ecdaq-sync0: %s\n", why);
-		return exit_status(r);
+		error_print(program, "%s", why);
+		return code_of(r);
 	}
 	return outcome == REPLAY_BAD ? EXIT_CODE_CHECK_FAILED : EXIT_CODE_OK;
 }
 
-static void take_signals(void)
-{
-	struct sigaction action = { .sa_handler = on_signal };
-
-	sigaction(SIGTERM, &action, NULL);
-	sigaction(SIGINT, &action, NULL);
-}
-
-static int run_calibration(const struct config *cfg, const char *dev_dir)
+static enum exit_code run_calibration(const struct config *cfg, const char *dev_dir)
 {
 	char why[ERROR_BYTES] = "";
-	int r = listen_calibrate(cfg, dev_dir, &has_stopped, stdout, why);
+	int r = listen_calibrate(cfg, dev_dir, stop_flag(), stdout, why);
 
 	if (r < 0) {
-		fprintf(stderr, "ecdaq-sync0: %s\n", why);
-		return exit_status(r);
+		error_print(program, "%s", why);
+		return code_of(r);
 	}
 	return EXIT_CODE_OK;
 }
 
-static int run_watch(const struct arguments *a, const struct config *cfg, const char *dev_dir)
+static enum exit_code run_watch(const struct arguments *a, const struct config *cfg,
+				const char *dev_dir)
 {
 	struct watch_spec spec = { .cfg = cfg, .dev_dir = dev_dir, .platform = platform_posix() };
 	char why[WATCH_WHY_BYTES] = "";
@@ -279,22 +119,22 @@ static int run_watch(const struct arguments *a, const struct config *cfg, const 
 	if (a->dump != NULL) {
 		spec.dump = fopen(a->dump, "we");
 		if (spec.dump == NULL) {
-			fprintf(stderr, "ecdaq-sync0: --dump: %s: %s\n", a->dump, strerror(errno));
-			return exit_status(-errno);
+			error_print(program, "--dump: %s: %s", a->dump, strerror(errno));
+			return code_of(-errno);
 		}
 	}
 	r = watch_create(&spec, &watch, why);
 	if (r < 0) {
-		fprintf(stderr, "ecdaq-sync0: %s\n", why);
-		return r == -ENOENT ? EXIT_CODE_CONFIG : exit_status(r);
+		error_print(program, "%s", why);
+		return r == -ENOENT ? EXIT_CODE_CONFIG : code_of(r);
 	}
-	while (!has_stopped) {
+	while (!stop_requested()) {
 		watch_step(watch);
 	}
 	watch_finish(watch);
 	watch_destroy(watch);
 	if (spec.dump != NULL && fclose(spec.dump) != 0) {
-		fprintf(stderr, "ecdaq-sync0: --dump: %s: %s\n", a->dump, strerror(errno));
+		error_print(program, "--dump: %s: %s", a->dump, strerror(errno));
 		return EXIT_CODE_FAILED;
 	}
 	return EXIT_CODE_OK;
@@ -303,32 +143,59 @@ static int run_watch(const struct arguments *a, const struct config *cfg, const 
 int main(int argc, char **argv)
 {
 	static struct config cfg;
-	struct arguments arguments = { .dev_dir = "/dev" };
+	struct arguments a = { .dev_dir = "/dev" };
+	const struct args_option options[] = {
+		{ "edges", 0, args_text, &a.edges, "FILE",
+		  "follow the edge file of ecdaq-sim instead of lines (sync0.edges); results are "
+		  "marked \"simulated edges\"" },
+		{ "dump", 0, args_text, &a.dump, "FILE",
+		  "write every edge and cycle to FILE, for --replay" },
+		{ "replay", 0, args_text, &a.replay, "FILE",
+		  "analyse recorded edges, print the results and exit" },
+		{ "calibrate", 0, args_flag, &a.is_calibrate, NULL,
+		  "the same signal is on the first two lines: measure the noise of this board, "
+		  "store "
+		  "it in sync0.calibration and exit; with --replay, from the first two slaves of "
+		  "the "
+		  "file" },
+		{ "json", 0, args_flag, &a.is_json, NULL, "with --replay: one JSON object a line" },
+		{ "dev-dir", 0, args_text, &a.dev_dir, "DIR", NULL }, /* for tests */
+	};
+	const struct command_line_override overrides[] = { { "sync0.edges", &a.edges } };
+	struct command_line line = {
+		.program = program,
+		.summary =
+			"Checks the SYNC0 pulses of the slaves, wired to GPIO lines "
+			"(slaves[].sync0_line),\n"
+			"against the cycles of ecdaqd. Waits for the master and follows it through "
+			"restarts.\n",
+		.options = options,
+		.option_count = sizeof(options) / sizeof(options[0]),
+		.overrides = overrides,
+		.override_count = 1,
+		.exit_codes = EXIT_CODE_COMMON | EXIT_CODE_BIT(CONFIG) | EXIT_CODE_BIT(PERMISSION) |
+			      EXIT_CODE_BIT(BUSY) | EXIT_CODE_BIT(CHECK_FAILED) |
+			      EXIT_CODE_BIT(DISABLED),
+	};
+	enum exit_code code;
 
-	if (parse_arguments(argc, argv, &arguments) < 0) {
+	if (command_line_read(&line, argc, argv, &cfg, &code) == COMMAND_LINE_EXIT) {
+		return (int)code;
+	}
+	if (is_conflict(&a)) {
 		return EXIT_CODE_USAGE;
 	}
-	if (!do_fit(&arguments)) {
-		return EXIT_CODE_USAGE;
+	if (!cfg.sync0_enable && a.edges == NULL && a.replay == NULL && !a.is_calibrate) {
+		return (int)command_line_disabled(&line, "sync0.enable");
 	}
-	if (arguments.is_help || arguments.is_version) {
-		fputs(arguments.is_help ? help_text : "ecdaq-sync0 " ECDAQ_VERSION "\n", stdout);
-		return EXIT_CODE_OK;
+	if (line.is_check) {
+		return (int)command_line_valid(&line);
 	}
-	if (configure(&arguments, &cfg) < 0) {
-		return EXIT_CODE_CONFIG;
+	if (a.replay != NULL) {
+		return (int)run_replay(&a, &cfg);
 	}
-	if (arguments.replay != NULL) {
-		return run_replay(&arguments, &cfg);
-	}
-	take_signals();
+	stop_catch(STOP_REPEAT_IGNORED, NULL);
 	choose_core(&cfg);
-	if (arguments.is_calibrate) {
-		return run_calibration(&cfg, arguments.dev_dir);
-	}
-	if (!cfg.sync0_enable && arguments.edges == NULL) {
-		fputs("ecdaq-sync0: sync0.enable is off, there is nothing to do\n", stderr);
-		return EXIT_CODE_OK;
-	}
-	return run_watch(&arguments, &cfg, arguments.dev_dir);
+	return (int)(a.is_calibrate ? run_calibration(&cfg, a.dev_dir)
+				    : run_watch(&a, &cfg, a.dev_dir));
 }

@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: MIT */
+/* SIGTERM and SIGINT, which stop a program in order. Once in a process. */
+#ifndef PROGRAM_STOP_H
+#define PROGRAM_STOP_H
+
+#include <signal.h>
+#include <stdint.h>
+
+/* What a second signal does. */
+enum stop_repeat { STOP_REPEAT_IGNORED, STOP_REPEAT_EXITS };
+
+/**
+ * Catch both from now on; the first calls @notify (NULL: none), in the signal handler. Context:
+ * main thread, before others are started.
+ */
+void stop_catch(enum stop_repeat repeat, void (*notify)(void));
+/** Block them, but in stop_wait(): none is missed between the question and the wait. */
+void stop_block(void);
+/** 1 after one came. Context: any. */
+int stop_requested(void);
+/** The same, for calls that poll it. */
+const volatile sig_atomic_t *stop_flag(void);
+/** Wait for @wait_ns or a signal. Context: main thread. */
+void stop_wait(int64_t wait_ns);
+
+#endif
