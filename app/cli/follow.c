@@ -9,15 +9,12 @@
 enum exit_code follow_open(struct cli *cli, struct follow *ret_follow)
 {
 	struct follow follow = { .cli = cli, .idle_ns = 5 * NS_PER_MS };
-	char path[CONFIG_PATH_BYTES];
 	enum exit_code result = samples_open(cli, &follow.samples);
 
 	if (result != EXIT_CODE_OK) {
 		return result;
 	}
-	if (cli_path(cli, CONFIG_RUN_STATUS, path) == EXIT_CODE_OK) {
-		follow.page = status_open(path, STATUS_MAGIC, sizeof(*follow.page));
-	}
+	(void)source_try_status(cli, &follow.page);
 	*ret_follow = follow;
 	return EXIT_CODE_OK;
 }
@@ -30,15 +27,18 @@ void follow_close(struct follow *follow)
 }
 
 /* The ring is closed. Is its ecdaqd still there, so that another one may follow? */
-static int may_go_on(const struct follow *follow)
+static int may_go_on(struct follow *follow)
 {
+	const struct status_page *page;
 	uint32_t state;
 
-	if (follow->page == NULL || !source_is_alive(follow->page->pid)) {
+	if (source_try_status(follow->cli, &page) < 0) {
 		return 0;
 	}
-	state = atomic_load_explicit(&follow->page->bus_state, memory_order_relaxed);
-	return state != BUS_STOPPED && state != BUS_FAILED;
+	source_status_close(follow->page);
+	follow->page = page;
+	state = atomic_load_explicit(&page->bus_state, memory_order_relaxed);
+	return source_is_alive(page->pid) && state != BUS_STOPPED && state != BUS_FAILED;
 }
 
 static enum follow_news next_ring(struct follow *follow)

@@ -235,7 +235,6 @@ static void write_recorder(const struct report *report, FILE *out)
 	const struct record_status *record = report->record;
 	char written[TEXT_BYTES];
 	char left[TEXT_BYTES];
-	char text[512];
 
 	if (record == NULL) {
 		fputs("recorder   none\n", out);
@@ -249,13 +248,11 @@ static void write_recorder(const struct report *report, FILE *out)
 		GET(record->recorded_gaps), GET(record->cycles_missing), GET(record->lag_cycles),
 		text_bytes(GET(record->bytes_written), written),
 		text_bytes(GET(record->bytes_free), left));
-	status_text_get(&record->text_sequence, record->path, sizeof(record->path), text);
-	if (text[0] != '\0') {
-		fprintf(out, "           %s\n", text);
+	if (record->path[0] != '\0') {
+		fprintf(out, "           %s\n", record->path);
 	}
-	status_text_get(&record->text_sequence, record->message, sizeof(record->message), text);
-	if (text[0] != '\0') {
-		fprintf(out, "           %s\n", text);
+	if (record->message[0] != '\0') {
+		fprintf(out, "           %s\n", record->message);
 	}
 }
 
@@ -283,12 +280,10 @@ static void write_dds(const struct report *report, FILE *out)
 
 static void write_message(const struct status_page *page, FILE *out)
 {
-	char text[sizeof(page->message)];
-	char plain[sizeof(text)];
+	char plain[sizeof(page->message)];
 
-	status_text_get(&page->text_sequence, page->message, sizeof(page->message), text);
-	if (text[0] != '\0') {
-		fprintf(out, "message    %s\n", text_plain(text, plain, sizeof(plain)));
+	if (page->message[0] != '\0') {
+		fprintf(out, "message    %s\n", text_plain(page->message, plain, sizeof(plain)));
 	}
 }
 

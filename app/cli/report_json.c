@@ -83,15 +83,6 @@ static void write_degraded(struct json *js, const struct status_page *page)
 	}
 }
 
-static void write_guarded(struct json *js, const char *key, const _Atomic uint64_t *sequence,
-			  const char *field, uint32_t field_bytes)
-{
-	char text[512];
-
-	status_text_get(sequence, field, field_bytes, text);
-	json_text(js, key, text);
-}
-
 static void write_record(struct json *js, const struct report *report)
 {
 	const struct record_status *record = report->record;
@@ -103,7 +94,7 @@ static void write_record(struct json *js, const struct report *report)
 		json_null(js, "recorder");
 		return;
 	}
-	write_guarded(js, "recording", &record->text_sequence, record->path, sizeof(record->path));
+	json_text(js, "recording", record->path);
 	json_u64(js, "recorded_cycles", GET(record->recorded_cycles));
 	json_u64(js, "recorded_gaps", GET(record->recorded_gaps));
 	json_object_begin(js, "recorder");
@@ -119,8 +110,7 @@ static void write_record(struct json *js, const struct report *report)
 	json_u64(js, "bytes_written", GET(record->bytes_written));
 	json_u64(js, "bytes_free", GET(record->bytes_free));
 	json_u64(js, "files", GET(record->files));
-	write_guarded(js, "message", &record->text_sequence, record->message,
-		      sizeof(record->message));
+	json_text(js, "message", record->message);
 	json_object_end(js);
 }
 
@@ -239,7 +229,7 @@ static void write_process(struct json *js, const struct report *report)
 	json_text(js, "state", bus_state_to_str(state));
 	json_truth(js, "running", report->is_running);
 	json_u64(js, "exit_code", GET(page->exit_code));
-	write_guarded(js, "message", &page->text_sequence, page->message, sizeof(page->message));
+	json_text(js, "message", page->message);
 	snprintf(text, sizeof(text), "%.*s", (int)sizeof(page->version), page->version);
 	json_text(js, "version", text);
 	json_i64(js, "pid", page->pid);

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "image/image.h"
+#include "reader/page.h"
 
 /* Say why @path cannot be read. */
 static enum exit_code fail_open(const struct cli *cli, const char *what, const char *path, int err)
@@ -32,44 +33,60 @@ static enum exit_code fail_open(const struct cli *cli, const char *what, const c
 
 enum exit_code source_status(struct cli *cli, const struct status_page **ret_page)
 {
-	const struct status_page *page;
 	char path[CONFIG_PATH_BYTES];
 	enum exit_code result = cli_path(cli, CONFIG_RUN_STATUS, path);
+	int r;
 
 	if (result != EXIT_CODE_OK) {
 		return result;
 	}
-	page = status_open(path, STATUS_MAGIC, sizeof(*page));
-	if (page == NULL) {
-		return fail_open(cli, "status", path, errno);
+	r = source_try_status(cli, ret_page);
+	return r < 0 ? fail_open(cli, "status", path, -r) : EXIT_CODE_OK;
+}
+
+int source_try_status(struct cli *cli, const struct status_page **ret_page)
+{
+	struct status_page *page = malloc(sizeof(*page));
+	char path[CONFIG_PATH_BYTES];
+	int r = page == NULL ? -ENOMEM
+		: cli_path(cli, CONFIG_RUN_STATUS, path) != EXIT_CODE_OK
+			? -ENAMETOOLONG
+			: page_read_status(path, page);
+
+	if (r < 0) {
+		free(page);
+		return r;
 	}
 	*ret_page = page;
-	return EXIT_CODE_OK;
+	return 0;
 }
 
 const struct record_status *source_record(struct cli *cli)
 {
+	struct record_status *record = malloc(sizeof(*record));
 	char path[CONFIG_PATH_BYTES];
 
-	if (cli_path(cli, CONFIG_RUN_RECORD_STATUS, path) != EXIT_CODE_OK) {
+	if (record == NULL || cli_path(cli, CONFIG_RUN_RECORD_STATUS, path) != EXIT_CODE_OK ||
+	    page_read_record(path, record) < 0) {
+		free(record);
 		return NULL;
 	}
-	return status_open(path, RECORD_STATUS_MAGIC, sizeof(struct record_status));
+	return record;
 }
 
 void source_status_close(const struct status_page *page)
 {
-	status_unmap(page, sizeof(*page));
+	free((void *)(uintptr_t)page);
 }
 
 void source_record_close(const struct record_status *record)
 {
-	status_unmap(record, sizeof(*record));
+	free((void *)(uintptr_t)record);
 }
 
 void source_dds_close(const struct dds_status *dds)
 {
-	status_unmap(dds, sizeof(*dds));
+	free((void *)(uintptr_t)dds);
 }
 
 int source_is_alive(int64_t pid)
@@ -84,17 +101,13 @@ static int is_closed_text(const char *text, size_t len)
 
 const struct dds_status *source_dds(struct cli *cli)
 {
-	const struct dds_status *dds;
+	struct dds_status *dds = malloc(sizeof(*dds));
 	char path[CONFIG_PATH_BYTES];
 
-	if (cli_path(cli, CONFIG_RUN_DDS_STATUS, path) != EXIT_CODE_OK) {
+	if (dds == NULL || cli_path(cli, CONFIG_RUN_DDS_STATUS, path) != EXIT_CODE_OK ||
+	    page_read_dds(path, dds) < 0) {
+		free(dds);
 		return NULL;
-	}
-	dds = status_open(path, DDS_STATUS_MAGIC, sizeof(*dds));
-	if (dds != NULL && !(is_closed_text(dds->interface, sizeof(dds->interface)) &&
-			     is_closed_text(dds->tag, sizeof(dds->tag)))) {
-		source_dds_close(dds);
-		dds = NULL;
 	}
 	return dds;
 }
@@ -226,18 +239,12 @@ void samples_flags_format(uint32_t flags, char *buf, size_t buf_len)
 
 uint32_t source_slave_count(const struct status_page *page)
 {
-	uint32_t count = atomic_load_explicit(&page->slave_count, memory_order_acquire);
-
-	return count > LIMIT_SLAVES ? LIMIT_SLAVES : count;
+	return atomic_load_explicit(&page->slave_count, memory_order_relaxed);
 }
 
 struct slave_info source_slave(const struct status_page *page, uint32_t index)
 {
-	struct slave_info info = page->slave[index].info;
-
-	info.name[sizeof(info.name) - 1] = '\0';
-	info.device[sizeof(info.device) - 1] = '\0';
-	return info;
+	return page->slave[index].info;
 }
 
 enum exit_code source_find_slave(const struct cli *cli, const struct status_page *page,

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Where the reading verbs read: status pages and rings of the run directory, all mapped read-only.
- * Nothing found there is trusted: a table that does not fit into its ring is refused. What goes
- * wrong is said (cli_fail).
+ * Where the reading verbs read: status pages and rings of the run directory, by core/reader. What
+ * goes wrong is said (cli_fail).
  */
 #ifndef CLI_SOURCE_H
 #define CLI_SOURCE_H
@@ -15,8 +14,10 @@
 #include "base/status.h"
 #include "cli/cli.h"
 
-/** Map ecdaqd's status page. EXIT_CODE_OK, or the code of a failure that was said. */
+/** A copy of ecdaqd's status page. EXIT_CODE_OK, or the code of a failure that was said. */
 enum exit_code source_status(struct cli *cli, const struct status_page **ret_page);
+/** The same without a message; 0 or -errno. */
+int source_try_status(struct cli *cli, const struct status_page **ret_page);
 /** The recorder's page, or NULL: it may not have been started. Nothing is said. */
 const struct record_status *source_record(struct cli *cli);
 /** The same of ecdaq-dds. */

@@ -111,9 +111,8 @@ static void write_table(const struct view *view)
 		       "below that\n",
 		       text_ns(GET(page->noise_p99_ns), noise));
 	}
-	status_text_get(&page->text_sequence, page->message, sizeof(page->message), text);
-	if (text[0] != '\0') {
-		printf("message    %s\n", text_plain(text, plain, sizeof(plain)));
+	if (page->message[0] != '\0') {
+		printf("message    %s\n", text_plain(page->message, plain, sizeof(plain)));
 	}
 	for (uint32_t i = 0; i < view->lines; i++) {
 		write_line(view, i);
@@ -213,7 +212,6 @@ static void write_line_json(struct json *js, const struct view *view, uint32_t n
 static void write_json(const struct view *view)
 {
 	const struct sync0_status *page = view->page;
-	char text[sizeof(page->message)];
 	struct json js;
 
 	json_init(&js, stdout);
@@ -230,8 +228,7 @@ static void write_json(const struct view *view)
 	} else {
 		json_i64(&js, "noise_p99_ns", GET(page->noise_p99_ns));
 	}
-	status_text_get(&page->text_sequence, page->message, sizeof(page->message), text);
-	json_text(&js, "message", text);
+	json_text(&js, "message", page->message);
 	json_array_begin(&js, "lines");
 	for (uint32_t i = 0; i < view->lines; i++) {
 		write_line_json(&js, view, i);

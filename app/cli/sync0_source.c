@@ -2,72 +2,63 @@
 #include "cli/sync0_source.h"
 
 #include <errno.h>
+#include <stdint.h>
+#include <stdlib.h>
 #include <string.h>
 
-#include "base/status.h"
+#include "reader/page.h"
 
-static int are_texts_closed(const struct sync0_status *page)
+static int read_page(struct cli *cli, const struct sync0_status **ret_page)
 {
-	for (size_t i = 0; i < LIMIT_SLAVES; i++) {
-		const struct sync0_line_status *ls = &page->line[i];
+	struct sync0_status *page = malloc(sizeof(*page));
+	char path[CONFIG_PATH_BYTES];
+	int r = page == NULL ? -ENOMEM
+		: cli_path(cli, CONFIG_RUN_SYNC0_STATUS, path) != EXIT_CODE_OK
+			? -ENAMETOOLONG
+			: page_read_sync0(path, page);
 
-		if (memchr(ls->slave, 0, sizeof(ls->slave)) == NULL ||
-		    memchr(ls->line, 0, sizeof(ls->line)) == NULL) {
-			return 0;
-		}
+	if (r < 0) {
+		free(page);
+		return r;
 	}
-	return 1;
-}
-
-static const struct sync0_status *open_page(const char *path)
-{
-	const struct sync0_status *page = status_open(path, SYNC0_STATUS_MAGIC, sizeof(*page));
-
-	if (page != NULL && !are_texts_closed(page)) {
-		sync0_source_close(page);
-		errno = EPROTO;
-		return NULL;
-	}
-	return page;
+	*ret_page = page;
+	return 0;
 }
 
 enum exit_code sync0_source_open(struct cli *cli, const struct sync0_status **ret_page)
 {
 	char path[CONFIG_PATH_BYTES];
 	enum exit_code result = cli_path(cli, CONFIG_RUN_SYNC0_STATUS, path);
+	int r;
 
 	if (result != EXIT_CODE_OK) {
 		return result;
 	}
-	*ret_page = open_page(path);
-	if (*ret_page != NULL) {
+	r = read_page(cli, ret_page);
+	if (r == 0) {
 		return EXIT_CODE_OK;
 	}
-	if (errno == ENOENT || errno == ENOTDIR) {
+	if (r == -ENOENT || r == -ENOTDIR) {
 		return cli_fail(cli, EXIT_CODE_NO_DAEMON,
 				"%s is not there: is ecdaq-sync0 running?", path);
 	}
-	return cli_fail(cli, cli_exit_of(errno), "%s: %s", path,
-			errno == EPROTO ? "is of another version of ecdaq, or damaged"
-					: strerror(errno));
+	return cli_fail(cli, cli_exit_of(-r), "%s: %s", path,
+			r == -EPROTO ? "is of another version of ecdaq, or damaged" : strerror(-r));
 }
 
 const struct sync0_status *sync0_source_try(struct cli *cli)
 {
-	char path[CONFIG_PATH_BYTES];
+	const struct sync0_status *page;
 
-	return cli_path(cli, CONFIG_RUN_SYNC0_STATUS, path) == EXIT_CODE_OK ? open_page(path)
-									    : NULL;
+	return read_page(cli, &page) == 0 ? page : NULL;
 }
 
 void sync0_source_close(const struct sync0_status *page)
 {
-	status_unmap(page, sizeof(*page));
+	free((void *)(uintptr_t)page);
 }
 
 uint32_t sync0_source_lines(const struct sync0_status *page)
 {
-	uint32_t count = atomic_load_explicit(&page->line_count, memory_order_relaxed);
-
-	return count < LIMIT_SLAVES ? count : LIMIT_SLAVES;
+	return atomic_load_explicit(&page->line_count, memory_order_relaxed);
 }

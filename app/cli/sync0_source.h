@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The status page of ecdaq-sync0, mapped read-only. */
+/* A copy of the status page of ecdaq-sync0. */
 #ifndef CLI_SYNC0_SOURCE_H
 #define CLI_SYNC0_SOURCE_H
 

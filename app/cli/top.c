@@ -33,20 +33,21 @@ struct top {
 	uint64_t lost_before;
 };
 
-/* Has another ecdaqd put its page in the place of ours? */
-static int is_replaced(struct top *top, const struct status_page *page)
+/* Read the page again. 0: it is no longer there, or is that of another ecdaqd. */
+static int refresh(struct top *top, const struct status_page **page)
 {
-	const struct status_page *other;
-	char path[CONFIG_PATH_BYTES];
-	int is_other;
+	const struct status_page *newer;
 
-	if (cli_path(top->cli, CONFIG_RUN_STATUS, path) != EXIT_CODE_OK) {
+	if (source_try_status(top->cli, &newer) < 0) {
 		return 0;
 	}
-	other = status_open(path, STATUS_MAGIC, sizeof(*other));
-	is_other = other == NULL || other->session != page->session;
-	source_status_close(other);
-	return is_other;
+	if (newer->session != (*page)->session) {
+		source_status_close(newer);
+		return 0;
+	}
+	source_status_close(*page);
+	*page = newer;
+	return 1;
 }
 
 /* How a shell in the same working directory calls this program. */
@@ -150,28 +151,28 @@ static void show(struct top *top, const struct report *report)
 	top->shown++;
 }
 
-static enum exit_code follow(struct top *top, const struct status_page *page)
+static enum exit_code follow(struct top *top, const struct status_page **page)
 {
 	const struct record_status *record;
 	struct report report;
 
-	while (!screen_is_over()) {
+	do {
 		/* The recorder may come, go and come back. */
 		record = source_record(top->cli);
-		report_gather(top->cli, page, record, &report);
+		report_gather(top->cli, *page, record, &report);
 		show(top, &report);
 		report_release(&report);
 		source_record_close(record);
-		if (!report.is_running || is_replaced(top, page) || top->shown == top->count) {
+		if (!report.is_running || top->shown == top->count) {
 			break;
 		}
 		screen_wait(top->interval_ns);
-	}
+	} while (!screen_is_over() && refresh(top, page));
 	screen_end();
 	/* What stood on the screen last is gone with it: leave it in the terminal. */
 	if (top->is_live && !screen_is_over()) {
 		record = source_record(top->cli);
-		report_gather(top->cli, page, record, &report);
+		report_gather(top->cli, *page, record, &report);
 		report_write_screen(&report, stdout);
 		report_release(&report);
 		source_record_close(record);
@@ -183,15 +184,11 @@ static enum exit_code follow(struct top *top, const struct status_page *page)
 static int is_worth_waiting(struct top *top)
 {
 	const struct status_page *page;
-	char path[CONFIG_PATH_BYTES];
 	int is_alive;
+	int r = source_try_status(top->cli, &page);
 
-	if (cli_path(top->cli, CONFIG_RUN_STATUS, path) != EXIT_CODE_OK) {
-		return 0;
-	}
-	page = status_open(path, STATUS_MAGIC, sizeof(*page));
-	if (page == NULL) {
-		return errno == ENOENT;
+	if (r < 0) {
+		return r == -ENOENT;
 	}
 	is_alive = source_is_alive(page->pid);
 	source_status_close(page);
@@ -257,7 +254,7 @@ enum exit_code verb_top(struct cli *cli, int argc, char **argv)
 		make_footer(&top);
 		screen_begin();
 	}
-	result = follow(&top, page);
+	result = follow(&top, &page);
 	source_status_close(page);
 	return result;
 }

@@ -40,26 +40,21 @@ static enum exit_code find_daemon(struct doctor *d)
 	struct target *t = &d->target;
 	int is_copy = d->root[0] != '\0';
 	const struct status_page *page;
-	char path[CONFIG_PATH_BYTES];
-	enum exit_code result;
+	int r;
 
 	if (is_copy && d->cli->run_dir == NULL) {
 		t->pid = resolve_find_daemon(&t->probe);
 		t->page_err = t->pid == 0 ? 0 : -ENOENT;
 		return EXIT_CODE_OK;
 	}
-	result = cli_path(d->cli, CONFIG_RUN_STATUS, path);
-	if (result != EXIT_CODE_OK) {
-		return result;
-	}
-	page = status_open(path, STATUS_MAGIC, sizeof(*page));
-	if (page == NULL && errno != ENOENT) {
-		t->page_err = -errno;
+	r = source_try_status(d->cli, &page);
+	if (r < 0 && r != -ENOENT) {
+		t->page_err = r;
 		t->pid = resolve_find_daemon(&t->probe);
-	} else if (page != NULL && source_is_alive(page->pid)) {
+	} else if (r == 0 && source_is_alive(page->pid)) {
 		t->page = page;
 		t->pid = page->pid;
-	} else if (page != NULL) {
+	} else if (r == 0) {
 		source_status_close(page);
 	}
 	return EXIT_CODE_OK;

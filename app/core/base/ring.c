@@ -13,6 +13,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "foreign.h"
 #include "pages.h"
 
 #define RING_MAGIC UINT64_C(0x31676e6972716463) /* "cdqring1" */
@@ -262,27 +263,6 @@ static int header_is_sane(const struct ring_header *h, uint64_t file_bytes)
 	       memchr(h->kind, 0, sizeof(h->kind)) != NULL;
 }
 
-/* All of it, or -EIO: the file has become shorter. */
-static int read_at(int fd, void *buf, size_t bytes, uint64_t offset)
-{
-	uint8_t *out = buf;
-
-	while (bytes > 0) {
-		ssize_t n = pread(fd, out, bytes, (off_t)offset);
-
-		if (n < 0 && errno == EINTR) {
-			continue;
-		}
-		if (n <= 0) {
-			return -EIO;
-		}
-		out += n;
-		offset += (uint64_t)n;
-		bytes -= (size_t)n;
-	}
-	return 0;
-}
-
 static int damaged(struct ring_reader *reader)
 {
 	reader->is_damaged = 1;
@@ -306,7 +286,7 @@ static int look_at_head(struct ring_reader *reader)
 			      offsetof(struct ring_header, head) + sizeof(now.head),
 		      "read together");
 	if (reader->is_damaged ||
-	    read_at(reader->fd, &now, sizeof(now), offsetof(struct ring_header, head)) < 0 ||
+	    foreign_read(reader->fd, &now, sizeof(now), offsetof(struct ring_header, head)) < 0 ||
 	    now.head < reader->head || now.head > HEAD_LIMIT) {
 		return damaged(reader);
 	}
@@ -322,12 +302,11 @@ static int open_file(struct ring_reader *reader)
 	struct ring_header *h = &reader->header;
 	struct stat st;
 
-	/* Not blocking: it may be a FIFO, put there by someone. */
-	reader->fd = open(reader->path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-	if (reader->fd < 0 || fstat(reader->fd, &st) < 0) {
-		return -errno;
+	reader->fd = foreign_open(reader->path, &st);
+	if (reader->fd < 0) {
+		return reader->fd;
 	}
-	if (!S_ISREG(st.st_mode) || read_at(reader->fd, h, sizeof(*h), 0) < 0 ||
+	if (foreign_read(reader->fd, h, sizeof(*h), 0) < 0 ||
 	    !header_is_sane(h, (uint64_t)st.st_size)) {
 		return -EPROTO;
 	}
@@ -342,7 +321,7 @@ static int open_file(struct ring_reader *reader)
 	if (reader->batch == NULL || reader->meta == NULL) {
 		return -ENOMEM;
 	}
-	return read_at(reader->fd, reader->meta, h->meta_bytes, h->meta_offset) < 0 ||
+	return foreign_read(reader->fd, reader->meta, h->meta_bytes, h->meta_offset) < 0 ||
 			       look_at_head(reader) < 0
 		       ? -EPROTO
 		       : 0;
@@ -396,8 +375,8 @@ static int copy_slots(struct ring_reader *reader, uint64_t sequence)
 	count = count < reader->batch_max ? count : reader->batch_max;
 	count = count < h->slot_count - place ? count : h->slot_count - place;
 	reader->batch_count = 0;
-	if (read_at(reader->fd, reader->batch, count * h->slot_bytes,
-		    h->slots_offset + place * h->slot_bytes) < 0) {
+	if (foreign_read(reader->fd, reader->batch, count * h->slot_bytes,
+			 h->slots_offset + place * h->slot_bytes) < 0) {
 		return damaged(reader);
 	}
 	atomic_thread_fence(memory_order_acquire);

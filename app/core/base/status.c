@@ -9,7 +9,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "foreign.h"
 #include "pages.h"
+
+enum { READ_TRIES = 100 };
 
 static const char *const bus_names[] = { "DOWN", "SCANNING",   "PREOP",   "SAFEOP",
 					 "OP",   "RECOVERING", "STOPPED", "FAILED" };
@@ -85,31 +88,42 @@ void *status_create(const char *path, uint64_t magic, uint32_t bytes, unsigned f
 	return map;
 }
 
-const void *status_open(const char *path, uint64_t magic, uint32_t bytes)
+/* 1: all texts of the copy are whole; 0: one was being written; -EPROTO: the file is too short. */
+static int read_once(int fd, uint32_t bytes, size_t sequence_offset, void *ret_page)
 {
-	int fd = open(path, O_RDONLY | O_CLOEXEC);
+	uint64_t before = 0;
+	uint64_t after = 0;
+	size_t n = sequence_offset == 0 ? 0 : sizeof(before);
+	int r = foreign_read(fd, &before, n, sequence_offset);
+
+	atomic_thread_fence(memory_order_acquire);
+	r = r < 0 ? r : foreign_read(fd, ret_page, bytes, 0);
+	atomic_thread_fence(memory_order_acquire);
+	r = r < 0 ? r : foreign_read(fd, &after, n, sequence_offset);
+	return r < 0 ? -EPROTO : before % 2 == 0 && before == after;
+}
+
+int status_read(const char *path, uint64_t magic, uint32_t bytes, size_t sequence_offset,
+		void *ret_page)
+{
 	struct stat st;
-	void *map = MAP_FAILED;
-	int r = EPROTO;
+	int fd = foreign_open(path, &st);
+	int r;
 
 	if (fd < 0) {
-		return NULL;
+		return fd;
 	}
-	if (fstat(fd, &st) == 0 && st.st_size == (off_t)bytes) {
-		map = mmap(NULL, bytes, PROT_READ, MAP_SHARED, fd, 0);
-		r = map == MAP_FAILED ? errno : 0;
+	r = st.st_size == (off_t)bytes ? 0 : -EPROTO;
+	/* A writer that died half way leaves the sequence odd: take what is there after a while. */
+	for (int tries = 0; r == 0 && tries < READ_TRIES; tries++) {
+		r = read_once(fd, bytes, sequence_offset, ret_page);
 	}
 	close(fd);
-	if (r == 0 && (memcmp(map, &magic, sizeof(magic)) != 0 ||
-		       memcmp((char *)map + sizeof(magic), &bytes, sizeof(bytes)) != 0)) {
-		munmap(map, bytes);
-		r = EPROTO;
+	if (r < 0 || memcmp(ret_page, &magic, sizeof(magic)) != 0 ||
+	    memcmp((char *)ret_page + sizeof(magic), &bytes, sizeof(bytes)) != 0) {
+		return -EPROTO;
 	}
-	if (r != 0) {
-		errno = r;
-		return NULL;
-	}
-	return map;
+	return 0;
 }
 
 void status_unmap(const void *page, uint32_t bytes)
@@ -130,23 +144,4 @@ void status_text_set(_Atomic uint64_t *sequence, char *field, uint32_t field_byt
 		__atomic_store_n(field + i, i < len ? text[i] : '\0', __ATOMIC_RELAXED);
 	}
 	atomic_fetch_add_explicit(sequence, 1, memory_order_release);
-}
-
-void status_text_get(const _Atomic uint64_t *sequence, const char *field, uint32_t field_bytes,
-		     char *ret_text)
-{
-	/* A writer that died half way leaves the sequence odd: take what is there after a while. */
-	for (int tries = 0; tries < 1000; tries++) {
-		uint64_t before = atomic_load_explicit(sequence, memory_order_acquire);
-
-		for (size_t i = 0; i < field_bytes; i++) {
-			ret_text[i] = __atomic_load_n(field + i, __ATOMIC_RELAXED);
-		}
-		atomic_thread_fence(memory_order_acquire);
-		if (before % 2 == 0 &&
-		    atomic_load_explicit(sequence, memory_order_relaxed) == before) {
-			break;
-		}
-	}
-	ret_text[field_bytes - 1] = '\0';
 }

@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * What ecdaqd says of itself: one page in shared memory ("status" in the run directory), written by
- * ecdaqd, mapped read-only by everyone else. So `ecdaq status` works while the daemon is busy, and
- * says the last known state after it has gone. Numbers are relaxed atomics with one writer each;
- * texts are guarded by @text_sequence (odd while being written).
+ * ecdaqd, read by everyone else (reader/page.h). So `ecdaq status` works while the daemon is busy,
+ * and says the last known state after it has gone. Numbers are relaxed atomics with one writer
+ * each; texts are guarded by @text_sequence (odd while being written).
  */
 #ifndef BASE_STATUS_H
 #define BASE_STATUS_H
 
 #include <stdatomic.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "histogram.h"
@@ -199,15 +200,17 @@ const char *control_state_to_str(uint32_t state);
  * writing; the caller fills it. NULL with errno. Unmap with status_unmap(). Context: blocking.
  */
 void *status_create(const char *path, uint64_t magic, uint32_t bytes, unsigned file_mode);
-/** Map the page at @path for reading; NULL with errno: ENOENT, EPROTO (other version). */
-const void *status_open(const char *path, uint64_t magic, uint32_t bytes);
+/**
+ * Copy the page at @path to @ret_page, which has @bytes; @sequence_offset is the place of its
+ * text_sequence, 0: it has none. 0; -ENOENT, ...; -EPROTO: another version, or too short (ret
+ * undefined). Use reader/page.h, which also checks the contents. Context: blocking.
+ */
+int status_read(const char *path, uint64_t magic, uint32_t bytes, size_t sequence_offset,
+		void *ret_page);
 void status_unmap(const void *page, uint32_t bytes);
 
 /** Write @text into a guarded text field. Context: the page's writer. */
 void status_text_set(_Atomic uint64_t *sequence, char *field, uint32_t field_bytes,
 		     const char *text);
-/** Copy a guarded text field; always ends in zero. Context: any. */
-void status_text_get(const _Atomic uint64_t *sequence, const char *field, uint32_t field_bytes,
-		     char *ret_text);
 
 #endif

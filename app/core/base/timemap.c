@@ -104,7 +104,7 @@ int64_t timemap_utc_ns(const struct timemap *map, int64_t dc_ns)
 
 int64_t timemap_tai_to_utc_ns(const struct timemap *map, int64_t tai_ns)
 {
-	return tai_ns - map->state.tai_offset_s * NS_PER_S;
+	return (tai_is_sane(tai_ns) ? tai_ns : 0) - map->state.tai_offset_s * NS_PER_S;
 }
 
 int timemap_is_ready(const struct timemap *map)

@@ -36,7 +36,8 @@ void feed_destroy(struct feed *feed);
 /**
  * Open the ring at the path if there is one: at @mark as feed_seek() has it; @mark NULL: as @start
  * of feed_create() says. An open ring that was replaced is read to its end first. Call before
- * reading. 0, or why none is open: -ENOENT, -EACCES, -EPROTO (not such a ring), ...
+ * reading. 0, or why none is open: -ENOENT, -EACCES, -EPROTO (not such a ring),
+ * -EIO (truncated or overwritten: until another takes its place).
  */
 int feed_open(struct feed *feed, const struct feed_mark *mark);
 /** Continue at @mark if it was made in this ring, else at the oldest record. */
@@ -53,8 +54,8 @@ int feed_read(struct feed *feed, void *ret_record, size_t bytes, uint64_t *ret_s
 	      uint64_t *ret_lost);
 /** Put the record just read back: it is read again. */
 void feed_unread(struct feed *feed);
-/** 1 if nothing can follow in the open ring: closed, its writer gone, or damaged. 1 if none is
- * open. */
-int feed_is_over(const struct feed *feed);
+/** After feed_read() found none: 1 if none will follow. Its writer has closed it or is gone, it is
+ * damaged, or no ring is open. */
+int feed_is_over(struct feed *feed);
 
 #endif

@@ -8,6 +8,9 @@
 #include "base/clock.h"
 #include "image/image.h"
 
+/* Far beyond any that there will be: sums of times do not overflow with it. */
+#define TAI_OFFSET_LIMIT_S 86400
+
 /* The table as it is allocated; what the const pointers of @table point to. */
 struct storage {
 	struct channel_table table;
@@ -21,7 +24,8 @@ static int head_is_consistent(const struct sample_meta *meta, size_t meta_bytes)
 	return meta->version == SAMPLE_VERSION && meta->slave_count <= LIMIT_SLAVES &&
 	       meta->channel_count <= LIMIT_CHANNELS && meta->image_bytes <= LIMIT_IMAGE_BYTES &&
 	       meta->output_bytes <= meta->image_bytes && meta->period_ns > 0 &&
-	       meta->period_ns <= (uint64_t)NS_PER_S &&
+	       meta->period_ns < (uint64_t)NS_PER_S && meta->tai_offset_s >= -TAI_OFFSET_LIMIT_S &&
+	       meta->tai_offset_s <= TAI_OFFSET_LIMIT_S &&
 	       meta_bytes >= sizeof(*meta) + meta->slave_count * sizeof(struct slave_info) +
 				     meta->channel_count * sizeof(struct channel);
 }

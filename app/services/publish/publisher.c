@@ -21,8 +21,10 @@
 #include "publish/state.h"
 #include "publish/sync0.h"
 #include "publish/topics.h"
+#include "reader/page.h"
 
 #define LOOK_NS (NS_PER_S / 10) /* for rings and pages */
+#define PAGE_NS (5 * NS_PER_MS)
 #define PENDING_POLL_NS (200 * NS_PER_US)
 enum { SAMPLES_A_STEP = 64, LOOKS_A_STATUS = 10 };
 
@@ -36,9 +38,11 @@ struct publisher {
 	struct own_status own;
 	char ring_path[CONFIG_PATH_BYTES];
 	char status_path[CONFIG_PATH_BYTES];
-	const struct status_page *page; /* NULL: none */
-	struct ring_reader *ring;       /* NULL: none */
-	struct samples *samples;        /* NULL: no master, or the ring is done with */
+	struct status_page page_copy;
+	const struct status_page *page; /* page_copy; NULL: none */
+	int64_t page_read_ns;
+	struct ring_reader *ring; /* NULL: none */
+	struct samples *samples;  /* NULL: no master, or the ring is done with */
 	struct samples_counts counts;
 	int had_ring;
 	int64_t looked_ns;
@@ -76,8 +80,8 @@ static int find_paths(struct publisher *p)
 
 static void look_at_page(struct publisher *p)
 {
-	status_unmap(p->page, sizeof(*p->page));
-	p->page = status_open(p->status_path, STATUS_MAGIC, sizeof(*p->page));
+	p->page = page_read_status(p->status_path, &p->page_copy) == 0 ? &p->page_copy : NULL;
+	p->page_read_ns = now_ns();
 }
 
 static int check_interface(struct publisher *p, char *error, size_t error_bytes)
@@ -170,7 +174,6 @@ void publisher_destroy(struct publisher *p)
 	events_close(&p->sync0_events);
 	sync0_close(&p->sync0);
 	ring_reader_destroy(p->ring);
-	status_unmap(p->page, sizeof(*p->page));
 	free(p);
 }
 
@@ -234,7 +237,6 @@ static void tell_state(struct publisher *p)
 static int look(struct publisher *p, int64_t now, char *error, size_t error_bytes)
 {
 	p->looked_ns = now;
-	look_at_page(p);
 	follow_ring(p);
 	events_follow(&p->events);
 	events_follow(&p->sync0_events);
@@ -308,6 +310,10 @@ int publisher_step(struct publisher *publisher, char *error, size_t error_bytes)
 
 	if (r < 0) {
 		return r;
+	}
+	/* Whether a command is taken depends on the bus state. */
+	if (now - p->page_read_ns >= PAGE_NS) {
+		look_at_page(p);
 	}
 	has_more = publish(p);
 	if (p->samples != NULL) {

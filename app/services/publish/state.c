@@ -179,7 +179,7 @@ void state_put_status(const struct topics *topics, const struct state_view *view
 		take_page(&m, page);
 		snprintf(dc_state, sizeof(dc_state), "%s",
 			 dc_state_to_str(u32(&page->cycle.dc_state)));
-		status_text_get(&page->text_sequence, page->message, sizeof(message), message);
+		snprintf(message, sizeof(message), "%s", page->message);
 	}
 	if (page != NULL && view->table != NULL) {
 		snprintf(state, sizeof(state), "%s", bus_state_to_str(u32(&page->bus_state)));

@@ -13,6 +13,7 @@
 
 #include "base/ring.h"
 #include "base/status.h"
+#include "reader/page.h"
 
 enum { RESULT_SLOTS = 4096, EVENT_SLOTS = 1024, FILE_MODE = 0644 };
 
@@ -108,14 +109,13 @@ static int fail(const char *path, int error, char *why)
 
 static int busy(const struct output *out, char *why)
 {
-	const struct sync0_status *page =
-		status_open(out->page_path, SYNC0_STATUS_MAGIC, sizeof(*page));
+	struct sync0_status *page = malloc(sizeof(*page));
 	char pid[32] = "";
 
-	if (page != NULL) {
+	if (page != NULL && page_read_sync0(out->page_path, page) == 0) {
 		snprintf(pid, sizeof(pid), " (pid %" PRId64 ")", page->pid);
-		status_unmap(page, sizeof(*page));
 	}
+	free(page);
 	snprintf(why, OUTPUT_WHY_BYTES, "%.170s: another ecdaq-sync0 is running here%s",
 		 out->lock_path, pid);
 	return -EBUSY;

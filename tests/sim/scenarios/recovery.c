@@ -31,13 +31,8 @@ static uint64_t wait_for_op(uint64_t limit_ms)
 
 	while (state() != BUS_OP) {
 		if (ms >= limit_ms) {
-			char text[256];
-			const struct status_page *page = session_page(vm.session);
-
-			status_text_get(&page->text_sequence, page->message, sizeof(page->message),
-					text);
 			test_fail(__FILE__, __LINE__, "not in OP after %llu ms: %s",
-				  (unsigned long long)ms, text);
+				  (unsigned long long)ms, session_page(vm.session)->message);
 		}
 		CHECK_EQ(virtual_master_run(&vm, 10), SESSION_GOES_ON);
 		ms += 10;

@@ -5,6 +5,7 @@
 #include <fcntl.h>
 #include <ftw.h>
 #include <grp.h>
+#include <stddef.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -51,7 +52,7 @@ TEST(run_dir, it_makes_a_directory_for_owner_and_group_with_page_and_ring)
 	struct failure failure;
 	struct stat st;
 	char path[512];
-	const struct status_page *page;
+	static struct status_page page;
 
 	bench_open(&b, "/dev/shm");
 	CHECK_EQ(open_home(&b, &run, &failure), 0);
@@ -61,12 +62,12 @@ TEST(run_dir, it_makes_a_directory_for_owner_and_group_with_page_and_ring)
 	CHECK_EQ(run_dir_path(&run, CONFIG_RUN_STATUS, path, sizeof(path)), 0);
 	CHECK_EQ(stat(path, &st), 0);
 	CHECK_EQ(st.st_mode & 07777, 0640);
-	page = status_open(path, STATUS_MAGIC, sizeof(*page));
-	CHECK(page != NULL);
-	CHECK_EQ(page->pid, getpid());
-	CHECK_STR(page->interface, "eth9");
-	CHECK_EQ(page->bus_state, BUS_DOWN);
-	status_unmap(page, sizeof(*page));
+	CHECK_EQ(status_read(path, STATUS_MAGIC, sizeof(page),
+			     offsetof(struct status_page, text_sequence), &page),
+		 0);
+	CHECK_EQ(page.pid, getpid());
+	CHECK_STR(page.interface, "eth9");
+	CHECK_EQ(page.bus_state, BUS_DOWN);
 	CHECK_EQ(run_dir_path(&run, CONFIG_RUN_EVENTS, path, sizeof(path)), 0);
 	CHECK_EQ(access(path, R_OK), 0);
 	run_dir_close(&run);

@@ -14,6 +14,7 @@
 #include "base/status.h"
 #include "base/sync0.h"
 #include "harness/test.h"
+#include "reader/page.h"
 #include "unit/services/sync0/fake_master.h"
 
 enum { STEP_CYCLES = 100, FOREVER = 1 << 30 };
@@ -157,12 +158,8 @@ static void run(int64_t cycles)
 static struct sync0_status *page(void)
 {
 	static struct sync0_status copy;
-	const struct sync0_status *seen =
-		status_open(path_of("sync0-status"), SYNC0_STATUS_MAGIC, sizeof(*seen));
 
-	CHECK(seen != NULL);
-	memcpy(&copy, seen, sizeof(copy));
-	status_unmap(seen, sizeof(*seen));
+	CHECK_EQ(page_read_sync0(path_of("sync0-status"), &copy), 0);
 	return &copy;
 }
 

@@ -1,0 +1,198 @@
+/* SPDX-License-Identifier: MIT */
+#include "reader/reader.h"
+
+#include <assert.h>
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/ring.h"
+
+struct reader {
+	char *path;
+	struct ring_reader *ring; /* NULL: none open */
+	struct channel_table *table;
+	int is_done; /* the open ring is not read any more: wait for another one */
+	int starts_at_newest;
+	int error; /* as reader_error() has it */
+	struct sample_header header;
+	uint8_t *payload; /* the sample read last: its header, then its image */
+};
+
+int reader_create(const char *path, enum reader_start start, struct reader **ret_reader)
+{
+	struct reader *r = calloc(1, sizeof(*r));
+
+	if (r == NULL) {
+		return -ENOMEM;
+	}
+	r->path = strdup(path);
+	r->payload = calloc(1, sizeof(struct sample_header) + LIMIT_IMAGE_BYTES);
+	r->starts_at_newest = start == READER_AT_NEWEST;
+	if (r->path == NULL || r->payload == NULL) {
+		reader_destroy(r);
+		return -ENOMEM;
+	}
+	*ret_reader = r;
+	return 0;
+}
+
+void reader_destroy(struct reader *r)
+{
+	if (r == NULL) {
+		return;
+	}
+	ring_reader_destroy(r->ring);
+	channel_table_destroy(r->table);
+	free(r->payload);
+	free(r->path);
+	free(r);
+}
+
+static int make_table(const struct ring_reader *ring, struct channel_table **ret)
+{
+	size_t bytes;
+	const void *meta = ring_meta(ring, &bytes);
+	int r;
+
+	if (strcmp(ring_kind(ring), "sample") != 0) {
+		return -EPROTO;
+	}
+	r = channel_table_create(meta, bytes, ret);
+	if (r == 0 &&
+	    ring_payload_bytes(ring) < sizeof(struct sample_header) + (*ret)->meta.image_bytes) {
+		channel_table_destroy(*ret);
+		r = -EPROTO;
+	}
+	return r;
+}
+
+/* A ring that is of no use stays open, so that it is looked at again only when it was replaced. */
+static enum reader_result begin(struct reader *r)
+{
+	struct channel_table *table = NULL;
+
+	ring_reader_destroy(r->ring);
+	r->ring = NULL;
+	r->error = ring_reader_open(r->path, &r->ring);
+	if (r->error < 0) {
+		return READER_WAITING;
+	}
+	r->error = make_table(r->ring, &table);
+	r->is_done = r->error < 0;
+	if (r->error < 0) {
+		return READER_WAITING;
+	}
+	channel_table_destroy(r->table);
+	r->table = table;
+	if (!r->starts_at_newest) {
+		ring_seek(r->ring, ring_oldest(r->ring));
+	}
+	r->starts_at_newest = 0;
+	return READER_BEGUN;
+}
+
+static enum reader_result end(struct reader *r, int error)
+{
+	r->is_done = 1;
+	r->error = error;
+	return READER_ENDED;
+}
+
+enum reader_result reader_next(struct reader *r, uint64_t *ret_lost)
+{
+	if (r->ring == NULL || (r->is_done && ring_is_replaced(r->ring))) {
+		return begin(r);
+	}
+	if (r->is_done) {
+		return READER_WAITING;
+	}
+	for (int is_last = 0;; is_last = 1) {
+		switch (ring_read(r->ring, r->payload, sizeof(r->header) + LIMIT_IMAGE_BYTES,
+				  ret_lost)) {
+		case RING_OK:
+			memcpy(&r->header, r->payload, sizeof(r->header));
+			return READER_SAMPLE;
+		case RING_LOST:
+			return READER_LOST;
+		case RING_CLOSED:
+			return end(r, 0);
+		case RING_DAMAGED:
+			return end(r, -EIO);
+		case RING_EMPTY:
+			break;
+		}
+		if (is_last) {
+			return end(r, -EPIPE);
+		}
+		if (!ring_is_replaced(r->ring) && !ring_is_orphaned(r->ring)) {
+			return READER_EMPTY;
+		}
+		/* Once more: what was pushed before the producer went is read. */
+	}
+}
+
+int reader_error(const struct reader *r)
+{
+	return r->error;
+}
+
+const char *reader_error_to_str(int error)
+{
+	return error == -EPROTO ? "not a sample ring of this version, or damaged"
+	       : error == -EIO  ? "truncated or overwritten while it was read"
+				: strerror(-error);
+}
+
+const struct channel_table *reader_table(const struct reader *r)
+{
+	return r->table;
+}
+
+const struct sample_header *reader_header(const struct reader *r)
+{
+	return &r->header;
+}
+
+const uint8_t *reader_image(const struct reader *r)
+{
+	return r->payload + sizeof(r->header);
+}
+
+int reader_read_newest(struct reader *r)
+{
+	if (r->ring == NULL || ring_peek_newest(r->ring, r->payload,
+						sizeof(r->header) + LIMIT_IMAGE_BYTES) != RING_OK) {
+		return 0;
+	}
+	memcpy(&r->header, r->payload, sizeof(r->header));
+	return 1;
+}
+
+uint64_t reader_cursor(const struct reader *r)
+{
+	return r->ring == NULL ? 0 : ring_cursor(r->ring);
+}
+
+uint64_t reader_oldest(struct reader *r)
+{
+	return r->ring == NULL ? 0 : ring_oldest(r->ring);
+}
+
+uint64_t reader_newest(struct reader *r)
+{
+	return r->ring == NULL ? 0 : ring_newest(r->ring);
+}
+
+void reader_seek(struct reader *r, uint64_t sequence)
+{
+	if (r->ring != NULL) {
+		ring_seek(r->ring, sequence);
+		r->is_done = 0;
+	}
+}
+
+void reader_skip_session(struct reader *r)
+{
+	r->is_done = 1;
+}
