@@ -18,10 +18,9 @@ It needs no privilege where the kernel grants users their own namespaces; real-t
 not to be had, and ecdaqd says so once.
 
   --seconds N     end after N seconds in OP (default: at Ctrl-C)
-  --slaves WHAT   1 to 64: so many FB1111+Piccolo slaves; or names, in order: those that ecdaq-sim
-                  has built in (fb1111_piccolo, wago_750_354, plant; ecdaq-sim --help), and those of
-                  SII images: ek1100,el2828,el2889 (default: 2)
-  --sii DIR       folder of the SII images (default: $ECDAQ_SII)
+  --slaves WHAT   1 to 64: number of FB1111+Piccolo slaves; or names, in the order of the line, of the catalogue
+                  (build/stage/bin/ecdaq-sim --list-slaves): ek1100,el2828,el3104 (default: 2)
+  --sii DIR       folder of SII images of real slaves, used instead of the catalogue (default: $ECDAQ_SII)
   --config FILE   ecdaq.yaml for ecdaqd and ecdaq-record (default: built-in defaults)
   --record DIR    where recordings go (default: build/run/record)
   --no-dds        without ecdaq-dds. Else it publishes on this machine's loopback, in a domain and with a
@@ -87,21 +86,6 @@ parse_options()
 	done
 }
 
-# Is there a name among $slaves that ecdaq-sim has not built in?
-has_images()
-{
-	local name names
-
-	IFS=, read -ra names <<< "$slaves"
-	for name in "${names[@]}"; do
-		case $name in
-		fb1111_piccolo | wago_750_354 | wago_750_354+* | plant | plant:*) ;;
-		*) return 0 ;;
-		esac
-	done
-	return 1
-}
-
 check_options()
 {
 	case $seconds in
@@ -110,7 +94,6 @@ check_options()
 	case $slaves in
 	'') die "--slaves: nothing given" ;;
 	*[!0-9]*)
-		[ -n "$sii" ] || ! has_images || die "--slaves $slaves: names need --sii DIR, the folder of their SII images"
 		[ -z "$sii" ] || [ -d "$sii" ] || die "--sii: $sii: no such folder"
 		;;
 	*)

@@ -25,7 +25,9 @@ MISTAKES = [
     (FAILED, [*NIC, "--slaves", "65"], "not 1 to 64"),
     (FAILED, [*NIC, "--slaves", ""], "nothing given"),
     (FAILED, [*NIC, "--slaves", "a/b"], "NAME,NAME"),
-    (FAILED, [*NIC, "--slaves", "ek1100"], "--sii DIR is missing"),
+    (FAILED, [*NIC, "--slaves", "el2829"], "'el2829': not in the catalogue: did you mean el2828"),
+    (FAILED, [*NIC, "--slaves", "motor"], "'motor': not in the catalogue: --list-slaves"),
+    (FAILED, [*NIC, "--slaves", "el", "--sii", "/tmp"], "'el': not in the catalogue nor in /tmp"),
     (FAILED, [*NIC, "--slaves", "plant:0"], "not plant[:TAU_MS[:GAIN]]"),
     (FAILED, [*NIC, "--slaves", "plant:50:nan"], "not plant[:TAU_MS[:GAIN]]"),
     (FAILED, [*NIC, "--slaves", "plant:50:1:"], "not plant[:TAU_MS[:GAIN]]"),
@@ -181,3 +183,17 @@ def wait_for(path: Path) -> None:
     while not path.exists():
         assert time.monotonic() < until, path
         time.sleep(0.01)
+
+
+def test_the_catalogue_page_has_the_table_that_the_program_prints() -> None:
+    result = segment("--list-slaves")
+    assert result.returncode == 0
+    assert result.stdout.count("\n| el") >= 15
+    assert result.stdout in (ROOT / "app/doc/reference/simulated-slaves.md").read_text()
+
+
+def test_a_real_image_is_used_instead_of_the_catalogue(tmp_path: Path) -> None:
+    (tmp_path / "ek1100.bin").write_bytes(b"\0" * 5)
+    result = segment(*NIC, "--sii", str(tmp_path), "--slaves", "el2828,ek1100")
+    assert result.returncode == FAILED
+    assert "ek1100.bin: no SII image: 5 bytes" in one_line(result.stderr)

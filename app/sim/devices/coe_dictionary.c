@@ -30,6 +30,7 @@ void coe_dictionary_init(struct coe_dictionary *d, const struct sii *sii, const 
 {
 	memset(d, 0, sizeof(*d));
 	d->sii = sii;
+	d->device_type = MODULAR_DEVICE;
 	memcpy(d->name, name, strnlen(name, sizeof(d->name) - 1));
 	coe_dictionary_reset(d);
 }
@@ -198,7 +199,7 @@ enum coe_abort coe_dictionary_read(const struct coe_dictionary *d, uint16_t inde
 		return COE_ABORT_NO_SUBINDEX;
 	}
 	if (index == DEVICE_TYPE) {
-		set_value(ret, MODULAR_DEVICE, 4);
+		set_value(ret, d->device_type, 4);
 		return COE_OK;
 	}
 	if (index == DEVICE_NAME) {

@@ -58,7 +58,8 @@ struct coe_dictionary {
 	const char *const *text; /* of entries, by their name number - 1; NULL: no SDO information
 				  */
 	size_t text_count;
-	uint8_t is_fixed; /* assignments can never be written */
+	uint32_t device_type; /* object 0x1000; after init: a modular device */
+	uint8_t is_fixed;     /* assignments can never be written */
 	struct coe_assignment assignment[SII_LIMIT_SM];
 	uint64_t entry_value[SII_LIMIT_ENTRIES];
 	uint8_t is_preop; /* assignments can be written */

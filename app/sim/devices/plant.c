@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "base/bytes.h"
-#include "devices/plant_sii.h"
+#include "devices/catalogue.h"
 #include "devices/slave_application.h"
 #include "wire/al.h"
 #include "wire/esc_reg.h"
@@ -24,11 +24,14 @@ enum {
 	PROCESSING_NS = 330,
 	FORWARDING_NS = 300,
 	SYNC0_ON = 0x03, /* 0x0981: cyclic unit and SYNC0 */
+	PLANT_SM_OUTPUTS = 0,
+	PLANT_SM_INPUTS = 1,
+	PLANT_BYTES = 4, /* of each of them */
 };
 
 struct plant {
 	struct sim_device dev; /* first */
-	uint8_t eeprom[PLANT_SII_BYTES];
+	uint8_t eeprom[MODEL_SII_BYTES];
 	struct sii sii;
 	struct slave_application app;
 	double tau_s;
@@ -181,14 +184,12 @@ int plant_slave(int position, double tau_s, double gain, struct segment_slave_sp
 	};
 	struct plant *p = calloc(1, sizeof(*p));
 	char name[SII_NAME_BYTES];
-	char error[128];
 	size_t bytes;
 
 	if (p == NULL) {
 		return -ENOMEM;
 	}
-	bytes = plant_sii(p->eeprom);
-	(void)sii_parse(p->eeprom, bytes, &p->sii, error, sizeof(error));
+	bytes = catalogue_image(NAME, p->eeprom, &p->sii);
 	sii_text(p->eeprom, bytes, p->sii.device_name, name);
 	slave_application_init(&p->app, &p->sii, name);
 	p->tau_s = tau_s;

@@ -5,6 +5,8 @@
 #include <errno.h>
 #include <string.h>
 
+#include "devices/catalogue.h"
+
 enum object {
 	MODULE_DISTANCE = 0x10, /* between two modules' indices */
 	PDO_COUPLER = 0xff,     /* of 0x1600 and 0x1A00: the coupler's own */
@@ -226,14 +228,11 @@ static_assert(WAGO_MODULES_MAX + 2 <= COE_ASSIGNED_MAX, "every PDO can be assign
 
 int wago_node_init(struct wago_node *node, const struct wago_module *const *modules, size_t count)
 {
-	char error[128];
-
 	if (count > WAGO_MODULES_MAX) {
 		return -E2BIG;
 	}
 	memset(node, 0, sizeof(*node));
-	node->eeprom_bytes = wago_sii(node->eeprom);
-	(void)sii_parse(node->eeprom, node->eeprom_bytes, &node->sii, error, sizeof(error));
+	node->eeprom_bytes = catalogue_image("wago_750_354", node->eeprom, &node->sii);
 	for (size_t i = 0; i < count; i++) {
 		node->slot[i].module = modules[i];
 	}

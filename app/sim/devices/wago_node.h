@@ -12,6 +12,7 @@
 #include <stdint.h>
 
 #include "devices/coe_dictionary.h"
+#include "devices/slave_model.h"
 #include "wire/sii.h"
 
 enum wago_limits {
@@ -20,7 +21,6 @@ enum wago_limits {
 	WAGO_HEADER_BYTES = 4, /* status or control of the coupler, in front of the modules' data */
 	WAGO_DIRECTION_BYTES_MAX = WAGO_HEADER_BYTES + WAGO_MODULES_MAX * WAGO_MODULE_BITS_MAX / 8 +
 		2,
-	WAGO_SII_BYTES = 1024,
 };
 
 enum wago_product { WAGO_VENDOR = 0x00000021, WAGO_PRODUCT = 0x07500354, WAGO_REVISION = 0x2 };
@@ -50,7 +50,7 @@ struct wago_node {
 	struct sii sii;    /* the coupler's, with the PDOs of the modules */
 	struct coe_constant constant[3 * WAGO_MODULES_MAX + 8];
 	size_t constant_count;
-	uint8_t eeprom[WAGO_SII_BYTES];
+	uint8_t eeprom[MODEL_SII_BYTES];
 	size_t eeprom_bytes;
 };
 
@@ -58,8 +58,5 @@ struct wago_node {
 int wago_node_init(struct wago_node *node, const struct wago_module *const *modules, size_t count);
 /** What a dictionary over node->sii needs besides. */
 void wago_node_complete(const struct wago_node *node, struct coe_dictionary *d);
-
-/** The coupler's EEPROM into @image of WAGO_SII_BYTES. Returns its length. */
-size_t wago_sii(uint8_t *image);
 
 #endif

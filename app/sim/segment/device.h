@@ -39,11 +39,4 @@ struct sim_device {
 	const struct signal_spec *signal; /* what its analog input sees; NULL: nothing connected */
 };
 
-/**
- * The generic slave that is nothing but an SII image: AL states with the checks a real one makes, a
- * CoE server if its SII says CoE, inputs that count. Its ESC has device emulation off. NULL: no
- * memory.
- */
-struct sim_device *sii_device_create(const uint8_t *sii, size_t sii_bytes);
-
 #endif

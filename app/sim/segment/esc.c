@@ -6,6 +6,8 @@
 #include "segment/esc_internal.h"
 #include "wire/al.h"
 
+enum { PORT_0 = 0x03, PORT_0_EBUS = 0x02 }; /* of the port descriptor, 0x0007 */
+
 const struct esc_features esc_et1100 = {
 	.type = 0x11,
 	.revision = 0x00,
@@ -34,7 +36,8 @@ static void reset_registers(struct esc *esc)
 	r[ESC_REG_RAM_SIZE] = f->ram_kib;
 	r[ESC_REG_PORT_DESCRIPTOR] = f->port_descriptor;
 	put_le16(r + ESC_REG_FEATURES, f->features);
-	put_le32(r + ESC_REG_DL_CONTROL, 0x00070001);
+	put_le32(r + ESC_REG_DL_CONTROL,
+		 (f->port_descriptor & PORT_0) == PORT_0_EBUS ? 0x00c70001 : 0x00070001);
 	put_le16(r + ESC_REG_AL_CONTROL, AL_INIT);
 	put_le16(r + ESC_REG_AL_STATUS, AL_INIT);
 	put_le16(r + ESC_REG_WATCHDOG_DIVIDER, 0x09c2);

@@ -5,19 +5,22 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "simulator/list_slaves.h"
+
 static const char usage_text[] =
 	"usage: ecdaq-sim --interface NIC [OPTION...]\n"
 	"\n"
 	"A simulated EtherCAT segment on a network interface. Ends at SIGINT or SIGTERM.\n"
 	"\n"
 	"  --interface NIC    where the master is: a veth, a tap, a real NIC\n"
-	"  --slaves WHAT      1 to 64: so many FB1111+Piccolo slaves (default 2); or names, in\n"
-	"                     order, of SII images: ek1100,el2828; built in are fb1111_piccolo,\n"
-	"                     wago_750_354 (750-354 with 750-457, -557, -430, -530) and\n"
-	"                     wago_750_354+430+530 (with these modules), and\n"
-	"                     plant[:TAU_MS[:GAIN]], a first-order lag to control (default\n"
+	"  --slaves WHAT      1 to 64: number of FB1111+Piccolo slaves (default 2); or names, in\n"
+	"                     the order of the line: ek1100,el2828,el3104. See --list-slaves.\n"
+	"                     wago_750_354+430+530 has these modules (default 457, 557, 430,\n"
+	"                     530); plant[:TAU_MS[:GAIN]] is a first-order lag (default\n"
 	"                     plant:50:1)\n"
-	"  --sii DIR          folder of the SII images NAME.bin\n"
+	"  --sii DIR          folder of SII images of real slaves: NAME.bin is used instead of\n"
+	"                     the catalogue's NAME\n"
+	"  --list-slaves      print the catalogue of slaves and exit\n"
 	"  --ppm A,B,...      crystals of the slaves, ppm (default: seeded, +-50)\n"
 	"  --wander PPM       crystals wander by so much (default 0.5)\n"
 	"  --jitter NS        time stamps of frames are off by up to this (default 10)\n"
@@ -154,6 +157,7 @@ void sim_options_read(int argc, char **argv, struct sim_options *opt)
 		{ "interface", required_argument, NULL, 'i' },
 		{ "slaves", required_argument, NULL, 'n' },
 		{ "sii", required_argument, NULL, 'd' },
+		{ "list-slaves", no_argument, NULL, 'l' },
 		{ "ppm", required_argument, NULL, 'p' },
 		{ "wander", required_argument, NULL, 'w' },
 		{ "jitter", required_argument, NULL, 'j' },
@@ -175,6 +179,9 @@ void sim_options_read(int argc, char **argv, struct sim_options *opt)
 		if (c == 'h') {
 			fputs(usage_text, stdout);
 			exit(0);
+		}
+		if (c == 'l') {
+			exit(list_slaves() < 0 ? EXIT_FAILURE : EXIT_SUCCESS);
 		}
 		if (c == 'v') {
 			puts("ecdaq-sim " ECDAQ_VERSION);

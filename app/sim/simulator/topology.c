@@ -106,6 +106,7 @@ static int check_image(const char *path, const uint8_t *image, size_t bytes)
 	return 0;
 }
 
+/* 1; 0: there is no such file. */
 static int read_image(struct topology *l, int i, size_t *ret_bytes)
 {
 	char path[PATH_BYTES];
@@ -113,19 +114,36 @@ static int read_image(struct topology *l, int i, size_t *ret_bytes)
 	int r;
 
 	if (l->opt->sii_dir == NULL) {
-		snprintf(line, sizeof(line), "slave '%s': --sii DIR is missing", l->name[i]);
-		return sim_error(line);
+		return 0;
 	}
 	if (snprintf(path, sizeof(path), "%s/%s.bin", l->opt->sii_dir, l->name[i]) >=
 	    (int)sizeof(path)) {
 		return sim_error("--sii: path too long");
 	}
 	r = read_file(path, l->sii[i], SEGMENT_SII_BYTES, ret_bytes);
+	if (r == -ENOENT) {
+		return 0;
+	}
 	if (r < 0) {
 		snprintf(line, sizeof(line), "%s: %s", path, strerror(-r));
 		return sim_error(line);
 	}
-	return check_image(path, l->sii[i], *ret_bytes);
+	return check_image(path, l->sii[i], *ret_bytes) < 0 ? -1 : 1;
+}
+
+static int unknown_slave(const struct topology *l, int i)
+{
+	char near[NAME_BYTES];
+	char line[LINE_BYTES];
+
+	catalogue_near(l->name[i], near, sizeof(near));
+	snprintf(line, sizeof(line), "slave '%s': not in the catalogue%s%s%s%s: %s", l->name[i],
+		 l->opt->sii_dir != NULL ? " nor in " : "",
+		 l->opt->sii_dir != NULL ? l->opt->sii_dir : "",
+		 near[0] != '\0' ? ": did you mean " : "", near,
+		 near[0] != '\0' ? "see --list-slaves"
+				 : "--list-slaves lists it, --sii DIR has images of others");
+	return sim_error(line);
 }
 
 static int make_wago(struct topology *l, int i)
@@ -159,6 +177,7 @@ static int make_plant(struct topology *l, int i)
 
 static int make_slave(struct topology *l, int i)
 {
+	static struct slave_model model;
 	size_t bytes = 0;
 	int r;
 
@@ -171,10 +190,18 @@ static int make_slave(struct topology *l, int i)
 
 	if (strcmp(l->name[i], "fb1111_piccolo") == 0) {
 		r = fb1111_piccolo_slave(i, &l->spec[i]);
-	} else if (read_image(l, i, &bytes) < 0) {
+		return r < 0 ? sim_error("no memory") : 0;
+	}
+	r = read_image(l, i, &bytes);
+	if (r < 0) {
 		return -1;
-	} else {
+	}
+	if (r > 0) {
 		r = catalogue_sii_slave(l->sii[i], bytes, i, &l->spec[i]);
+	} else if (catalogue_find(l->name[i], &model) == 0) {
+		r = catalogue_slave(&model, i, &l->spec[i]);
+	} else {
+		return unknown_slave(l, i);
 	}
 	return r < 0 ? sim_error("no memory") : 0;
 }

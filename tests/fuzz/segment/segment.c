@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "base/bytes.h"
+#include "devices/sii_device.h"
 #include "segment/segment.h"
 #include "wire/datagram.h"
 #include "wire/sii.h"

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* AL states of a slave that is only an SII. */
+#include "devices/sii_device.h"
 #include "base/bytes.h"
 #include "harness/test.h"
-#include "segment/device.h"
 #include "terminal.h"
 #include "wire/al.h"
 #include "wire/esc_reg.h"

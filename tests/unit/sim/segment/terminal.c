@@ -2,8 +2,8 @@
 #include "terminal.h"
 
 #include "base/bytes.h"
+#include "devices/sii_device.h"
 #include "harness/test.h"
-#include "segment/device.h"
 #include "wire/al.h"
 #include "wire/esc_reg.h"
 #include "wire/sii.h"

@@ -1,0 +1,121 @@
+/* SPDX-License-Identifier: MIT */
+/* Every slave of the simulator's catalogue on one line, brought to OP by the whole master. */
+#include "devices/catalogue.h"
+#include "base/ring.h"
+#include "devices/plant.h"
+#include "devices/wago_text.h"
+#include "harness/test.h"
+#include "sim/harness/virtual_master.h"
+
+static struct virtual_bench b;
+static struct virtual_master vm;
+
+static int make(int position, struct segment_slave_spec *ret_spec)
+{
+	static struct slave_model model;
+
+	catalogue_read((size_t)position, &model);
+	if (plant_is_name(model.name)) {
+		return plant_by_name(position, model.name, ret_spec);
+	}
+	if (wago_750_354_is_name(model.name)) {
+		return wago_750_354_by_name(position, model.name, ret_spec);
+	}
+	return catalogue_slave(&model, position, ret_spec);
+}
+
+static int make_some(const char *const *names, int position, struct segment_slave_spec *ret_spec)
+{
+	static struct slave_model model;
+
+	CHECK_EQ(catalogue_find(names[position], &model), 0);
+	return catalogue_slave(&model, position, ret_spec);
+}
+
+static void open_all(unsigned slaves, virtual_slave_maker maker, const char *const *settings)
+{
+	virtual_bench_init(&b,
+			   &(struct virtual_spec){ .slaves = slaves, .make = maker, .seed = 5 });
+	virtual_master_init(&vm, &b, settings);
+	if (virtual_master_bring_up(&vm) < 0) {
+		test_fail(__FILE__, __LINE__, "%s", vm.failure.text);
+	}
+	CHECK_EQ(virtual_master_run(&vm, 200), SESSION_GOES_ON);
+}
+
+static void close_all(void)
+{
+	CHECK_EQ(virtual_master_stop(&vm), 0);
+	virtual_master_kill(&vm);
+	virtual_bench_done(&b);
+}
+
+/* Bits of the PDOs that entry @i assigns by default. */
+static uint32_t assigned_bits(size_t i)
+{
+	static struct slave_model model;
+	uint32_t bits = 0;
+
+	catalogue_read(i, &model);
+	for (size_t p = 0; p < model.sii.pdo_count; p++) {
+		bits += model.sii.pdo[p].sm < model.sii.sm_count ? model.sii.pdo[p].bits : 0;
+	}
+	return bits;
+}
+
+static int64_t signed16(const char *name)
+{
+	return (int16_t)virtual_master_value(&vm, name);
+}
+
+TEST(catalogue, all_its_slaves_come_to_op_with_the_channels_of_their_entries)
+{
+	const struct sample_meta *meta;
+	size_t bytes;
+	uint32_t bits[LIMIT_SLAVES] = { 0 };
+
+	open_all((unsigned)catalogue_count(), make, NULL);
+	meta = ring_meta(vm.samples, &bytes);
+	for (uint32_t i = 0; i < meta->channel_count; i++) {
+		const struct channel *c = &sample_meta_channels(meta)[i];
+
+		bits[c->slave_pos] += c->bit_len;
+	}
+	for (size_t i = 0; i < catalogue_count(); i++) {
+		printf("  slave %zu: %u bits in channels\n", i, bits[i]);
+		CHECK(bits[i] <= assigned_bits(i) || assigned_bits(i) == 0);
+		CHECK((bits[i] > 0) == (assigned_bits(i) > 0) || i + 1 == catalogue_count());
+	}
+	CHECK_EQ(virtual_master_sample(&vm)->slaves_bad, 0);
+	CHECK(vm.result.op > 100);
+	close_all();
+}
+
+static int make_analog(int position, struct segment_slave_spec *ret_spec)
+{
+	static const char *const names[] = { "ek1100", "el3104", "el4132" };
+
+	return make_some(names, position, ret_spec);
+}
+
+TEST(catalogue, an_analog_terminal_shows_the_signal_at_its_scale)
+{
+	static const char *const settings[] = { "slaves[0].name=coupler", "slaves[1].name=ai",
+						"slaves[2].name=ao", NULL };
+	int64_t low = INT16_MAX;
+	int64_t high = INT16_MIN;
+
+	open_all(3, make_analog, settings);
+	for (unsigned i = 0; i < 120; i++) {
+		int64_t now;
+
+		CHECK_EQ(virtual_master_run(&vm, 10), SESSION_GOES_ON);
+		now = signed16("ai.ai_standard_channel_1_value");
+		low = now < low ? now : low;
+		high = now > high ? now : high;
+	}
+	/* 1 V and a sine of 0.5 V; 10 V are 0x7fff. */
+	CHECK(low > 1620 && low < 1660);
+	CHECK(high > 4890 && high < 4930);
+	close_all();
+}
