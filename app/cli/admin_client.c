@@ -17,11 +17,12 @@ static enum exit_code fail_connect(const struct cli *cli, const char *path, int 
 	case ENOTDIR:
 	case ECONNREFUSED:
 		return cli_fail(cli, EXIT_CODE_NO_DAEMON,
-				"admin socket: %s: nobody listens: is ecdaqd running?", path);
+				"admin socket: %s: no answer: is ecdaqd running?", path);
 	case EACCES:
 	case EPERM:
-		return cli_fail(cli, EXIT_CODE_PERMISSION,
-				"admin socket: no permission on %s: be root or in its group", path);
+		return cli_fail(
+			cli, EXIT_CODE_PERMISSION,
+			"admin socket: %s: permission denied: run as root or join its group", path);
 	default:
 		return cli_fail(cli, EXIT_CODE_FAILED, "admin socket: %s: %s", path, strerror(err));
 	}
@@ -103,10 +104,11 @@ enum exit_code admin_ask(struct cli *cli, struct admin_request *request,
 	}
 	if (r == -EPROTO) {
 		return cli_fail(cli, EXIT_CODE_FAILED,
-				"ecdaqd: its answer is of another version of ecdaq");
+				"ecdaqd: the answer is from another version of ecdaq");
 	}
 	if (r == -ECONNRESET || r == -EPIPE) {
-		return cli_fail(cli, EXIT_CODE_NO_DAEMON, "ecdaqd: hung up without an answer");
+		return cli_fail(cli, EXIT_CODE_NO_DAEMON,
+				"ecdaqd: connection closed without an answer");
 	}
 	return r < 0 ? cli_fail(cli, EXIT_CODE_FAILED, "ecdaqd: %s", strerror(-r)) : EXIT_CODE_OK;
 }

@@ -8,12 +8,12 @@
 
 /**
  * Send @request (its magic is filled in) and wait for the reply. EXIT_CODE_OK when there is one,
- * whatever it says; else the code of a failure that was said.
+ * whatever it contains; else the code of a failure that was reported.
  */
 enum exit_code admin_ask(struct cli *cli, struct admin_request *request,
 			 struct admin_reply *ret_reply);
 
-/** EXIT_CODE_OK if @reply grants what was asked; else say why not: EXIT_CODE_REFUSED. */
+/** EXIT_CODE_OK if @reply grants the request; else report why not: EXIT_CODE_REFUSED. */
 enum exit_code admin_judge(const struct cli *cli, const struct admin_reply *reply);
 
 /** Both in one. */

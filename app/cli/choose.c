@@ -4,7 +4,7 @@
 #include <fnmatch.h>
 #include <string.h>
 
-/* How much of @name stands at the start and at the end of @candidate. */
+/* Length of the common prefix and suffix of @name and @candidate. */
 static size_t likeness(const char *name, const char *candidate)
 {
 	size_t name_len = strlen(name);

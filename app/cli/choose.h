@@ -16,7 +16,7 @@ struct choice {
 
 /**
  * The channels that the words @names name, in that order; * and ? match. EXIT_CODE_OK, or the code
- * of a failure that was said.
+ * of a failure that was reported.
  */
 enum exit_code choose_channels(const struct cli *cli, const struct samples *samples,
 			       char *const *names, int name_count, struct choice *ret_choice);

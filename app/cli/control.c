@@ -22,7 +22,7 @@ enum exit_code verb_clear(struct cli *cli, int argc, char **argv)
 	return admin_do(cli, &request, &reply);
 }
 
-/* Until the process with @pid is gone, or @wait_ns have passed. */
+/* Wait for the end of process @pid, at most @wait_ns. */
 static enum exit_code wait_for_end(const struct cli *cli, int64_t pid, int64_t wait_ns)
 {
 	const int64_t step_ns = 20 * NS_PER_MS;
@@ -31,7 +31,8 @@ static enum exit_code wait_for_end(const struct cli *cli, int64_t pid, int64_t w
 	for (int64_t waited_ns = 0; source_is_alive(pid); waited_ns += step_ns) {
 		if (waited_ns >= wait_ns || screen_is_over()) {
 			snprintf(why, sizeof(why), "%.3g s", (double)waited_ns / 1e9);
-			return cli_fail(cli, EXIT_CODE_FAILED, "ecdaqd: still there after %s", why);
+			return cli_fail(cli, EXIT_CODE_FAILED, "ecdaqd: still running after %s",
+					why);
 		}
 		screen_wait(step_ns);
 	}
@@ -42,8 +43,7 @@ enum exit_code verb_stop(struct cli *cli, int argc, char **argv)
 {
 	int64_t wait_ns = 0;
 	const struct args_option options[] = {
-		{ "wait", 0, args_duration, &wait_ns, "T",
-		  "wait at most so long until ecdaqd is gone" },
+		{ "wait", 0, args_duration, &wait_ns, "T", "wait at most T for ecdaqd to end" },
 	};
 	struct args args = { .options = options, .option_count = 1 };
 	struct admin_request request = { .verb = ADMIN_STOP };

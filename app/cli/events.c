@@ -36,7 +36,7 @@ static int64_t clock_ns(clockid_t clock)
 	return (int64_t)ts.tv_sec * NS_PER_S + ts.tv_nsec;
 }
 
-/* The event's place on today's wall clock: its age by the monotonic clock, which nobody sets. */
+/* The event's place on today's wall clock: its age by the monotonic clock, which is never set. */
 static int64_t utc_of(const struct event *ev)
 {
 	return clock_ns(CLOCK_REALTIME) - (clock_ns(CLOCK_MONOTONIC) - ev->mono_ns);
@@ -102,7 +102,7 @@ static void print_lost(const struct events *events, uint64_t lost)
 	json_end_line(&js);
 }
 
-/* Both rings as one: what ecdaq-sync0 said before @mono_ns. */
+/* Merge both rings: print the events of ecdaq-sync0 before @mono_ns. */
 static void print_sync0_until(struct events *events, int64_t mono_ns)
 {
 	uint64_t lost = 0;
@@ -239,18 +239,18 @@ static enum exit_code parse_level(struct events *events)
 		}
 	}
 	return cli_fail(events->cli, EXIT_CODE_USAGE,
-			"--level: %s: is none of info, notice, warning, error", events->level);
+			"--level: %s: expected info, notice, warning or error", events->level);
 }
 
 enum exit_code verb_events(struct cli *cli, int argc, char **argv)
 {
 	struct events events = { .cli = cli };
 	const struct args_option options[] = {
-		{ "follow", 'f', args_flag, &events.is_follow, NULL, "go on with what comes" },
-		{ "count", 'n', args_count, &events.count, "N", "begin with the last N" },
+		{ "follow", 'f', args_flag, &events.is_follow, NULL, "continue with new events" },
+		{ "count", 'n', args_count, &events.count, "N", "start with the last N" },
 		{ "level", 'l', args_text, &events.level, "LEVEL",
-		  "info, notice, warning or error: this and worse" },
-		{ "json", 0, args_flag, &events.is_json, NULL, "a JSON object an event" },
+		  "info, notice, warning or error: minimum severity" },
+		{ "json", 0, args_flag, &events.is_json, NULL, "one JSON object per event" },
 	};
 	struct args args = { .options = options, .option_count = 4 };
 	enum exit_code result;

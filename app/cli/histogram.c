@@ -137,7 +137,7 @@ enum exit_code verb_histogram(struct cli *cli, int argc, char **argv)
 {
 	int is_json = 0;
 	const struct args_option options[] = {
-		{ "json", 0, args_flag, &is_json, NULL, "all buckets as a JSON object" },
+		{ "json", 0, args_flag, &is_json, NULL, "all buckets as one JSON object" },
 	};
 	struct args args = {
 		.options = options, .option_count = 1, .operands_min = 1, .operands_max = 1
@@ -156,7 +156,7 @@ enum exit_code verb_histogram(struct cli *cli, int argc, char **argv)
 	h = find(page, args.operands[0]);
 	if (h == NULL) {
 		result = cli_fail(cli, EXIT_CODE_USAGE,
-				  "%s: is none of wake, round-trip, phase, work, control",
+				  "%s: expected wake, round-trip, phase, work or control",
 				  args.operands[0]);
 	} else if (is_json) {
 		print_json(h, args.operands[0]);

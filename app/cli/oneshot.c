@@ -31,7 +31,7 @@ struct shot {
 	int is_done;
 	uint64_t cycle;     /* in which the command took effect, then in which the value came */
 	int64_t at_ns;      /* the instant that was armed */
-	int64_t sampled_ns; /* when the slave says that it sampled */
+	int64_t sampled_ns; /* sample time reported by the slave */
 	uint64_t value;
 };
 
@@ -185,7 +185,7 @@ static enum exit_code wait_for_all(struct oneshot *one)
 			return cli_fail(one->cli, EXIT_CODE_FAILED,
 					"the bus was stopped before the conversion");
 		case FOLLOW_OVER:
-			return cli_fail(one->cli, EXIT_CODE_FAILED, "not waited for");
+			return cli_fail(one->cli, EXIT_CODE_FAILED, "interrupted");
 		}
 	}
 	return EXIT_CODE_OK;
@@ -264,7 +264,7 @@ static enum exit_code run(struct oneshot *one, const char *word)
 			say_text(one, &one->shot[i]);
 		}
 		if (one->is_wait && !one->shot[i].is_done) {
-			result = cli_fail(one->cli, EXIT_CODE_FAILED, "%s: no conversion came",
+			result = cli_fail(one->cli, EXIT_CODE_FAILED, "%s: no conversion received",
 					  one->shot[i].name);
 		}
 	}
@@ -292,7 +292,7 @@ enum exit_code verb_oneshot(struct cli *cli, int argc, char **argv)
 	}
 	one.has_at = one.at_ns != INT64_MIN;
 	if (one.has_at == (one.in_ns > 0)) {
-		return cli_fail(cli, EXIT_CODE_USAGE, "wants --at or --in");
+		return cli_fail(cli, EXIT_CODE_USAGE, "requires --at or --in");
 	}
 	result = follow_open(cli, &one.follow);
 	if (result == EXIT_CODE_OK) {

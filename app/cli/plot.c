@@ -306,7 +306,7 @@ static void write_axis(const struct plot *plot, FILE *out)
 
 void plot_write(const struct plot *plot, int rows, FILE *out)
 {
-	/* Each panel has a title; below all stand the axis and its figures. */
+	/* Each panel has a title; below all are the axis and its labels. */
 	int panel_rows = (rows - 2) / (int)plot->spec.panels - 1;
 
 	if (panel_rows < PANEL_ROWS_MIN) {

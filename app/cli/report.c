@@ -7,6 +7,7 @@
 
 #include "base/clock.h"
 #include "base/event.h"
+#include "base/sync0.h"
 #include "cli/source.h"
 #include "cli/sync0_source.h"
 #include "cli/text.h"
@@ -52,6 +53,12 @@ void report_al_format(uint32_t al_state, char *buf, size_t buf_len)
 {
 	snprintf(buf, buf_len, "%s%s", al_state_to_str((uint16_t)(al_state & AL_STATE_MASK)),
 		 (al_state & AL_ERROR) != 0 ? "+ERROR" : "");
+}
+
+/* Behind the name of a program; at the end of a run all have ended, and should have. */
+static const char *mark_absent(const struct report *report, int is_running)
+{
+	return is_running || report->is_summary ? "" : " (not running)";
 }
 
 static int64_t tai_now_ns(void)
@@ -160,7 +167,7 @@ static void write_control(const struct status_page *page, FILE *out)
 	}
 	fprintf(out,
 		"control    %s: %s   %" PRIu64 " calls   %" PRIu64
-		" beyond %s   asked for safety %" PRIu64 "   values limited %" PRIu64
+		" beyond %s   fail-safe requests %" PRIu64 "   values limited %" PRIu64
 		", refused %" PRIu64 "\n",
 		text_plain(st->name, plain, sizeof(plain)), control_state_to_str(GET(st->state)),
 		GET(st->calls), GET(st->overruns), text_ns(st->budget_ns, budget),
@@ -244,8 +251,11 @@ static void write_recorder(const struct report *report, FILE *out)
 		"recorder   %s%s   %" PRIu64 " cycles, %" PRIu64 " gaps (%" PRIu64
 		" missing)   lag %" PRIu64 " cycles   %s written   %s free\n",
 		record_state_to_str(GET(record->state)),
-		report->is_recorder_running ? "" : " (gone)", GET(record->recorded_cycles),
-		GET(record->recorded_gaps), GET(record->cycles_missing), GET(record->lag_cycles),
+		GET(record->state) == RECORD_ENDED
+			? ""
+			: mark_absent(report, report->is_recorder_running),
+		GET(record->recorded_cycles), GET(record->recorded_gaps),
+		GET(record->cycles_missing), GET(record->lag_cycles),
 		text_bytes(GET(record->bytes_written), written),
 		text_bytes(GET(record->bytes_free), left));
 	if (record->path[0] != '\0') {
@@ -266,7 +276,7 @@ static void write_dds(const struct report *report, FILE *out)
 		return;
 	}
 	fprintf(out, "dds        %s%s, domain %u", text_plain(dds->interface, plain, sizeof(plain)),
-		report->is_dds_running ? "" : " (gone)", dds->domain);
+		mark_absent(report, report->is_dds_running), dds->domain);
 	if (dds->tag[0] != '\0') {
 		fprintf(out, ", tag %s", text_plain(dds->tag, plain, sizeof(plain)));
 	}
@@ -276,6 +286,40 @@ static void write_dds(const struct report *report, FILE *out)
 		GET(dds->published_cycles), GET(dds->missed_cycles), GET(dds->subscribers),
 		dds->are_commands_on ? "on" : "off", GET(dds->commands_accepted),
 		GET(dds->commands_refused), dds->is_secure ? "   secured" : "");
+}
+
+uint32_t report_sync0_verdict(const struct sync0_status *page)
+{
+	uint32_t v = SYNC0_NONE;
+
+	for (uint32_t i = 0; i < sync0_source_lines(page); i++) {
+		const struct sync0_line_status *ls = &page->line[i];
+		uint32_t own = GET(ls->is_lost) ? SYNC0_FAIL : GET(ls->verdict);
+
+		v = own > v ? own : v;
+	}
+	return v;
+}
+
+/* Nothing where there is none. */
+static void write_sync0(const struct report *report, FILE *out)
+{
+	const struct sync0_status *page = report->sync0;
+	uint64_t missing = 0;
+
+	if (page == NULL) {
+		return;
+	}
+	for (uint32_t i = 0; i < sync0_source_lines(page); i++) {
+		missing += GET(page->line[i].missing);
+	}
+	fprintf(out,
+		"sync0      %s%s: %s   %u lines: %s   %" PRIu64 " windows   %" PRIu64
+		" pulses missing   %" PRIu64 " alarms\n",
+		sync0_source_to_str(page->source), mark_absent(report, report->is_sync0_running),
+		sync0_state_to_str(GET(page->state)), sync0_source_lines(page),
+		sync0_verdict_to_str(report_sync0_verdict(page)), GET(page->windows), missing,
+		GET(page->alarms));
 }
 
 static void write_message(const struct status_page *page, FILE *out)
@@ -299,7 +343,7 @@ void report_write_screen(const struct report *report, FILE *out)
 	write_times(report->page, out);
 	write_recorder(report, out);
 	write_dds(report, out);
-	report_sync0_line(report, out);
+	write_sync0(report, out);
 	if (count > 0) {
 		fprintf(out, "%3s %-16s %-13s %12s %10s %10s %6s %6s\n", "pos", "slave", "state",
 			"good", "bad", "dc diff", "rx err", "links");
@@ -326,6 +370,6 @@ void report_write_summary(const struct report *report, FILE *out)
 	write_times(report->page, out);
 	write_recorder(report, out);
 	write_dds(report, out);
-	report_sync0_line(report, out);
+	write_sync0(report, out);
 	write_message(report->page, out);
 }

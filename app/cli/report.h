@@ -45,9 +45,8 @@ void report_write_json(const struct report *report, struct json *js);
 /** "OP", "SAFE-OP+ERROR". */
 void report_al_format(uint32_t al_state, char *buf, size_t buf_len);
 
-/** ecdaq-sync0's part of the screen and of the JSON object. */
-void report_sync0_line(const struct report *report, FILE *out);
-void report_sync0_json(const struct report *report, struct json *js);
+/** The worst verdict of all lines; a lost line is a failed one. */
+uint32_t report_sync0_verdict(const struct sync0_status *page);
 
 /** One slave as a JSON object in an array. */
 void report_slave_json(const struct status_page *page, uint32_t index, struct json *js);

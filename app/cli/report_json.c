@@ -2,6 +2,7 @@
 #include "base/event.h"
 #include "cli/report.h"
 #include "cli/source.h"
+#include "cli/sync0_source.h"
 #include "wire/al.h"
 
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
@@ -222,7 +223,7 @@ static void write_process(struct json *js, const struct report *report)
 	uint32_t state = GET(page->bus_state);
 	char text[64];
 
-	/* The summary of a run tells how the run was, not that it has ended: "running" does. */
+	/* The summary shows the state of the run, not its end: that is in "running". */
 	if (report->is_summary && GET(page->bus_state) == BUS_STOPPED) {
 		state = GET(page->bus_state_at_stop);
 	}
@@ -242,6 +243,25 @@ static void write_process(struct json *js, const struct report *report)
 	json_u64(js, "period_ns", page->period_ns);
 	json_u64(js, "slaves", source_slave_count(page));
 	json_u64(js, "slaves_expected", GET(page->slaves_expected));
+}
+
+static void write_sync0(const struct report *report, struct json *js)
+{
+	const struct sync0_status *page = report->sync0;
+
+	if (page == NULL) {
+		json_null(js, "sync0");
+		return;
+	}
+	json_object_begin(js, "sync0");
+	json_truth(js, "running", report->is_sync0_running);
+	json_text(js, "source", sync0_source_to_str(page->source));
+	json_text(js, "state", sync0_state_to_str(GET(page->state)));
+	json_text(js, "verdict", sync0_verdict_to_str(report_sync0_verdict(page)));
+	json_u64(js, "lines", sync0_source_lines(page));
+	json_u64(js, "windows", GET(page->windows));
+	json_u64(js, "alarms", GET(page->alarms));
+	json_object_end(js);
 }
 
 void report_write_json(const struct report *report, struct json *js)
@@ -266,7 +286,7 @@ void report_write_json(const struct report *report, struct json *js)
 	write_control(js, page);
 	write_record(js, report);
 	write_dds(js, report);
-	report_sync0_json(report, js);
+	write_sync0(report, js);
 	write_degraded(js, page);
 	json_array_begin(js, "slave");
 	for (uint32_t i = 0; i < source_slave_count(page); i++) {

@@ -132,7 +132,7 @@ static void give_terminal_back(void)
 	}
 }
 
-/* Ctrl-Z: stop, with the terminal as the shell wants to find it, and go on with SIGCONT. */
+/* Ctrl-Z: stop, with the terminal restored for the shell; SIGCONT resumes. */
 static void suspend(void)
 {
 	sigset_t stop;

@@ -16,12 +16,12 @@ struct screen_size {
 
 /** Is standard output a terminal? */
 int screen_is_terminal(void);
-/** Size of the terminal, or what $LINES and $COLUMNS say, or 24 by 80. */
+/** Size of the terminal, or $LINES and $COLUMNS, or 24 by 80. */
 struct screen_size screen_size(void);
 /** Does the locale speak UTF-8? */
 int screen_is_utf8(void);
 
-/** SIGINT, SIGTERM and SIGHUP no longer end the program, but screen_is_over() says so. */
+/** SIGINT, SIGTERM and SIGHUP end screen_wait() and make screen_is_over() true, not the program. */
 void screen_catch_signals(void);
 int screen_is_over(void);
 

@@ -47,7 +47,7 @@ static int parse_object(const char *text, uint16_t *ret_index, uint8_t *ret_subi
 	return 0;
 }
 
-/* Ask, and say an abort in the words of ETG.1000.6. */
+/* Send the request; report an abort with its text. */
 static enum exit_code ask(struct sdo *sdo)
 {
 	enum exit_code result = admin_ask(sdo->cli, &sdo->request, &sdo->reply);
@@ -179,10 +179,10 @@ static enum exit_code find_type(const struct sdo *sdo, int *ret_type)
 		return EXIT_CODE_OK;
 	}
 	*ret_type = sdo_type_find(sdo->type);
-	return *ret_type >= 0
-		       ? EXIT_CODE_OK
-		       : cli_fail(sdo->cli, EXIT_CODE_USAGE,
-				  "--type: %s: is none of " SDO_TYPE_WORDS "|STRING", sdo->type);
+	return *ret_type >= 0 ? EXIT_CODE_OK
+			      : cli_fail(sdo->cli, EXIT_CODE_USAGE,
+					 "--type: %s: expected one of " SDO_TYPE_WORDS "|STRING",
+					 sdo->type);
 }
 
 static enum exit_code read_object(struct sdo *sdo, int type)
@@ -215,12 +215,12 @@ static enum exit_code write_object(struct sdo *sdo, int type, const char *value)
 
 	if (type < 0 || type == SDO_TYPES) {
 		return cli_fail(sdo->cli, EXIT_CODE_USAGE,
-				"--type: writing wants one of " SDO_TYPE_WORDS);
+				"write: --type must be one of " SDO_TYPE_WORDS);
 	}
 	r = sdo_value_parse((enum sdo_type)type, value, &bits);
 	if (r < 0) {
 		return cli_fail(sdo->cli, EXIT_CODE_USAGE, "%s: %s %s", value,
-				r == -ERANGE ? "does not fit into" : "is no",
+				r == -ERANGE ? "does not fit into" : "is not a valid",
 				sdo_type_to_str((enum sdo_type)type));
 	}
 	put_le64(bytes, bits);
@@ -238,17 +238,17 @@ static enum exit_code run(struct sdo *sdo, const struct args *args)
 	int type;
 
 	if (!is_write && strcmp(args->operands[0], "read") != 0) {
-		return cli_fail(sdo->cli, EXIT_CODE_USAGE, "%s: wants read or write",
+		return cli_fail(sdo->cli, EXIT_CODE_USAGE, "%s: expected read or write",
 				args->operands[0]);
 	}
 	if (args->operand_count != (is_write ? 4 : 3)) {
 		return cli_fail(sdo->cli, EXIT_CODE_USAGE,
-				is_write ? "write: wants SLAVE INDEX:SUB VALUE"
-					 : "read: wants SLAVE INDEX:SUB");
+				is_write ? "write: expected SLAVE INDEX:SUB VALUE"
+					 : "read: expected SLAVE INDEX:SUB");
 	}
 	if (parse_object(args->operands[2], &sdo->request.index, &sdo->request.subindex) < 0) {
-		return cli_fail(sdo->cli, EXIT_CODE_USAGE, "%s: wants INDEX:SUB such as 0x1018:1",
-				args->operands[2]);
+		return cli_fail(sdo->cli, EXIT_CODE_USAGE,
+				"%s: expected INDEX:SUB such as 0x1018:1", args->operands[2]);
 	}
 	result = find_type(sdo, &type);
 	if (result != EXIT_CODE_OK) {
@@ -271,7 +271,7 @@ enum exit_code verb_sdo(struct cli *cli, int argc, char **argv)
 	struct sdo sdo = { .cli = cli };
 	const struct args_option options[] = {
 		{ "type", 't', args_text, &sdo.type, "TYPE", "data type of the object" },
-		{ "json", 0, args_flag, &sdo.is_json, NULL, "what was read as a JSON object" },
+		{ "json", 0, args_flag, &sdo.is_json, NULL, "the value as a JSON object" },
 	};
 	struct args args = {
 		.options = options, .option_count = 2, .operands_min = 3, .operands_max = 4

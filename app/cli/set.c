@@ -51,7 +51,7 @@ static enum exit_code take_word(struct setting *setting, const char *word, struc
 
 	if (equals == NULL || equals == word || equals[1] == '\0' ||
 	    equals - word >= (ptrdiff_t)sizeof(name)) {
-		return cli_fail(cli, EXIT_CODE_USAGE, "%s: wants OUTPUT=VALUE", word);
+		return cli_fail(cli, EXIT_CODE_USAGE, "%s: expected OUTPUT=VALUE", word);
 	}
 	snprintf(name, sizeof(name), "%.*s", (int)(equals - word), word);
 	index = image_channel_find(setting->samples.channels, setting->samples.meta->channel_count,
@@ -68,7 +68,8 @@ static enum exit_code take_word(struct setting *setting, const char *word, struc
 	if (r < 0) {
 		image_type_format(ch, type, sizeof(type));
 		return cli_fail(cli, EXIT_CODE_FAILED, "%s: %s %s %s", name, equals + 1,
-				r == -ERANGE ? "does not fit into" : "is no value of type", type);
+				r == -ERANGE ? "does not fit into" : "is not a value of type",
+				type);
 	}
 	memcpy(item->channel, ch->name, sizeof(item->channel));
 	return EXIT_CODE_OK;

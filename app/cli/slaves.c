@@ -70,7 +70,7 @@ static void show_more(const struct status_page *page, uint32_t index)
 	printf("    %-16s %u processing, %u PDI\n", "other errors", GET(slave->processing_errors),
 	       GET(slave->pdi_errors));
 	if (GET(slave->are_errors_short)) {
-		printf("    %-16s a counter stood at 255: there were more errors than counted\n",
+		printf("    %-16s a counter reached 255: there were more errors than counted\n",
 		       "");
 	}
 }

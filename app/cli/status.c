@@ -10,10 +10,8 @@ enum exit_code verb_status(struct cli *cli, int argc, char **argv)
 	int is_json = 0;
 	int is_summary = 0;
 	const struct args_option options[] = {
-		{ "json", 0, args_flag, &is_json, NULL,
-		  "all of it as one JSON object in one line" },
-		{ "summary", 0, args_flag, &is_summary, NULL,
-		  "only what one asks at the end of a run" },
+		{ "json", 0, args_flag, &is_json, NULL, "one JSON object in one line" },
+		{ "summary", 0, args_flag, &is_summary, NULL, "a few lines for the end of a run" },
 	};
 	struct args args = { .options = options, .option_count = 2 };
 	const struct status_page *page;

@@ -32,7 +32,7 @@ struct view {
 	struct sync0_result result[LIMIT_SLAVES]; /* the newest of each line */
 };
 
-/* The newest result of each line stands among the last few of the ring. */
+/* The newest result of each line is among the last few of the ring. */
 static void read_results(struct cli *cli, struct view *view)
 {
 	char path[CONFIG_PATH_BYTES];
@@ -98,17 +98,18 @@ static void write_table(const struct view *view)
 	char noise[TEXT_BYTES];
 
 	printf("sync0      %s%s: %s   %" PRIu64 " windows of %s   %" PRIu64 " alarms\n",
-	       sync0_source_to_str(page->source), view->is_running ? "" : " (gone)",
+	       sync0_source_to_str(page->source), view->is_running ? "" : " (not running)",
 	       sync0_state_to_str(GET(page->state)), GET(page->windows),
 	       text_ns(GET(page->window_ns), window), GET(page->alarms));
 	if (page->source == SYNC0_SIMULATED) {
-		puts("           the edges are ecdaq-sim's: no wire and no interrupt is in them");
+		puts("           simulated edges of ecdaq-sim: they include no wire and no "
+		     "interrupt");
 	} else if (GET(page->noise_p99_ns) < 0) {
 		puts("           not calibrated: phase and skew are UNRESOLVED (ecdaq sync0 "
 		     "calibrate)");
 	} else {
-		printf("           resolution of this board: p99 %s; it does not verify jitter "
-		       "below that\n",
+		printf("           resolution of this board: p99 %s; jitter below that is not "
+		       "verified\n",
 		       text_ns(GET(page->noise_p99_ns), noise));
 	}
 	if (page->message[0] != '\0') {
@@ -242,8 +243,8 @@ static void write_bars(const struct view *view)
 {
 	char name[TEXT_BYTES * 2];
 
-	puts("distance of each SYNC0 period from the nominal one; the noise of the measurement "
-	     "is in it");
+	puts("difference of each SYNC0 period from nominal, including measurement "
+	     "noise");
 	for (uint32_t i = 0; i < view->lines; i++) {
 		const struct sync0_line_status *ls = &view->page->line[i];
 
@@ -317,16 +318,17 @@ enum exit_code verb_sync0(struct cli *cli, int argc, char **argv)
 		return result;
 	}
 	if (is_json && is_histogram) {
-		return cli_fail(cli, EXIT_CODE_USAGE, "--json and --histogram: one of them");
+		return cli_fail(cli, EXIT_CODE_USAGE, "--json and --histogram exclude each other");
 	}
 	if (args.operand_count == 0) {
 		return show(cli, is_json, is_histogram);
 	}
 	if (strcmp(args.operands[0], "calibrate") != 0) {
-		return cli_fail(cli, EXIT_CODE_USAGE, "%s: is not calibrate", args.operands[0]);
+		return cli_fail(cli, EXIT_CODE_USAGE, "%s: expected calibrate", args.operands[0]);
 	}
 	if (is_json || is_histogram) {
-		return cli_fail(cli, EXIT_CODE_USAGE, "calibrate has no --json and no --histogram");
+		return cli_fail(cli, EXIT_CODE_USAGE,
+				"calibrate: --json and --histogram are not supported");
 	}
 	return run_calibration(cli);
 }

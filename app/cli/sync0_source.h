@@ -6,7 +6,7 @@
 #include "base/sync0.h"
 #include "cli/cli.h"
 
-/** EXIT_CODE_OK, or the code of a failure that was said. */
+/** EXIT_CODE_OK, or the code of a failure that was reported. */
 enum exit_code sync0_source_open(struct cli *cli, const struct sync0_status **ret_page);
 /** The same without a word: NULL if there is none. */
 const struct sync0_status *sync0_source_try(struct cli *cli);

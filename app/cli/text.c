@@ -80,14 +80,15 @@ const char *text_plain(const char *text, char *buf, size_t buf_len)
 	return buf;
 }
 
-int text_is_plain(const struct channel *ch)
+/* Does the value need no scaling, so that its raw text is exact? */
+static int is_exact(const struct channel *ch)
 {
 	return ch->type != CHANNEL_FLOAT && ch->scale == 1.0 && ch->offset == 0.0;
 }
 
 const char *text_value(const struct channel *ch, uint64_t raw, char buf[TEXT_BYTES])
 {
-	if (text_is_plain(ch)) {
+	if (is_exact(ch)) {
 		image_raw_format(ch, raw, buf, TEXT_BYTES);
 	} else {
 		snprintf(buf, TEXT_BYTES, "%.9g", image_raw_to_physical(ch, raw));
@@ -100,7 +101,7 @@ void text_value_json(struct json *js, const char *key, const struct channel *ch,
 {
 	uint64_t sign = UINT64_C(1) << (ch->bit_len - 1);
 
-	if (kind == TEXT_PHYSICAL && !text_is_plain(ch)) {
+	if (kind == TEXT_PHYSICAL && !is_exact(ch)) {
 		json_double(js, key, image_raw_to_physical(ch, raw));
 	} else if (ch->type == CHANNEL_INT) {
 		json_i64(js, key, (int64_t)((raw ^ sign) - sign));

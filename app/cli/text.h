@@ -22,8 +22,6 @@ const char *text_utc(int64_t utc_ns, char buf[TEXT_BYTES]);
 /** @text for a terminal: printable ASCII, "?" for all else. */
 const char *text_plain(const char *text, char *buf, size_t buf_len);
 
-/** Does the channel's value need no scaling, so that its raw text is exact? */
-int text_is_plain(const struct channel *ch);
 /** A channel's value in its unit, without the unit: exact where the channel is not scaled. */
 const char *text_value(const struct channel *ch, uint64_t raw, char buf[TEXT_BYTES]);
 

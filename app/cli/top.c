@@ -169,7 +169,7 @@ static enum exit_code follow(struct top *top, const struct status_page **page)
 		screen_wait(top->interval_ns);
 	} while (!screen_is_over() && refresh(top, page));
 	screen_end();
-	/* What stood on the screen last is gone with it: leave it in the terminal. */
+	/* Leave the last state in the terminal: the other screen buffer is gone. */
 	if (top->is_live && !screen_is_over()) {
 		record = source_record(top->cli);
 		report_gather(top->cli, *page, record, &report);
@@ -195,7 +195,7 @@ static int is_worth_waiting(struct top *top)
 	return !is_alive;
 }
 
-/* ecdaqd may just be starting; what an earlier one has left is not what is meant. */
+/* ecdaqd may be starting: the page of an earlier one does not count. */
 static void wait_for_page(struct top *top)
 {
 	const int64_t step_ns = 50 * NS_PER_MS;

@@ -99,7 +99,7 @@ static void add_to_plot(struct watch *watch, const struct sample_header *header)
 	for (unsigned i = 0; i < watch->choice.count; i++) {
 		const struct channel *ch = chosen(watch, i);
 
-		/* A stale input would draw a flat line that never was. */
+		/* A stale input would draw a flat line. */
 		if (ch->direction == CHANNEL_OUTPUT || !lines_is_bad(header, ch)) {
 			plot_add(watch->plot, i, time_ns,
 				 plotted_value(watch, ch,
@@ -163,7 +163,7 @@ static enum exit_code begin_plot(struct watch *watch)
 	if (watch->plot == NULL) {
 		return cli_fail(watch->cli, EXIT_CODE_FAILED, "out of memory");
 	}
-	/* A live picture starts full: the ring knows what was. */
+	/* A live plot starts with the samples that are in the ring. */
 	if (watch->is_live) {
 		uint64_t newest = ring_newest(reader);
 		uint64_t oldest = ring_oldest(reader);
@@ -242,7 +242,7 @@ static enum exit_code ended(const struct watch *watch)
 	}
 	if (watch->shown == 0) {
 		return cli_fail(watch->cli, EXIT_CODE_NO_DAEMON,
-				"ecdaqd has ended: nothing comes any more");
+				"ecdaqd has ended: no more samples");
 	}
 	return EXIT_CODE_OK;
 }
@@ -265,7 +265,7 @@ static enum exit_code run(struct watch *watch)
 			fflush(stdout);
 			draw_if_due(watch);
 			if (ferror(stdout)) {
-				return EXIT_CODE_OK; /* main() says why */
+				return EXIT_CODE_OK; /* main() reports why */
 			}
 			break;
 		case FOLLOW_NEW_BUS:
@@ -313,15 +313,15 @@ enum exit_code verb_watch(struct cli *cli, int argc, char **argv)
 	struct watch watch = { .cli = cli, .every = 1, .window_ns = 5 * NS_PER_S };
 	const struct args_option options[] = {
 		{ "plot", 'p', args_flag, &watch.is_plot, NULL,
-		  "curves that scroll, a panel a channel" },
+		  "scrolling curves, one panel per channel" },
 		{ "window", 'w', args_duration, &watch.window_ns, "T",
 		  "time across the plot (5s)" },
 		{ "count", 'n', args_count, &watch.count, "N", "end after N samples" },
-		{ "every", 0, args_count, &watch.every, "N", "only each N-th cycle" },
-		{ "rate", 0, args_number, &watch.rate_hz, "HZ", "only about so many a second" },
+		{ "every", 0, args_count, &watch.every, "N", "only every N-th cycle" },
+		{ "rate", 0, args_number, &watch.rate_hz, "HZ", "about HZ samples per second" },
 		{ "raw", 0, args_flag, &watch.is_raw, NULL,
 		  "raw counts, not in the channel's unit" },
-		{ "json", 0, args_flag, &watch.is_json, NULL, "a JSON object a sample" },
+		{ "json", 0, args_flag, &watch.is_json, NULL, "one JSON object per sample" },
 	};
 	enum exit_code result;
 
@@ -335,10 +335,10 @@ enum exit_code verb_watch(struct cli *cli, int argc, char **argv)
 		return result;
 	}
 	if (watch.is_plot && watch.is_json) {
-		return cli_fail(cli, EXIT_CODE_USAGE, "--plot and --json: one or the other");
+		return cli_fail(cli, EXIT_CODE_USAGE, "--plot and --json exclude each other");
 	}
 	if (watch.rate_hz > 0 && watch.every > 1) {
-		return cli_fail(cli, EXIT_CODE_USAGE, "--rate and --every: one or the other");
+		return cli_fail(cli, EXIT_CODE_USAGE, "--rate and --every exclude each other");
 	}
 	watch.is_live = watch.is_plot && screen_is_terminal();
 	return begin(&watch);

@@ -36,15 +36,15 @@ def test_set_takes_several_outputs_at_once_and_64_bits_exactly(daemon: Fake) -> 
 @pytest.mark.parametrize(
     ("word", "code", "said"),
     [
-        ("piccolo0.led", USAGE, "piccolo0.led: wants OUTPUT=VALUE"),
-        ("=1", USAGE, "=1: wants OUTPUT=VALUE"),
-        ("piccolo0.led=", USAGE, "wants OUTPUT=VALUE"),
+        ("piccolo0.led", USAGE, "piccolo0.led: expected OUTPUT=VALUE"),
+        ("=1", USAGE, "=1: expected OUTPUT=VALUE"),
+        ("piccolo0.led=", USAGE, "expected OUTPUT=VALUE"),
         ("piccolo0.lde=1", FAILED, "piccolo0.lde: no such channel; did you mean piccolo0.led?"),
         ("piccolo0.adc=1", FAILED, "piccolo0.adc: is an input"),
-        ("piccolo0.led=2", FAILED, "piccolo0.led: 2 is no value of type BOOL"),
-        ("piccolo0.led=maybe", FAILED, "maybe is no value of type BOOL"),
+        ("piccolo0.led=2", FAILED, "piccolo0.led: 2 is not a value of type BOOL"),
+        ("piccolo0.led=maybe", FAILED, "maybe is not a value of type BOOL"),
         ("piccolo0.oneshot_time=-1", FAILED, "-1 does not fit into UINT64"),
-        ("piccolo0.oneshot_time=1.5", FAILED, "1.5 is no value of type UINT64"),
+        ("piccolo0.oneshot_time=1.5", FAILED, "1.5 is not a value of type UINT64"),
         ("piccolo1.led=1", REFUSED, "refused: piccolo1.led: owned by program"),
     ],
 )
@@ -134,9 +134,9 @@ def test_sdo_write_is_read_back(daemon: Fake) -> None:
     [
         (["read", "0", "0x1234"], REFUSED, "0x1234:00: SDO abort 0x06020000: object"),
         (["write", "0", "0x8000:1", "1", "-t", "USINT"], REFUSED, "0x08000022: data cannot be"),
-        (["write", "0", "0x8000:2", "1"], USAGE, "--type: writing wants one of BOOL|SINT"),
+        (["write", "0", "0x8000:2", "1"], USAGE, "write: --type must be one of BOOL|SINT"),
         (["write", "0", "0x8000:2", "65536", "-t", "UINT"], USAGE, "65536: does not fit into UINT"),
-        (["write", "0", "0x8000:2", "x", "-t", "UINT"], USAGE, "x: is no UINT"),
+        (["write", "0", "0x8000:2", "x", "-t", "UINT"], USAGE, "x: is not a valid UINT"),
         (["write", "0", "0x8000:2", "-1", "-t", "UINT"], USAGE, "-1: does not fit into UINT"),
         (["read", "0", "0x1018:1", "-t", "UINT"], FAILED, "the object has 4 bytes, UINT has 2"),
         (["read", "9", "0x1018:1"], FAILED, "9: no slave at this position, there are 2"),
@@ -159,19 +159,19 @@ def test_stop_waits_until_ecdaqd_is_gone(daemon: Fake) -> None:
     assert daemon.process.wait(20) == 0
     _, said = process.communicate(timeout=60)
     assert (process.returncode, said) == (OK, "")
-    fails(daemon("stop"), NO_DAEMON, "nobody listens: is ecdaqd running?")
+    fails(daemon("stop"), NO_DAEMON, "no answer: is ecdaqd running?")
 
 
 def test_an_ecdaqd_that_hangs_up_is_named(fake: Callable[..., Fake]) -> None:
-    fails(fake("ADMIN=mute")("clear"), NO_DAEMON, "ecdaqd: hung up without an answer")
+    fails(fake("ADMIN=mute")("clear"), NO_DAEMON, "ecdaqd: connection closed without an answer")
 
 
 def test_an_answer_of_another_version_is_refused(fake: Callable[..., Fake]) -> None:
-    fails(fake("ADMIN=garbage")("clear"), FAILED, "its answer is of another version")
+    fails(fake("ADMIN=garbage")("clear"), FAILED, "the answer is from another version")
 
 
 def test_a_socket_that_nobody_serves_is_named(fake: Callable[..., Fake], run_dir: Path) -> None:
     daemon = fake("ADMIN=none")
-    fails(daemon("clear"), NO_DAEMON, "nobody listens")
+    fails(daemon("clear"), NO_DAEMON, "no answer")
     (run_dir / "admin").write_text("")
-    fails(daemon("clear"), NO_DAEMON, "nobody listens")
+    fails(daemon("clear"), NO_DAEMON, "no answer")

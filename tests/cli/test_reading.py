@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import json
 import math
+import os
 import re
 import signal
 import subprocess
@@ -326,15 +328,23 @@ def test_top_ends_when_ecdaqd_ends(daemon: Fake) -> None:
     assert rest.splitlines()[-1].startswith("STOPPED")
 
 
-def test_everything_is_mapped_read_only(daemon: Fake) -> None:
+def test_everything_is_read_and_mapped_read_only(daemon: Fake) -> None:
     process = daemon.start("watch", "piccolo0.adc", stdout=subprocess.DEVNULL)
-    maps = Path(f"/proc/{process.pid}/maps")
+    proc = Path(f"/proc/{process.pid}")
 
-    def shared() -> list[str]:
-        return [line.split()[1] for line in maps.read_text().splitlines() if "/ecdaq-cli-" in line]
+    def modes() -> list[str]:
+        """Of what it has mapped or open in the run directory."""
+        maps = (proc / "maps").read_text().splitlines()
+        found = [line.split()[1] for line in maps if "/ecdaq-cli-" in line]
+        for fd in (proc / "fd").iterdir():
+            with contextlib.suppress(FileNotFoundError):  # closed meanwhile
+                if "/ecdaq-cli-" in str(fd.readlink()):
+                    flags = (proc / "fdinfo" / fd.name).read_text().split("flags:")[1].split()[0]
+                    found.append("r--s" if int(flags, 8) & os.O_ACCMODE == os.O_RDONLY else flags)
+        return found
 
-    wait_until(lambda: len(shared()) >= 2)
-    assert set(shared()) == {"r--s"}
+    wait_until(lambda: len(modes()) >= 1)
+    assert set(modes()) == {"r--s"}
     process.terminate()
     process.wait(20)
 

@@ -201,15 +201,15 @@ def test_a_line_that_cannot_be_had_is_said_once_and_waited_for(run_dir: Path) ->
         _, said = process.communicate(timeout=60)
     assert process.returncode == 0
     assert said.count("this machine has no GPIO chip") == 1
-    assert "(gone)" in works(ecdaq(run_dir, "sync0"))
+    assert "(not running)" in works(ecdaq(run_dir, "sync0"))
     dev.rmdir()
 
 
 def test_without_ecdaq_sync0_the_verb_says_so(run_dir: Path) -> None:
     fails(ecdaq(run_dir, "sync0"), NO_DAEMON, "is ecdaq-sync0 running?")
     fails(ecdaq(run_dir, "sync0", "measure"), USAGE, "calibrate")
-    fails(ecdaq(run_dir, "sync0", "--json", "--histogram"), USAGE, "one of them")
-    fails(ecdaq(run_dir, "sync0", "calibrate", "--json"), USAGE, "no --json")
+    fails(ecdaq(run_dir, "sync0", "--json", "--histogram"), USAGE, "exclude each other")
+    fails(ecdaq(run_dir, "sync0", "calibrate", "--json"), USAGE, "not supported")
 
 
 def test_a_calibration_needs_two_lines(tmp_path: Path) -> None:
