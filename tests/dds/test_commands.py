@@ -129,7 +129,7 @@ def test_wrong_commands_are_refused_with_their_reason_and_never_reach_the_bus(
         ({LED: 1, "piccolo1.led": 1}, {}, "owned by local, not remote"),
         ({"piccolo0.adc": 1}, {}, "is an input"),
         ({"nobody.led": 1}, {}, "no such channel"),
-        ({LED: 7}, {}, "cannot be held"),
+        ({LED: 7}, {}, "outside the range of the channel"),
         ({LED: 2}, {"raw": True}, "does not fit in 1 bits"),
         ({LED: 1}, {"session": 5}, "stale"),
         ({LED: 1}, {"not_after_cycle": 1}, "stale"),

@@ -29,7 +29,7 @@ MODULES: dict[str, dict[str, set[str]]] = {
     "core": {
         "base": set(),
         "wire": {"base"},
-        "config": {"base"},
+        "config": {"base", "image"},
         "program": {"base", "config"},
         "image": {"base", "wire"},
         "reader": {"base", "image"},

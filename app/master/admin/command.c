@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "config/output.h"
 #include "image/image.h"
 
 /* One item of a set, resolved. */
@@ -48,70 +49,13 @@ static int has_op(const struct admin_target *t, struct admin_reply *reply)
 	return 1;
 }
 
-static const struct config_output *output_config(const struct config *cfg, const char *channel)
-{
-	for (size_t i = 0; i < cfg->output_count; i++) {
-		if (strncmp(cfg->output[i].channel, channel, LIMIT_NAME_BYTES) == 0) {
-			return &cfg->output[i];
-		}
-	}
-	return NULL;
-}
-
-/* Its place on the board: the n-th output of the channel table (base/board.h). */
-static unsigned output_index(const struct admin_target *t, size_t channel)
-{
-	unsigned n = 0;
-
-	for (size_t i = 0; i < channel; i++) {
-		n += t->channels[i].direction == CHANNEL_OUTPUT;
-	}
-	return n;
-}
-
-static const char *owner_name(enum config_owner owner)
-{
-	switch (owner) {
-	case CONFIG_OWNER_LOCAL:
-		return "local";
-	case CONFIG_OWNER_PROGRAM:
-		return "program";
-	case CONFIG_OWNER_REMOTE:
-		return "remote";
-	}
-	return "unknown";
-}
-
 /* May the local writer put @raw on @channel? 0, or the refusal in @reply. */
 static int check_output(const struct admin_target *t, size_t channel, uint64_t raw,
 			struct admin_reply *reply)
 {
-	const struct channel *ch = &t->channels[channel];
-	const struct config_output *out = output_config(t->cfg, ch->name);
-	double physical;
-
-	if (ch->direction != CHANNEL_OUTPUT) {
-		admin_reply_refuse(reply, -EPERM, "%s: an input, not an output", ch->name);
-		return reply->result;
-	}
-	if (out != NULL && out->owner != CONFIG_OWNER_LOCAL) {
-		admin_reply_refuse(reply, -EPERM, "%s: owned by %s, not local (outputs[].owner)",
-				   ch->name, owner_name(out->owner));
-		return reply->result;
-	}
-	if (ch->bit_len < 64 && raw >> ch->bit_len != 0) {
-		admin_reply_refuse(reply, -ERANGE, "%s: %" PRIu64 " does not fit in %u bits",
-				   ch->name, raw, ch->bit_len);
-		return reply->result;
-	}
-	physical = image_raw_to_physical(ch, raw);
-	/* A NaN is in no range. */
-	if (out != NULL && !(physical >= out->min && physical <= out->max)) {
-		admin_reply_refuse(reply, -ERANGE, "%s: %g is outside %g to %g (outputs[])",
-				   ch->name, physical, out->min, out->max);
-		return reply->result;
-	}
-	return 0;
+	reply->result = config_output_check(t->cfg, &t->channels[channel], CONFIG_OWNER_LOCAL, raw,
+					    reply->text, sizeof(reply->text));
+	return reply->result;
 }
 
 static int place_item(const struct admin_target *t, const struct admin_item *item,
@@ -130,7 +74,7 @@ static int place_item(const struct admin_target *t, const struct admin_item *ite
 	}
 	*ret_placed = (struct placed){
 		.channel = (size_t)channel,
-		.output = output_index(t, (size_t)channel),
+		.output = config_output_index(t->channels, (size_t)channel),
 		.raw = item->raw,
 	};
 	return 0;
@@ -252,7 +196,7 @@ static int place_oneshot(const struct admin_target *t, uint16_t slave_pos, int64
 	}
 	*ret_placed = (struct placed){
 		.channel = (size_t)channel,
-		.output = output_index(t, (size_t)channel),
+		.output = config_output_index(t->channels, (size_t)channel),
 		.raw = (uint64_t)at_ns,
 	};
 	return 0;

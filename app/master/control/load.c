@@ -8,6 +8,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "config/output.h"
 #include "control/control_internal.h"
 
 #define SYMBOL "ecdaq_program"
@@ -156,22 +157,12 @@ int control_load(const struct config *cfg, struct control **ret_control, char *e
 
 /* --- init() --- */
 
-static const struct config_output *configured(const struct config *cfg, const char *name)
-{
-	for (size_t i = 0; i < cfg->output_count; i++) {
-		if (strncmp(cfg->output[i].channel, name, LIMIT_NAME_BYTES) == 0) {
-			return &cfg->output[i];
-		}
-	}
-	return NULL;
-}
-
 /* The n-th output channel is the n-th place on the board; cycle_create() has counted them. */
 static void place_outputs(struct control *ctl)
 {
 	for (size_t i = 0; i < ctl->spec.channel_count; i++) {
 		const struct channel *ch = &ctl->spec.channels[i];
-		const struct config_output *wanted = configured(ctl->cfg, ch->name);
+		const struct config_output *wanted = config_output_find(ctl->cfg, ch->name);
 
 		ctl->output_of[i] = -1;
 		if (ch->direction != CHANNEL_OUTPUT || ctl->output_count == BOARD_OUTPUTS) {

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "base/clock.h"
+#include "config/output.h"
 #include "image/image.h"
 #include "publish/domain.h"
 
@@ -51,16 +52,6 @@ __attribute__((format(printf, 3, 4))) static int refuse(char *reason, int error,
 	vsnprintf(reason, GATE_REASON_BYTES, format, args);
 	va_end(args);
 	return error;
-}
-
-const struct config_output *gate_rules(const struct config *cfg, const char *name)
-{
-	for (size_t i = 0; i < cfg->output_count; i++) {
-		if (strcmp(cfg->output[i].channel, name) == 0) {
-			return &cfg->output[i];
-		}
-	}
-	return NULL;
 }
 
 int64_t gate_lease_ns(const struct config *cfg)
@@ -179,74 +170,34 @@ static int check_order(struct commander *c, const struct gate_command *cmd,
 	return 0;
 }
 
-static unsigned output_index(const struct slave_table *table, uint32_t channel)
-{
-	unsigned output = 0;
-
-	for (uint32_t i = 0; i < channel; i++) {
-		output += table->channels[i].direction == CHANNEL_OUTPUT;
-	}
-	return output;
-}
-
-static int check_range(const struct channel *ch, const struct config_output *rules, uint64_t raw,
-		       char *reason)
-{
-	double physical;
-
-	if (ch->bit_len < 64 && raw >> ch->bit_len != 0) {
-		return refuse(reason, -ERANGE, "%s: %" PRIu64 " does not fit in %u bits", ch->name,
-			      raw, ch->bit_len);
-	}
-	physical = image_raw_to_physical(ch, raw);
-	/* A NaN is in no range. */
-	if (!(physical >= rules->min && physical <= rules->max)) {
-		return refuse(reason, -ERANGE, "%s: %g is outside %g to %g (outputs[])", ch->name,
-			      physical, rules->min, rules->max);
-	}
-	return 0;
-}
-
-static const char *owner_of(const struct config_output *rules)
-{
-	return rules == NULL || rules->owner == CONFIG_OWNER_LOCAL ? "local" : "program";
-}
-
 static int check_item(const struct gate *gate, const struct gate_command *cmd, uint32_t i,
 		      const struct slave_table *table, struct gate_item *ret_item, char *reason)
 {
 	int index =
 		image_channel_find(table->channels, table->meta->channel_count, cmd->channel[i]);
-	const struct config_output *rules = gate_rules(gate->cfg, cmd->channel[i]);
 	const struct channel *ch;
-	uint64_t raw;
+	struct gate_item item;
 	int r;
 
-	if (index < 0 || table->channels[index].direction != CHANNEL_OUTPUT) {
-		return refuse(reason, -ENOENT, "%.*s: %s", GATE_NAME_BYTES, cmd->channel[i],
-			      index < 0 ? "no such channel" : "is an input");
+	if (index < 0) {
+		return refuse(reason, -ENOENT, "%.*s: no such channel", GATE_NAME_BYTES,
+			      cmd->channel[i]);
 	}
 	ch = &table->channels[index];
-	if (rules == NULL || rules->owner != CONFIG_OWNER_REMOTE) {
-		return refuse(reason, -EPERM, "%s: owned by %s, not remote (outputs[].owner)",
-			      ch->name, owner_of(rules));
+	item.output = config_output_index(table->channels, (size_t)index);
+	if (item.output >= BOARD_OUTPUTS) {
+		return refuse(reason, -ENOENT, "%s: more than %d outputs", ch->name, BOARD_OUTPUTS);
 	}
 	if (cmd->is_raw) {
-		raw = cmd->raw[i];
-	} else {
-		r = image_physical_to_raw(ch, cmd->values[i], &raw);
-		if (r < 0) {
-			return refuse(reason, -ERANGE, "%s: %g cannot be held by the channel",
-				      ch->name, cmd->values[i]);
-		}
+		item.raw = cmd->raw[i];
+	} else if (image_physical_to_raw(ch, cmd->values[i], &item.raw) < 0) {
+		return refuse(reason, -ERANGE, "%s: %g is outside the range of the channel",
+			      ch->name, cmd->values[i]);
 	}
-	r = check_range(ch, rules, raw, reason);
+	r = config_output_check(gate->cfg, ch, CONFIG_OWNER_REMOTE, item.raw, reason,
+				GATE_REASON_BYTES);
 	if (r == 0) {
-		*ret_item = (struct gate_item){ .output = output_index(table, (uint32_t)index),
-						.raw = raw };
-		if (ret_item->output >= BOARD_OUTPUTS) {
-			return refuse(reason, -ENOENT, "%s: beyond the board", ch->name);
-		}
+		*ret_item = item;
 	}
 	return r;
 }
@@ -316,7 +267,7 @@ int gate_has_timeout(const struct slave_table *table, const struct config *cfg, 
 	for (uint32_t i = 0; i < table->meta->channel_count; i++) {
 		if (table->channels[i].direction == CHANNEL_OUTPUT && n++ == output) {
 			const struct config_output *rules =
-				gate_rules(cfg, table->channels[i].name);
+				config_output_find(cfg, table->channels[i].name);
 
 			return rules != NULL && rules->timeout_ns > 0;
 		}

@@ -70,9 +70,6 @@ void gate_note_set(struct gate *gate, unsigned output, uint64_t sender);
 uint64_t gate_setter(const struct gate *gate, unsigned output);
 int gate_has_timeout(const struct slave_table *table, const struct config *cfg, unsigned output);
 
-/** The rules of a channel named @name; NULL: the standard ones. */
-const struct config_output *gate_rules(const struct config *cfg, const char *name);
-
 /** Longest liveliness lease a commander may have: half the shortest time-out, 20 ms to 1 s. */
 int64_t gate_lease_ns(const struct config *cfg);
 

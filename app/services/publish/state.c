@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "config/output.h"
 #include "ecdaq.h"
 #include "image/image.h"
 #include "publish/domain.h"
@@ -52,9 +53,8 @@ static void put_slaves(ecdaq_ChannelsV1 *m, const struct slave_table *t)
 static void put_channel(ecdaq_ChannelsV1 *m, uint32_t i, const struct channel *ch,
 			const struct config *cfg)
 {
-	static const char *const owners[] = { "local", "program", "remote" };
 	int is_output = ch->direction == CHANNEL_OUTPUT;
-	const struct config_output *rules = is_output ? gate_rules(cfg, ch->name) : NULL;
+	const struct config_output *rules = is_output ? config_output_find(cfg, ch->name) : NULL;
 	char type[TYPE_BYTES];
 
 	image_type_format(ch, type, sizeof(type));
@@ -65,9 +65,7 @@ static void put_channel(ecdaq_ChannelsV1 *m, uint32_t i, const struct channel *c
 	m->is_output._buffer[i] = is_output != 0;
 	m->scale._buffer[i] = ch->scale;
 	m->offset._buffer[i] = ch->offset;
-	m->owner._buffer[i] = dds_string_dup(rules != NULL ? owners[rules->owner]
-					     : is_output   ? owners[CONFIG_OWNER_LOCAL]
-							   : "");
+	m->owner._buffer[i] = dds_string_dup(is_output ? config_output_owner(rules) : "");
 	m->minimum._buffer[i] = rules != NULL ? rules->min : 0;
 	m->maximum._buffer[i] = rules != NULL ? rules->max : 0;
 	m->fail_safe._buffer[i] = rules != NULL ? rules->fail_safe : 0;

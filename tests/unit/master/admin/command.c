@@ -87,7 +87,7 @@ TEST(admin, an_input_is_not_set)
 	fake_init(&fake);
 	reply = set_one(&fake, "a.adc", 1, ADMIN_DONE);
 	CHECK_EQ(reply.result, -EPERM);
-	CHECK_STR(reply.text, "a.adc: an input, not an output");
+	CHECK_STR(reply.text, "a.adc: is an input");
 }
 
 TEST(admin, an_output_with_another_owner_is_refused)

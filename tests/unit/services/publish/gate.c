@@ -121,7 +121,8 @@ TEST(publish_gate, only_the_remote_owner_may_write_and_only_outputs)
 	CHECK_STR(s->reason, "s.led: owned by program, not remote (outputs[].owner)");
 	s->cfg.output_count = 0;
 	CHECK_EQ(ask(s, 1, 2, "s.volt", 1), -EPERM);
-	CHECK_EQ(ask(s, 1, 3, "s.adc", 1), -ENOENT);
+	CHECK_EQ(ask(s, 1, 3, "s.adc", 1), -EPERM);
+	CHECK_STR(s->reason, "s.adc: is an input");
 	CHECK_EQ(ask(s, 1, 4, "s.none", 1), -ENOENT);
 }
 
