@@ -13,26 +13,28 @@ usage()
 usage: ./build.sh VERB [OPTION...]
 
   run      a simulated segment, the master, the recorder, DDS and the live view, on this machine
-  test     the tests, all groups or some
-  build    compile, and lay what others use into build/stage/
-  sim      the simulated segment alone, on a network interface
+  test     run the tests, all groups or some
+  build    compile and install into build/stage/
+  sim      run the simulated segment alone, on a network interface
   fuzz     search for inputs that break a parser
   lint     formatting, static analysis, shell and Python checks
   clean    remove what was built
-  image    the disk image of the SBC, or of the machine that QEMU plays
-  boot     that image in QEMU
-  help     this, or ./build.sh help VERB for its options
+  image    build the disk image of the SBC, or of the QEMU machine
+  boot     boot that image in QEMU
+  help     print this, or the options of a verb: ./build.sh help VERB
 
-What is missing on Debian 12 or 13 is installed (as root or with sudo); elsewhere it is named.
-The list with reasons: app/tools/packages.txt. Downloads are kept in ~/.cache/ecdaq/.
+Missing packages are installed on Debian 12 or 13 (as root or with sudo) and listed on other systems;
+app/tools/packages.txt says what each is for. Downloads are kept in ~/.cache/ecdaq/.
+
+exit codes: 0 done, 1 failed, 2 wrong command line, 130 and 143 ended by SIGINT and SIGTERM.
 
 environment of every verb:
   PYTHON              Python 3.11 or newer to start from (default: python3 on PATH, else the machine's)
   XDG_CACHE_HOME      where ecdaq/ keeps its downloads and Python environment (default: ~/.cache)
-  ECDAQ_SOEM_ARCHIVE  the archive that app/third_party/soem.lock names, where no registry is reached
-  ECDAQ_LIBGPIOD_ARCHIVE  the same of app/third_party/libgpiod.lock
-  PIP_*, pip.conf     the machine's own pip configuration holds
-  ECDAQ_OS_RELEASE    what says which system this is (default: /etc/os-release)
+  ECDAQ_SOEM_ARCHIVE  local copy of the archive in app/third_party/soem.lock (default: downloaded)
+  ECDAQ_LIBGPIOD_ARCHIVE  local copy of the archive in app/third_party/libgpiod.lock
+  PIP_*, pip.conf     pip's own configuration applies
+  ECDAQ_OS_RELEASE    file that identifies the system (default: /etc/os-release)
 USAGE
 }
 
@@ -120,7 +122,7 @@ usage: ./build.sh lint [--fix]
 
 Runs tests/tidy: clang-format, clang-tidy, ruff, shellcheck and the rules of the source tree.
 
-  --fix   first let clang-format and ruff mend what they can
+  --fix   first let clang-format and ruff fix what they can
 USAGE
 }
 
@@ -152,14 +154,25 @@ prepare_build()
 {
 	need_packages build "$@"
 	want_packages dds ecdaq-dds
+	need_sources
+}
+
+# What the tests need on top of that.
+prepare_tests()
+{
 	need_venv
-	need_soem
-	need_libgpiod
+	prepare_build test "$@"
 }
 
 do_build()
 {
 	[ $# -gt 0 ] || set -- release
+	for flavour in "$@"; do
+		case $flavour in
+		release | asan | tsan | fuzz | clang) ;;
+		*) usage_error "build: no flavour '$flavour'; there are: release asan tsan fuzz clang" ;;
+		esac
+	done
 	prepare_build
 	for flavour in "$@"; do
 		case $flavour in
@@ -167,12 +180,18 @@ do_build()
 		esac
 		build_flavour "$flavour"
 		note "built $flavour in build/$flavour/"
+		[ "$flavour" != release ] ||
+			note "to have the programs on PATH: export PATH=\"$stage/bin:\$PATH\""
 	done
 }
 
 do_test()
 {
-	prepare_build test run dds
+	# A wrong word is reported before anything is installed or built.
+	if python=$(find_python); then
+		"$python" "$root/app/tools/run_tests.py" --check "$@"
+	fi
+	prepare_tests run dds
 	case " ${1:--} $* " in
 	" -"* | *" dds "*) want_packages foreign "subscribers on Fast DDS and RustDDS" ;;
 	esac
@@ -183,14 +202,14 @@ do_run()
 {
 	"$root/app/tools/run-segment.sh" --check "$@"
 	prepare_build run
-	build_flavour release
+	build_flavour release programs
 	exec "$root/app/tools/run-segment.sh" "$@"
 }
 
 do_sim()
 {
 	prepare_build
-	build_flavour release
+	build_flavour release programs
 	exec "$stage/bin/ecdaq-sim" "$@"
 }
 
@@ -199,20 +218,21 @@ do_fuzz()
 	target=${1:-}
 	seconds=${2:-60}
 	case $seconds in
-	'' | *[!0-9]*) die "fuzz: '$seconds' is no number of seconds" ;;
+	'' | *[!0-9]*) usage_error "fuzz: '$seconds' is not a number of seconds" ;;
 	esac
-	[ -z "$target" ] || [ -d "$root/tests/fuzz/$target" ] || die "fuzz: no target '$target' in tests/fuzz/"
+	[ -z "$target" ] || [ -d "$root/tests/fuzz/$target" ] ||
+		usage_error "fuzz: no target '$target' in tests/fuzz/"
 	do_test --fuzz-seconds "$seconds" --only "${target:+^fuzz_$target\$}" fuzz
 }
 
 do_lint()
 {
-	prepare_build test
 	case ${1:-} in
-	'') ;;
-	--fix) "$PYTHON" "$root/tests/tidy/fix.py" ;;
-	*) die "lint: unknown option '$1' (see ./build.sh help lint)" ;;
+	'' | --fix) ;;
+	*) usage_error "lint: unknown option '$1' (see ./build.sh help lint)" ;;
 	esac
+	prepare_tests
+	[ -z "${1:-}" ] || "$PYTHON" "$root/tests/tidy/fix.py"
 	exec "$PYTHON" "$root/app/tools/run_tests.py" tidy
 }
 
@@ -221,7 +241,7 @@ do_clean()
 	case ${1:-} in
 	'') rm -rf "$root/build" ;;
 	--all) rm -rf "$root/build" "$root/app/third_party/soem" "$root/app/third_party/libgpiod" "$cache" ;;
-	*) die "clean: unknown option '$1' (see ./build.sh help clean)" ;;
+	*) usage_error "clean: unknown option '$1' (see ./build.sh help clean)" ;;
 	esac
 }
 
@@ -242,6 +262,7 @@ do_boot()
 	exec "$root/app/tools/image/boot.sh" "$@"
 }
 
+verbs="run test build sim fuzz lint clean image boot"
 verb=${1:-help}
 [ $# -eq 0 ] || shift
 case $verb in
@@ -257,8 +278,8 @@ build | test | run | sim | fuzz | lint | clean | image | boot)
 help | --help | -h)
 	case ${1:-help} in
 	build | test | run | sim | fuzz | lint | clean | image | boot | help) "help_${1:-help}" ;;
-	*) die "no verb '$1'; there are: run test build sim fuzz lint clean image boot help" ;;
+	*) usage_error "no verb '$1'; there are: $verbs help" ;;
 	esac
 	;;
-*) die "no verb '$verb'; there are: run test build sim fuzz lint clean image boot help" ;;
+*) usage_error "no verb '$verb'; there are: $verbs help" ;;
 esac

@@ -79,6 +79,17 @@ function(ecdaq_program name)
 	install(TARGETS ${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 endfunction()
 
+# ecdaq_targets_below(DIRECTORY VARIABLE): all targets of a directory and of those it has added so far.
+function(ecdaq_targets_below directory variable)
+	get_property(targets DIRECTORY "${directory}" PROPERTY BUILDSYSTEM_TARGETS)
+	get_property(below DIRECTORY "${directory}" PROPERTY SUBDIRECTORIES)
+	foreach(subdirectory ${below})
+		ecdaq_targets_below("${subdirectory}" more)
+		list(APPEND targets ${more})
+	endforeach()
+	set(${variable} ${targets} PARENT_SCOPE)
+endfunction()
+
 # ecdaq_test(GROUP NAME SOURCES a.c [DEPENDS module...] [LIBRARIES lib...] [TIMEOUT s] [LABELS long])
 # An executable GROUP_NAME on tests/harness; every TEST(module, sentence) in its sources becomes
 # one ctest test "module.sentence" with label GROUP. LABELS long: not under the sanitizers.

@@ -11,29 +11,35 @@ usage()
 	cat <<'USAGE'
 usage: ./build.sh run [OPTION...]
 
-Brings a simulated segment to OP over a veth pair in a network namespace of its own, records every
-cycle, publishes it over DDS, checks the SYNC0 pulses and shows it live. Ctrl-C ends it in order (ecdaqd, recorder, segment)
-and prints a summary.
-It needs no privilege where the kernel grants users their own namespaces; real-time priority is then
-not to be had, and ecdaqd says so once.
+Brings a simulated segment to OP over a veth pair in its own network namespace, records every cycle,
+publishes it over DDS, checks the SYNC0 pulses and shows it live. Ctrl-C stops ecdaqd, recorder and
+segment in this order, prints a summary and where the recording is.
+It needs no privilege where the kernel grants users network namespaces; ecdaqd then runs without
+real-time priority and reports that once.
 
-  --seconds N     end after N seconds in OP (default: at Ctrl-C)
+  --seconds N     stop after N seconds in OP (default: at Ctrl-C)
   --slaves WHAT   1 to 64: number of FB1111+Piccolo slaves; or names, in the order of the line, of the catalogue
                   (build/stage/bin/ecdaq-sim --list-slaves): ek1100,el2828,el3104 (default: 2)
   --sii DIR       folder of SII images of real slaves, used instead of the catalogue (default: $ECDAQ_SII)
   --config FILE   ecdaq.yaml for ecdaqd and ecdaq-record (default: built-in defaults)
-  --record DIR    where recordings go (default: build/run/record)
-  --no-dds        without ecdaq-dds. Else it publishes on this machine's loopback, in a domain and with a
-                  tag of its own (one line says which); where FILE has a section dds, as that says
-  --no-sync0      without ecdaq-sync0. Else it checks the simulated pulses, marked as such in `ecdaq sync0`; where section
-                  sync0 of FILE has enable or edges, it does as that says
-  --json          no live view; the last line printed is `ecdaq status --json --summary`
+  --record DIR    folder of the recordings (default: build/run/record)
+  --no-dds        do not start ecdaq-dds. Without this option it publishes on the loopback interface,
+                  in a domain and with a tag of its own (one line names them), or as section dds of
+                  FILE says
+  --no-sync0      do not start ecdaq-sync0. Without this option it checks the simulated pulses, marked
+                  as simulated in `ecdaq sync0`, or what section sync0 of FILE names (enable, edges)
+  --json          no live view; the last line of standard output is `ecdaq status --json --summary`;
+                  there is none if the start failed
+
+exit codes: 0 stopped as requested, 1 failed (the last line of standard error is the cause),
+2 wrong command line
 
 environment:
   ECDAQ_BIN_DIR  folder of the programs (default: build/stage/bin)
-  ECDAQ_RUN_DIR  run directory: rings, status, admin socket (default: a new one in /dev/shm, removed
-                 at the end). With it set, `ecdaq` in a second terminal reads what runs here, and
-                 app/tools/tell-segment.py sets inputs of the simulated slaves, or makes faults.
+  ECDAQ_RUN_DIR  run directory: rings, status, admin socket; used by one run at a time (default: a new
+                 /dev/shm/ecdaq-run-*, removed at the end). In a second terminal `ecdaq` reads what
+                 runs here, and app/tools/tell-segment.py sets inputs of the simulated slaves or
+                 injects faults.
   ECDAQ_SII      as --sii
 USAGE
 }
@@ -44,12 +50,18 @@ die()
 	exit 1
 }
 
+usage_error()
+{
+	printf 'build.sh: run: %s\n' "$*" >&2
+	exit 2
+}
+
 note()
 {
 	printf -- '-- %s\n' "$*" >&2
 }
 
-# The highest domain: nobody's by default, and no ports that the kernel gives away.
+# The highest domain: no default of anybody, and below the kernel's ephemeral ports.
 private_domain=230
 seconds=
 slaves=2
@@ -61,13 +73,15 @@ dds=yes
 sync0=yes
 mode=outside
 bin=${ECDAQ_BIN_DIR:-$root/build/stage/bin}
+# As one types it here.
+tool=${bin#"$PWD/"}/ecdaq
 
 parse_options()
 {
 	while [ $# -gt 0 ]; do
 		case $1 in
 		--seconds | --slaves | --sii | --config | --record)
-			[ $# -ge 2 ] || die "$1 needs a value"
+			[ $# -ge 2 ] || usage_error "$1 needs a value"
 			printf -v "${1#--}" '%s' "$2"
 			shift
 			;;
@@ -80,7 +94,7 @@ parse_options()
 			usage
 			exit 0
 			;;
-		*) die "unknown option '$1' (see ./build.sh help run)" ;;
+		*) usage_error "unknown option '$1' (see ./build.sh help run)" ;;
 		esac
 		shift
 	done
@@ -89,32 +103,32 @@ parse_options()
 check_options()
 {
 	case $seconds in
-	*[!0-9]* | 0) die "--seconds: '$seconds' is no number of seconds above 0" ;;
+	*[!0-9]* | 0) usage_error "--seconds: '$seconds' is not a number of seconds above 0" ;;
 	esac
 	case $slaves in
-	'') die "--slaves: nothing given" ;;
+	'') usage_error "--slaves: nothing given" ;;
 	*[!0-9]*)
-		[ -z "$sii" ] || [ -d "$sii" ] || die "--sii: $sii: no such folder"
+		[ -z "$sii" ] || [ -d "$sii" ] || usage_error "--sii: $sii: no such directory"
 		;;
 	*)
 		if [ "${#slaves}" -gt 2 ] || [ "$slaves" -lt 1 ] || [ "$slaves" -gt 64 ]; then
-			die "--slaves: $slaves is not 1 to 64"
+			usage_error "--slaves: $slaves is not 1 to 64"
 		fi
 		;;
 	esac
 	[ -z "$seconds" ] || daemon_options+=(--seconds "$seconds")
-	[ -z "$config" ] || [ -r "$config" ] || die "--config: $config: cannot be read"
+	[ -z "$config" ] || [ -r "$config" ] || usage_error "--config: $config: cannot be read"
 }
 
-# ecdaq-dds stays outside of the namespace, where others can subscribe: it needs nothing of the
-# segment but the run directory. It is a child of this process, which goes on as the one inside.
+# ecdaq-dds runs outside the namespace, where others can subscribe: all it needs is the run directory.
+# It is a child of this process, which continues inside by exec.
 start_dds()
 {
 	local options=(--config "$config") why
 
 	[ "$dds" = yes ] || return 0
 	if [ ! -x "$bin/ecdaq-dds" ]; then
-		note "no DDS: ecdaq-dds is not there (app/doc/reference/dds.md says what it needs to be built)"
+		note "no DDS: ecdaq-dds is not built (app/doc/reference/dds.md names the packages it needs)"
 		return 0
 	fi
 	if [ -z "$config" ] || ! grep -q '^dds:' "$config"; then
@@ -126,7 +140,7 @@ start_dds()
 		note "no DDS: ${why##*$'\n'}"
 		return 0
 	fi
-	setpriv --pdeathsig TERM setsid "$bin/ecdaq-dds" "${options[@]}" < /dev/null &
+	setpriv --pdeathsig TERM setsid "$bin/ecdaq-dds" "${options[@]}" < /dev/null 2<> "$run_work/pipe" &
 	export run_dds_pid=$!
 	[[ ${options[*]} != *dds.tag=run-$$ ]] ||
 		note "DDS: ecdaq-remote --interface lo --domain $private_domain --tag run-$$ watch"
@@ -144,6 +158,13 @@ enter_namespace()
 		export ECDAQ_RUN_DIR run_dir_is_own=yes
 	fi
 	mkdir -p "$ECDAQ_RUN_DIR"
+	# Held open by all that is started here, so one run at a time uses a run directory.
+	exec 8> "$ECDAQ_RUN_DIR/run.lock"
+	flock -n 8 || die "$ECDAQ_RUN_DIR: another run uses this directory: stop it, or set another ECDAQ_RUN_DIR"
+	note "starting; in a second terminal: $tool --run-dir $ECDAQ_RUN_DIR status"
+	run_work=$(mktemp -d)
+	export run_work
+	mkfifo "$run_work/pipe"
 	start_dds
 	exec "${how[@]}" "$0" --inside "$@"
 }
@@ -163,7 +184,34 @@ make_wire()
 	done
 }
 
-declare -A pid=()
+declare -A pid=() program=(
+	[daemon]=ecdaqd [recorder]=ecdaq-record [segment]=ecdaq-sim [sync0]=ecdaq-sync0 [dds]=ecdaq-dds [view]=ecdaq
+)
+view=no
+cause=
+
+# What the programs report through $run_work/pipe is kept in $run_work/messages and shown: at once, or,
+# where the live view has the terminal, after it has ended.
+open_messages()
+{
+	if [ "$json" = no ] && [ -t 1 ]; then
+		view=yes
+		setsid cat < "$run_work/pipe" > "$run_work/messages" 4>&- &
+	else
+		setsid tee "$run_work/messages" < "$run_work/pipe" >&2 &
+	fi
+	messages_pid=$!
+	exec 4> "$run_work/pipe"
+}
+
+close_messages()
+{
+	[ -n "${messages_pid:-}" ] || return 0
+	exec 4>&-
+	wait "$messages_pid" || true
+	messages_pid=
+	[ "$view" = no ] || cat "$run_work/messages" >&2
+}
 
 # start NAME COMMAND...: in a session of its own, so that Ctrl-C reaches this script only; ended with
 # this script if it is killed.
@@ -172,11 +220,21 @@ start()
 	local name=$1
 
 	shift
-	setpriv --pdeathsig TERM setsid "$@" <&3 &
+	case $name in
+	interrupt) setpriv --pdeathsig TERM setsid "$@" <&3 4>&- & ;;
+	*) setpriv --pdeathsig TERM setsid "$@" <&3 2>&4 4>&- & ;;
+	esac
 	pid[$name]=$!
 }
 
-# stop NAME: end it by SIGTERM and wait. Its exit code is kept in failed if it is none of ours.
+# failure NAME HOW: the first one is the cause of all others; its program's last message says more.
+failure()
+{
+	failed=1
+	[ -n "$cause" ] || cause="$1 $2" cause_program=$1
+}
+
+# stop NAME: end it by SIGTERM and wait. An exit code that is not that of an orderly end fails the run.
 stop()
 {
 	local name=$1 status=0
@@ -190,9 +248,12 @@ stop()
 	case $status in
 	0 | 143) ;;
 	*)
-		note "$name ended with $status"
-		# Who only looks on does not spoil the run.
-		[ "$name" = sync0 ] || failed=1
+		# A check that fails does not fail what it checks.
+		if [ "$name" = sync0 ]; then
+			note "ecdaq-sync0 ended with $status"
+		else
+			failure "${program[$name]}" "ended with $status"
+		fi
 		;;
 	esac
 }
@@ -200,7 +261,7 @@ stop()
 # The live view stays in this process group: Ctrl-Z and fg reach it, too.
 start_view()
 {
-	setpriv --pdeathsig TERM "$bin/ecdaq" top --leave-text 'q: stop master, segment and recorder' <&3 &
+	setpriv --pdeathsig TERM "$bin/ecdaq" top --leave-text 'q: stop master, segment and recorder' <&3 4>&- &
 	pid[view]=$!
 	trap suspend TSTP
 }
@@ -220,7 +281,7 @@ suspend()
 	trap suspend TSTP
 }
 
-# Does the configuration itself say what ecdaq-sync0 has to look at?
+# Does the configuration itself name what ecdaq-sync0 checks?
 has_sync0_source()
 {
 	[ -n "$config" ] && awk '
@@ -235,19 +296,25 @@ start_sync0()
 
 	[ "$sync0" = yes ] || return 0
 	if [ ! -x "$bin/ecdaq-sync0" ]; then
-		note "no check of SYNC0: ecdaq-sync0 is not there"
+		note "no check of SYNC0: ecdaq-sync0 is not built"
 		return 0
 	fi
 	[ -z "$config" ] || options=(--config "$config")
-	has_sync0_source || options+=(--edges "$ECDAQ_RUN_DIR/edges")
-	start sync0 "$bin/ecdaq-sync0" "${options[@]}"
+	if has_sync0_source; then
+		start sync0 "$bin/ecdaq-sync0" "${options[@]}"
+	else
+		# ecdaq-sim makes this file when it starts.
+		# shellcheck disable=SC2016 # expanded by the inner shell
+		start sync0 sh -c 'until [ -e "$0" ]; do sleep 0.02; done; exec "$@" --edges "$0"' \
+			"$ECDAQ_RUN_DIR/edges" "$bin/ecdaq-sync0" "${options[@]}"
+	fi
 }
 
-# ecdaq-dds was started before this shell: tail stands in for it, and ends when it does.
+# ecdaq-dds is not a child of this shell: a tail that ends with it takes its place.
 adopt_dds()
 {
 	[ -n "${run_dds_pid:-}" ] || return 0
-	setsid tail --pid="$run_dds_pid" -s 0.1 -f /dev/null &
+	setsid tail --pid="$run_dds_pid" -s 0.1 -f /dev/null 4>&- &
 	pid[dds]=$!
 }
 
@@ -279,11 +346,11 @@ clean_up()
 {
 	trap '' INT TERM
 	end_in_order
-	rm -f "$ECDAQ_RUN_DIR/edges"
+	rm -rf "$ECDAQ_RUN_DIR/edges" "$run_work"
 	[ -z "${run_dir_is_own:-}" ] || rm -rf "$ECDAQ_RUN_DIR"
 }
 
-# A signal that comes before "wait" is in it would be waited over: this child's end is waited for, too.
+# A signal that arrives just before "wait" would not end it: the end of this child does.
 start_interruptible()
 {
 	setpriv --pdeathsig TERM setsid sleep infinity <&3 &
@@ -291,10 +358,10 @@ start_interruptible()
 	trap 'interrupted=yes; kill "${pid[interrupt]}" 2> /dev/null || true' INT TERM
 }
 
-# Which of the children ended? Waits for the first, ecdaq-sync0 apart: the run goes on without it.
+# Waits for the first of the children to end, except ecdaq-sync0: the run goes on without it.
 wait_for_end()
 {
-	local ended status
+	local ended='' status
 
 	while :; do
 		status=0
@@ -309,15 +376,43 @@ wait_for_end()
 	done
 	for name in "${!pid[@]}"; do
 		[ "${pid[$name]}" = "$ended" ] || continue
-		case $name in
-		view) ;;
-		daemon) [ -n "$seconds" ] || note "ecdaqd ended by itself" ;;
-		*)
-			note "$name ended by itself"
-			failed=1
-			;;
+		case $name$status in
+		view* | daemon0) ;;
+		*0 | dds*) failure "${program[$name]}" "ended by itself" ;;
+		*) failure "${program[$name]}" "ended with $status" ;;
 		esac
 	done
+}
+
+# The status page of another ecdaqd, or of an earlier run, is not the summary of this one.
+is_own_page()
+{
+	[[ $page == *"\"pid\":$daemon_pid,"* ]]
+}
+
+print_end()
+{
+	local page recording message
+
+	page=$("$bin/ecdaq" status --json --summary 2> /dev/null) || page=
+	# A failed start has no result, only a cause.
+	if [ -z "$cause" ] || { is_own_page && [[ $page != *'"samples_good":0,'* ]]; }; then
+		if [ "$json" = yes ]; then
+			printf '%s\n' "$page"
+			[ -n "$page" ] || failed=1
+		else
+			"$bin/ecdaq" status --summary || failed=1
+		fi
+		recording=$(sed -n 's/.*"recording":"\([^"]*\)".*/\1/p' <<< "$page")
+		if [ -n "$recording" ]; then
+			note "recorded in $record; to look at it: $tool log list --dir $record"
+			note "as a table: $tool log export $recording --output FILE.csv"
+		fi
+	fi
+	if [ -n "$cause" ]; then
+		message=$(sed -n "s/^$cause_program: //p" "$run_work/messages" | tail -n 1)
+		die "$cause${message:+: $message}"
+	fi
 }
 
 run_inside()
@@ -335,24 +430,26 @@ run_inside()
 	[ -z "$config" ] || set_options=(--config "$config" "${set_options[@]}")
 	mkdir -p "$record"
 	exec 3<&0
+	open_messages
 	trap clean_up EXIT
 	start_interruptible
 	make_wire
 	start segment "$bin/ecdaq-sim" "${segment_options[@]}"
 	start recorder "$bin/ecdaq-record" "${set_options[@]}"
-	start daemon "$bin/ecdaqd" "${set_options[@]}" "${daemon_options[@]}"
-	start_sync0
-	adopt_dds
-	if [ "$json" = no ] && [ -t 1 ]; then
+	if [ "$view" = yes ]; then
+		start daemon "$bin/ecdaqd" "${set_options[@]}" "${daemon_options[@]}" >&4
 		start_view
+	else
+		start daemon "$bin/ecdaqd" "${set_options[@]}" "${daemon_options[@]}"
 	fi
+	daemon_pid=${pid[daemon]}
+	adopt_dds
+	start_sync0
+	# No command may run between the first start and this wait: it would take the end of a child.
 	wait_for_end
 	end_in_order
-	if [ "$json" = yes ]; then
-		"$bin/ecdaq" status --json --summary || failed=1
-	else
-		"$bin/ecdaq" status --summary || failed=1
-	fi
+	close_messages
+	print_end
 	exit "$failed"
 }
 

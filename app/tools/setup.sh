@@ -12,9 +12,72 @@ die()
 	exit 1
 }
 
+# usage_error MESSAGE: the command line is wrong.
+usage_error()
+{
+	printf 'build.sh: %s\n' "$*" >&2
+	exit 2
+}
+
 note()
 {
 	printf -- '-- %s\n' "$*" >&2
+}
+
+# Progress of $text, whose output is in $log: a terminal gets one line that is rewritten, anything
+# else a line every 5 s.
+report_progress()
+{
+	half_seconds=0
+	while sleep 0.5 > /dev/null 2>&1 && kill -0 "$$" 2> /dev/null; do
+		half_seconds=$((half_seconds + 1))
+		[ -t 2 ] || [ $((half_seconds % 10)) = 1 ] || continue
+		step=$(tail -n 5 "$log" | sed -n 's/^\[\([0-9]*\)\/\([0-9]*\)\].*/ \1 of \2/p' | tail -n 1)
+		line="$text$step, $(((half_seconds + 1) / 2)) s"
+		if [ -t 2 ]; then
+			printf '\r\033[K-- %.72s' "$line" >&2
+		else
+			note "$line"
+		fi
+	done
+}
+
+# Ends what run_step started, its children included.
+interrupt_step()
+{
+	trap '' INT TERM HUP
+	kill "$reporter" 2> /dev/null || true
+	kill -TERM "$step_target" 2> /dev/null || true
+	wait
+	[ ! -t 2 ] || printf '\r\033[K' >&2
+	exit "$1"
+}
+
+# run_step TEXT LOG COMMAND...: runs a command with its output in LOG and shows progress; returns its
+# exit code. The command has a process group of its own (but for sudo, which asks the terminal), so
+# that a signal to this shell ends all of it.
+run_step()
+{
+	text=$1 log=$2 status=0
+	shift 2
+	if [ "$1" = as_root ]; then
+		"$@" > "$log" 2>&1 &
+		step_target=$!
+	else
+		setsid "$@" < /dev/null > "$log" 2>&1 &
+		step_target=-$!
+	fi
+	step_pid=$!
+	report_progress &
+	reporter=$!
+	trap 'interrupt_step 130' INT
+	trap 'interrupt_step 143' TERM HUP
+	wait "$step_pid" || status=$?
+	kill "$reporter" 2> /dev/null || true
+	wait "$reporter" 2> /dev/null || true
+	trap - INT TERM HUP
+	[ ! -t 2 ] || printf '\r\033[K' >&2
+	return "$status"
 }
 
 # A Python of 3.11 or newer that can make environments; the machine's own if the first on PATH
@@ -102,7 +165,7 @@ as_root()
 	fi
 }
 
-say_missing()
+report_missing()
 {
 	printf 'build.sh: %s; missing:\n' "$2" >&2
 	printf '%s\n' "$1" | while read -r package why; do
@@ -111,32 +174,33 @@ say_missing()
 	exit 1
 }
 
-# need_packages PURPOSE...: install what is missing, or say plainly what it is.
+# need_packages PURPOSE...: install what is missing, or list it and exit.
 need_packages()
 {
 	missing=$(missing_packages "$@")
 	[ -n "$missing" ] || return 0
 	is_supported_debian ||
-		say_missing "$missing" "this is not Debian 12 or 13, install the like of these yourself"
+		report_missing "$missing" "this is not Debian 12 or 13: install the equivalents yourself"
 	if [ "$(id -u)" != 0 ] && ! command -v sudo > /dev/null 2>&1; then
-		say_missing "$missing" "neither root nor sudo, have these Debian packages installed"
+		report_missing "$missing" "neither root nor sudo: have these Debian packages installed"
 	fi
 	names=$(printf '%s\n' "$missing" | cut -f 1 | tr '\n' ' ')
 	note "installing $names"
-	log=$(mktemp)
+	apt_log=$(mktemp)
 	# shellcheck disable=SC2086 # a list of names
-	if ! { as_root apt-get update -q && as_root env DEBIAN_FRONTEND=noninteractive apt-get install \
-		-q -y --no-install-recommends -o DPkg::Lock::Timeout=300 $names; } > "$log" 2>&1; then
-		tail -n 5 "$log" >&2
-		rm -f "$log"
-		say_missing "$missing" "apt-get failed (its last lines stand above)"
+	if ! { run_step "reading Debian's package lists" "$apt_log" as_root apt-get update -q &&
+		run_step "installing packages" "$apt_log" as_root env DEBIAN_FRONTEND=noninteractive \
+			apt-get install -q -y --no-install-recommends -o DPkg::Lock::Timeout=300 $names; }; then
+		tail -n 5 "$apt_log" >&2
+		rm -f "$apt_log"
+		report_missing "$missing" "apt-get failed (its last lines are above)"
 	fi
-	rm -f "$log"
+	rm -f "$apt_log"
 	missing=$(missing_packages "$@")
-	[ -z "$missing" ] || say_missing "$missing" "installed, and still not found"
+	[ -z "$missing" ] || report_missing "$missing" "still not found after installing"
 }
 
-# want_packages PURPOSE WHAT: the same where it can do without; one line says what is left out.
+# want_packages PURPOSE WHAT: the same for what is optional; one line says what is left out.
 want_packages()
 {
 	[ -n "$(missing_packages "$1")" ] || return 0
@@ -156,10 +220,10 @@ need_venv()
 	venv=$cache/venv-$key
 	if [ ! -f "$venv/.complete" ]; then
 		mkdir -p "$cache"
-		(
-			flock 9
-			[ -f "$venv/.complete" ] || make_venv
-		) 9> "$cache/venv.lock" || exit 1
+		exec 9> "$cache/venv.lock"
+		flock 9
+		[ -f "$venv/.complete" ] || make_venv
+		exec 9>&-
 	fi
 	export PYTHON="$venv/bin/python"
 	PATH=$venv/bin:$PATH
@@ -167,26 +231,53 @@ need_venv()
 
 make_venv()
 {
-	note "making the Python environment $venv"
 	rm -rf "$venv"
-	"$base_python" -m venv "$venv" || die "cannot make $venv"
-	"$venv/bin/python" -m pip install --quiet --disable-pip-version-check \
-		--requirement "$root/tests/requirements.txt" ||
-		die "pip cannot install tests/requirements.txt (its reason stands above)"
+	run_step "making the Python environment" "$cache/venv.log" "$base_python" -m venv "$venv" ||
+		die "cannot make $venv (see $cache/venv.log)"
+	run_step "installing Python packages" "$cache/venv.log" "$venv/bin/python" -m pip install \
+		--quiet --disable-pip-version-check --requirement "$root/tests/requirements.txt" ||
+		{
+			cat "$cache/venv.log" >&2
+			die "pip cannot install tests/requirements.txt (its reason is above)"
+		}
 	touch "$venv/.complete"
 }
 
-need_soem()
+# need_pip: sets PYTHON to one with pip, for an archive that is not in the cache.
+need_pip()
 {
-	"$root/app/third_party/fetch-soem.sh" || exit 1
+	PYTHON=$(find_python) || die "no Python 3.11 or newer with venv and ensurepip"
+	if ! "$PYTHON" -m pip --version > /dev/null 2>&1; then
+		mkdir -p "$cache"
+		[ -x "$cache/pip/bin/pip" ] ||
+			run_step "making a Python environment with pip" "$cache/venv.log" \
+				"$PYTHON" -m venv "$cache/pip" || die "cannot make $cache/pip (see $cache/venv.log)"
+		PYTHON=$cache/pip/bin/python
+	fi
+	export PYTHON
 }
 
-need_libgpiod()
+# need_sources: what is compiled and is not in the tree.
+need_sources()
 {
-	"$root/app/third_party/fetch-libgpiod.sh" || exit 1
+	mkdir -p "$root/build"
+	for name in soem libgpiod; do
+		lock=$root/app/third_party/$name.lock
+		stamp=$root/app/third_party/$name/.stamp
+		if [ -z "${venv:-}" ] && { [ ! -e "$stamp" ] || [ "$lock" -nt "$stamp" ]; } &&
+			[ ! -f "$cache/$(sed -n 's/^file = //p' "$lock")" ]; then
+			need_pip
+		fi
+		if ! run_step "fetching $name" "$root/build/fetch-$name.log" \
+			"$root/app/third_party/fetch-$name.sh"; then
+			cat "$root/build/fetch-$name.log" >&2
+			exit 1
+		fi
+	done
 }
 
-# configure_flavour NAME: sets $build_dir and configures it.
+# configure_flavour NAME: sets $build_dir and configures it. Ninja itself configures again when a
+# CMakeLists.txt has changed, so that is not repeated here unless the options have.
 configure_flavour()
 {
 	build_dir=$root/build/$1
@@ -207,25 +298,31 @@ configure_flavour()
 		set -- "$@" -DCMAKE_C_COMPILER_LAUNCHER=ccache
 	fi
 	mkdir -p "$build_dir"
-	if ! cmake -S "$root/app" -B "$build_dir" -G Ninja -DCMAKE_C_COMPILER="$compiler" "$@" \
-		> "$build_dir/configure.log" 2>&1; then
+	set -- cmake -S "$root/app" -B "$build_dir" -G Ninja -DCMAKE_C_COMPILER="$compiler" "$@"
+	[ ! -f "$build_dir/build.ninja" ] || [ "$*" != "$(cat "$build_dir/configured" 2> /dev/null)" ] ||
+		return 0
+	if ! run_step "configuring ${build_dir##*/}" "$build_dir/configure.log" "$@"; then
 		cat "$build_dir/configure.log" >&2
-		die "cannot configure $build_dir (cmake's reason stands above)"
+		die "cannot configure $build_dir (cmake's reason is above)"
 	fi
+	printf '%s\n' "$*" > "$build_dir/configured"
 }
 
-# build_flavour NAME: configure, build, and, but for the fuzz targets, install into $stage.
+# build_flavour NAME [TARGET]: configure, build (default: all of it), and, except for the fuzz
+# targets, install into $stage.
 build_flavour()
 {
 	configure_flavour "$1"
 	stage=$build_dir/stage
+	target=${2:-all}
 	case $1 in
-	fuzz)
-		cmake --build "$build_dir" --target fuzz_targets -- --quiet >&2
-		return
-		;;
+	fuzz) target=fuzz_targets ;;
 	release) stage=$root/build/stage ;;
 	esac
-	cmake --build "$build_dir" -- --quiet >&2
-	cmake --install "$build_dir" --prefix "$stage" > "$build_dir/install.log"
+	# Line by line, for the progress.
+	if ! run_step "compiling $1" "$build_dir/build.log" stdbuf -oL ninja -C "$build_dir" "$target"; then
+		sed -n '/^FAILED:\|^ninja: error/,$p' "$build_dir/build.log" >&2
+		die "cannot build $1 (see above, and $build_dir/build.log)"
+	fi
+	[ "$1" = fuzz ] || cmake --install "$build_dir" --prefix "$stage" > "$build_dir/install.log"
 }

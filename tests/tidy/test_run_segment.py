@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import time
@@ -20,6 +21,7 @@ trap 'echo "end $(basename "$0")" >> "$LOG"; exit 0' TERM
 trap 'echo "interrupted $(basename "$0")" >> "$LOG"' INT
 [ "$1" != --check ] || exit 0
 echo "start $(basename "$0") $*" >> "$LOG"
+[[ $0 != */ecdaq-sim ]] || touch "$ECDAQ_RUN_DIR/edges"
 {body}
 while :; do sleep 0.05; done
 """
@@ -30,9 +32,10 @@ WHEN_ALL_RUN = WHEN_RUN.format(count=5)
 WHEN_ALL_BUT_ONE_RUN = WHEN_RUN.format(count=4)
 PROGRAMS = ("ecdaqd", "ecdaq-record", "ecdaq-dds", "ecdaq-sim", "ecdaq-sync0")
 END_ORDER = ["ecdaq-sync0", "ecdaqd", "ecdaq-record", "ecdaq-dds", "ecdaq-sim"]
+PAGE = '{"state":"STOPPED"}'
 TOOL = """#!/bin/bash
 echo "tool $*" >> "$LOG"
-[ "$1" = status ] && echo '{"state":"STOPPED"}'
+[ "$1" = status ] && echo '{page}'
 """
 
 
@@ -45,7 +48,7 @@ class Bench:
         self.log_file.touch()
         self.bin = folder / "bin"
         self.bin.mkdir()
-        self.program("ecdaq", TOOL)
+        self.program("ecdaq", TOOL.replace("{page}", PAGE))
         for name in PROGRAMS:
             self.program(name, STAND_IN.replace("{body}", ""))
 
@@ -90,6 +93,13 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
     yield Bench(tmp_path)
 
 
+def reports(err: str) -> list[str]:
+    """Standard error without the line for the second terminal, which is the first one."""
+    first, *others = err.splitlines()
+    assert re.fullmatch(r"-- starting; in a second terminal: \S+/ecdaq --run-dir \S+ status", first)
+    return others
+
+
 def ends(bench: Bench) -> list[str]:
     return [line for line in bench.log if line.startswith("end ")]
 
@@ -119,11 +129,11 @@ def test_json_ends_with_the_summary_as_one_line(bench: Bench) -> None:
 
 
 def test_a_master_that_fails_fails_the_run(bench: Bench) -> None:
-    bench.make_it("ecdaqd", WHEN_ALL_RUN + "exit 8")
+    bench.make_it("ecdaqd", WHEN_ALL_RUN + "echo ecdaqd: no link >&2; exit 8")
     run = bench.start("--seconds", "1")
     _, err = run.communicate(timeout=20)
     assert run.returncode == 1
-    assert "daemon ended with 8" in err
+    assert err.splitlines()[-1] == "build.sh: run: ecdaqd ended with 8: no link"
     assert ends(bench) == [f"end {name}" for name in END_ORDER if name != "ecdaqd"]
 
 
@@ -132,7 +142,7 @@ def test_a_segment_that_ends_by_itself_fails_the_run(bench: Bench) -> None:
     run = bench.start()
     _, err = run.communicate(timeout=20)
     assert run.returncode == 1
-    assert "segment ended with 3" in err
+    assert err.splitlines()[-1] == "build.sh: run: ecdaq-sim ended with 3"
 
 
 def test_a_run_that_is_killed_leaves_nothing_behind(bench: Bench) -> None:
@@ -150,6 +160,48 @@ def test_the_run_directory_is_removed_unless_it_is_given(bench: Bench, tmp_path:
     (line,) = [entry for entry in bench.log if entry.startswith("run dir ")]
     assert not Path(line.removeprefix("run dir ")).exists()
     assert set(Path("/dev/shm").glob("ecdaq-run-*")) <= before
+
+
+@pytest.mark.parametrize("page", ['{"pid":1,"samples_good":7,}', '{"pid":PID,"samples_good":0,}'])
+def test_a_failed_start_prints_its_cause_and_no_summary(bench: Bench, page: str) -> None:
+    """Neither that of an earlier run in the same directory, nor an empty one."""
+    body = WHEN_ALL_RUN + 'echo $$ > "$LOG.pid"; echo ecdaqd: why >&2; exit 5'
+    bench.make_it("ecdaqd", body)
+    bench.program("ecdaq", f"""#!/bin/bash\necho '{page}' | sed "s/PID/$(cat "$LOG.pid")/"\n""")
+    run = bench.start()
+    out, err = run.communicate(timeout=20)
+    assert (run.returncode, out) == (1, "")
+    assert err.splitlines()[-1] == "build.sh: run: ecdaqd ended with 5: why"
+
+
+def test_a_run_that_fails_after_it_was_in_op_prints_summary_and_cause(bench: Bench) -> None:
+    body = WHEN_ALL_RUN + 'echo $$ > "$LOG.pid"; exit 14'
+    bench.make_it("ecdaqd", body)
+    page = '{"pid":PID,"samples_good":7,"recording":"/x/a.mcap"}'
+    bench.program("ecdaq", f"""#!/bin/bash\necho '{page}' | sed "s/PID/$(cat "$LOG.pid")/"\n""")
+    run = bench.start()
+    out, err = run.communicate(timeout=20)
+    assert run.returncode == 1
+    assert '"samples_good":7' in out
+    assert "log list --dir" in err
+    assert "log export /x/a.mcap" in err
+    assert err.splitlines()[-1] == "build.sh: run: ecdaqd ended with 14"
+
+
+def test_a_run_directory_is_used_by_one_run_at_a_time(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ECDAQ_RUN_DIR", str(tmp_path / "run"))
+    first = bench.start()
+    bench.wait_until_all_run()
+    second = bench.start()
+    out, err = second.communicate(timeout=20)
+    assert (second.returncode, out) == (1, "")
+    assert "another run uses this directory" in err
+    assert err.count("\n") == 1
+    assert first.poll() is None
+    os.killpg(first.pid, signal.SIGINT)
+    assert first.wait(20) == 0
 
 
 def dds_line(bench: Bench) -> str:
@@ -187,7 +239,7 @@ def test_without_dds_there_is_none(bench: Bench) -> None:
 @pytest.mark.parametrize(
     ("program", "reason"),
     [
-        (None, "ecdaq-dds is not there"),
+        (None, "ecdaq-dds is not built"),
         ("#!/bin/sh\necho 'ecdaq-dds: why not' >&2\nexit 3\n", "ecdaq-dds: why not"),
     ],
 )
@@ -202,8 +254,7 @@ def test_where_dds_cannot_be_had_one_line_says_so_and_the_run_goes_on(
     run = bench.start("--seconds", "1")
     _, err = run.communicate(timeout=20)
     assert run.returncode == 0
-    (line,) = err.splitlines()
-    assert line.startswith(f"-- no DDS: {reason}")
+    assert reports(err)[0].startswith(f"-- no DDS: {reason}")
 
 
 def test_a_publisher_that_ends_by_itself_fails_the_run(bench: Bench) -> None:
@@ -211,7 +262,7 @@ def test_a_publisher_that_ends_by_itself_fails_the_run(bench: Bench) -> None:
     run = bench.start()
     _, err = run.communicate(timeout=20)
     assert run.returncode == 1
-    assert "dds ended by itself" in err
+    assert "ecdaq-dds ended by itself" in err
 
 
 def sync0_line(bench: Bench) -> str:
@@ -266,7 +317,7 @@ def test_where_the_check_is_missing_one_line_says_so_and_the_run_goes_on(bench: 
     run = bench.start("--seconds", "1", "--no-dds")
     _, err = run.communicate(timeout=20)
     assert run.returncode == 0
-    assert err == "-- no check of SYNC0: ecdaq-sync0 is not there\n"
+    assert reports(err) == ["-- no check of SYNC0: ecdaq-sync0 is not built"]
 
 
 @pytest.mark.parametrize(("code", "said"), [(0, []), (1, ["-- ecdaq-sync0 ended with 1"])])
@@ -277,10 +328,12 @@ def test_a_check_that_ends_by_itself_ends_nothing_else(
     run = bench.start("--no-dds")
     bench.wait_for_log(*(f"start {name}" for name in PROGRAMS if name != "ecdaq-dds"))
     assert run.stderr is not None
+    assert run.stderr.readline().startswith("-- starting")
     assert [run.stderr.readline().rstrip() for _ in said] == said
     assert run.poll() is None
     assert not ends(bench)
     os.killpg(run.pid, signal.SIGINT)
     _, err = run.communicate(timeout=20)
-    assert (run.returncode, err) == (0, "")
+    assert run.returncode == 0
+    assert not err
     assert ends(bench) == ["end ecdaqd", "end ecdaq-record", "end ecdaq-sim"]

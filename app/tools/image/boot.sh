@@ -39,6 +39,12 @@ die()
 	exit 1
 }
 
+usage_error()
+{
+	printf 'build.sh: boot: %s\n' "$*" >&2
+	exit 2
+}
+
 fresh=no
 port=2222
 key=
@@ -55,7 +61,7 @@ while [ $# -gt 0 ]; do
 	--lan) lan=yes ;;
 	--wire) wire=yes ;;
 	--ssh-port | --key | --config)
-		[ $# -ge 2 ] || die "$1 needs a value"
+		[ $# -ge 2 ] || usage_error "$1 needs a value"
 		case $1 in
 		--ssh-port) port=$2 ;;
 		--key) key=$2 ;;
@@ -71,14 +77,14 @@ while [ $# -gt 0 ]; do
 		shift
 		break
 		;;
-	*) die "unknown option '$1' (see --help)" ;;
+	*) usage_error "unknown option '$1' (see --help)" ;;
 	esac
 	shift
 done
 case $port in
-'' | *[!0-9]*) die "--ssh-port: '$port' is no port" ;;
+'' | *[!0-9]*) usage_error "--ssh-port: '$port' is not a port" ;;
 esac
-[ "$wire$timing" != yesguest ] || die "--wire: the segment keeps the host's time, --icount does not"
+[ "$wire$timing" != yesguest ] || usage_error "--wire: the segment keeps the host's time, --icount does not"
 [ "$check" = no ] || exit 0
 
 image=$root/build/image/qemuarm64
@@ -135,7 +141,7 @@ trap end EXIT
 trap 'exit 1' INT TERM HUP
 add_tap()
 {
-	ip tuntap add dev "$2" mode tap || die "$1: no tap $2 to be had (its reason stands above)"
+	ip tuntap add dev "$2" mode tap || die "$1: no tap $2 to be had (its reason is above)"
 	taps="$taps $2"
 }
 

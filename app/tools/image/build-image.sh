@@ -39,6 +39,12 @@ die()
 	exit 1
 }
 
+usage_error()
+{
+	printf 'build.sh: image: %s\n' "$*" >&2
+	exit 2
+}
+
 machine=qemuarm64
 recipe=ecdaq-image
 jobs=$(nproc)
@@ -47,7 +53,7 @@ check=no
 while [ $# -gt 0 ]; do
 	case $1 in
 	--machine | --recipe | --jobs)
-		[ $# -ge 2 ] || die "$1 needs a value"
+		[ $# -ge 2 ] || usage_error "$1 needs a value"
 		case $1 in
 		--machine) machine=$2 ;;
 		--recipe) recipe=$2 ;;
@@ -61,16 +67,16 @@ while [ $# -gt 0 ]; do
 		usage
 		exit 0
 		;;
-	*) die "unknown option '$1' (see --help)" ;;
+	*) usage_error "unknown option '$1' (see --help)" ;;
 	esac
 	shift
 done
 
 [ -f "$root/layers/meta-ecdaq/conf/machine/$machine.conf" ] ||
-	die "no machine '$machine'; there are: $(cd "$root/layers/meta-ecdaq/conf/machine" &&
+	usage_error "no machine '$machine'; there are: $(cd "$root/layers/meta-ecdaq/conf/machine" &&
 		printf '%s ' *.conf | sed 's/\.conf//g')"
 case $jobs in
-'' | *[!0-9]* | 0) die "--jobs: '$jobs' is no number of tasks" ;;
+'' | *[!0-9]* | 0) usage_error "--jobs: '$jobs' is not a number of tasks" ;;
 esac
 
 [ "$check" = no ] || exit 0
@@ -85,7 +91,7 @@ need_bitbake()
 		"${PYTHON:-python3}" -m venv "$venv" || die "${PYTHON:-python3} cannot make an environment"
 		"$venv/bin/python" -m pip install --quiet --disable-pip-version-check \
 			--requirement "$here/requirements.txt" ||
-			die "pip cannot install app/tools/image/requirements.txt (its reason stands above)"
+			die "pip cannot install app/tools/image/requirements.txt (its reason is above)"
 		touch "$venv/.complete"
 	}
 }
