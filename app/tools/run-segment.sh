@@ -220,10 +220,7 @@ start()
 	local name=$1
 
 	shift
-	case $name in
-	interrupt) setpriv --pdeathsig TERM setsid "$@" <&3 4>&- & ;;
-	*) setpriv --pdeathsig TERM setsid "$@" <&3 2>&4 4>&- & ;;
-	esac
+	setpriv --pdeathsig TERM setsid "$@" <&3 2>&4 4>&- &
 	pid[$name]=$!
 }
 
@@ -331,56 +328,54 @@ interrupted=no
 
 end_in_order()
 {
-	trap '' TSTP
+	trap '' INT TERM TSTP
 	stop view
 	stop sync0
 	stop daemon
 	stop recorder
 	stop_dds
 	stop segment
-	trap '' INT TERM
-	stop interrupt
 }
 
 clean_up()
 {
-	trap '' INT TERM
 	end_in_order
 	rm -rf "$ECDAQ_RUN_DIR/edges" "$run_work"
 	[ -z "${run_dir_is_own:-}" ] || rm -rf "$ECDAQ_RUN_DIR"
 }
 
-# A signal that arrives just before "wait" would not end it: the end of this child does.
-start_interruptible()
+# has_ended NAME: also says how, in $status.
+has_ended()
 {
-	setpriv --pdeathsig TERM setsid sleep infinity <&3 &
-	pid[interrupt]=$!
-	trap 'interrupted=yes; kill "${pid[interrupt]}" 2> /dev/null || true' INT TERM
+	! kill -0 "${pid[$1]}" 2> /dev/null || return 1
+	status=0
+	wait "${pid[$1]}" || status=$?
 }
 
-# Waits for the first of the children to end, except ecdaq-sync0: the run goes on without it.
+# Returns when the first of the children has ended, except ecdaq-sync0: the run goes on without it. It
+# looks instead of waiting: a signal during "wait -n" can make bash lose the end of a child.
 wait_for_end()
 {
-	local ended='' status
+	local name status
 
-	while :; do
-		status=0
-		ended=''
-		[ "$interrupted" = no ] || return 0
-		wait -n -p ended "${pid[@]}" || status=$?
-		[ "$interrupted" = no ] || return 0
-		[ -n "${ended:-}" ] || continue # suspended, and resumed
-		[ "$ended" = "${pid[sync0]:-none}" ] || break
-		unset 'pid[sync0]'
-		[ "$status" = 0 ] || note "ecdaq-sync0 ended with $status"
-	done
-	for name in "${!pid[@]}"; do
-		[ "${pid[$name]}" = "$ended" ] || continue
-		case $name$status in
-		view* | daemon0) ;;
-		*0 | dds*) failure "${program[$name]}" "ended by itself" ;;
-		*) failure "${program[$name]}" "ended with $status" ;;
-		esac
+	mkfifo "$run_work/idle"
+	exec 5<> "$run_work/idle"
+	while [ "$interrupted" = no ]; do
+		read -r -t 0.2 -u 5 || true
+		for name in "${!pid[@]}"; do
+			has_ended "$name" || continue
+			case $name$status in
+			sync0*)
+				unset 'pid[sync0]'
+				[ "$status" = 0 ] || note "ecdaq-sync0 ended with $status"
+				continue
+				;;
+			view* | daemon0) ;;
+			*0 | dds*) failure "${program[$name]}" "ended by itself" ;;
+			*) failure "${program[$name]}" "ended with $status" ;;
+			esac
+			return 0
+		done
 	done
 }
 
@@ -432,7 +427,7 @@ run_inside()
 	exec 3<&0
 	open_messages
 	trap clean_up EXIT
-	start_interruptible
+	trap 'interrupted=yes' INT TERM
 	make_wire
 	start segment "$bin/ecdaq-sim" "${segment_options[@]}"
 	start recorder "$bin/ecdaq-record" "${set_options[@]}"
@@ -445,7 +440,6 @@ run_inside()
 	daemon_pid=${pid[daemon]}
 	adopt_dds
 	start_sync0
-	# No command may run between the first start and this wait: it would take the end of a child.
 	wait_for_end
 	end_in_order
 	close_messages
