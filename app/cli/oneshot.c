@@ -14,7 +14,7 @@
 #include "image/image.h"
 #include "program/args.h"
 
-/* Entries of the FB1111-Piccolo (DESIGN 5). */
+/* Entries of the FB1111-Piccolo. */
 #define ENTRY_TIME "oneshot_time"
 #define ENTRY_SAMPLE_TIME "sample_time"
 #define ENTRY_ADC "adc"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The control program of the second seed thesis, on a WAGO 750-354 with, in this order, 750-457
+ * Inputs to outputs, on a WAGO 750-354 with, in this order, 750-457
  * (4 AI), 750-557 (4 AO), 750-430 (8 DI) and 750-530 (8 DO): analog input 1 goes to analog output
  * 1, digital input 1 drives digital outputs 4 to 8. What the inputs of one cycle say travels with
  * the next frame.

@@ -12,7 +12,7 @@ struct signal_spec {
 	double phase_rad; /* at time 0 of the segment */
 };
 
-/** 1 Hz, 0.5 V around 1 V: the signal of the thesis. */
+/** Default signal: 1 Hz, 0.5 V around 1 V. */
 struct signal_spec signal_default(void);
 
 /** Volts at true time @t_ns. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The cyclic frame of the second seed thesis, which its master (SOEM) exchanged with this coupler
+ * The cyclic frame that a plain SOEM master exchanges with this coupler
  * every millisecond: 76 bytes, one LRW of 28 bytes from logical address 0 and one FRMW of 8 bytes
  * of 0x0910 of station 0x1001; they came back with working counters 3 and 1.
  */
@@ -65,7 +65,7 @@ static void look(struct virtual_master *vm, const uint8_t *frame, size_t frame_l
 	}
 }
 
-TEST(sim_loopback, the_cyclic_frame_is_that_of_the_thesis)
+TEST(sim_loopback, the_cyclic_frame_has_76_bytes_with_lrw_and_frmw)
 {
 	static struct virtual_bench b;
 	static struct virtual_master vm;

@@ -76,7 +76,7 @@ TEST(sync0, a_limit_below_the_noise_cannot_be_judged)
 	struct judge_limits fine = limits;
 	struct sync0_result r = good();
 
-	fine.jitter_ns = 15; /* the class of the thesis' 4.727 ns and 29.28 ns */
+	fine.jitter_ns = 15; /* far below what a GPIO resolves */
 	fine.skew_ns = 30;
 	judge(&fine, &pi, 0, &r);
 	CHECK_EQ(r.check[SYNC0_CHECK_JITTER], SYNC0_UNRESOLVED);

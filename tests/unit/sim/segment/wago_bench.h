@@ -10,7 +10,7 @@
 #include "segment/signal.h"
 
 enum {
-	WAGO_BENCH_BYTES = 14, /* each way, of the node of the thesis */
+	WAGO_BENCH_BYTES = 14, /* each way, of the node with 750-457, -557, -430, -530 */
 	WAGO_BENCH_BOX = 512,
 };
 
@@ -19,7 +19,7 @@ struct bench *wago_bench_create(const char *name, const struct signal_spec *sign
 struct sim_device *wago_bench_device(struct bench *b);
 /** Ask for @control, wait; AL status. */
 uint16_t wago_bench_request(struct bench *b, uint16_t control);
-/** INIT to PRE-OP; PRE-OP to SAFE-OP and to OP, with the process data of the thesis' node. */
+/** INIT to PRE-OP; PRE-OP to SAFE-OP and to OP, with the process data of that node. */
 void wago_bench_preop(struct bench *b);
 void wago_bench_safeop(struct bench *b);
 void wago_bench_op(struct bench *b, const uint8_t *outputs);

@@ -30,7 +30,7 @@ static void check_pdos(const struct wago_node *node, const uint16_t *index, size
 	}
 }
 
-TEST(wago_node, the_thesis_node_has_fourteen_bytes_each_way)
+TEST(wago_node, node_with_four_modules_has_fourteen_bytes_each_way)
 {
 	static const uint16_t pdos[] = { 0x16ff, 0x1601, 0x1603, 0x1701,
 					 0x1aff, 0x1a00, 0x1a02, 0x1b01 };
