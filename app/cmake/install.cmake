@@ -1,32 +1,47 @@
 # SPDX-License-Identifier: MIT
-# What others use, beside the programs: the library and headers with which a user's own program reads
-# the rings (pkg-config name: ecdaq), the licence texts, and what SOEM's licence asks to hand on.
+# What others use, beside the programs: libecdaq with <ecdaq/reader.h> (pkg-config name ecdaq, CMake
+# package ecdaq), <ecdaq/control.h>, the licence texts, and what SOEM's licence asks to hand on.
 
-# The include paths of the headers are those of the source tree: "base/ring.h", "image/image.h".
-add_library(ecdaq_client STATIC $<TARGET_OBJECTS:ecdaq_base> $<TARGET_OBJECTS:ecdaq_image>
-	$<TARGET_OBJECTS:ecdaq_reader>)
-set_target_properties(ecdaq_client PROPERTIES OUTPUT_NAME ecdaq LINKER_LANGUAGE C)
-add_library(ecdaq_client_shared SHARED $<TARGET_OBJECTS:ecdaq_base> $<TARGET_OBJECTS:ecdaq_image>
-	$<TARGET_OBJECTS:ecdaq_reader>)
-set_target_properties(ecdaq_client_shared PROPERTIES OUTPUT_NAME ecdaq LINKER_LANGUAGE C
-	VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR})
+include(CMakePackageConfigHelpers)
+
+# Only ecdaq_* is visible to a program that links the library: everything else in it may change.
+set(client_objects $<TARGET_OBJECTS:ecdaq_base> $<TARGET_OBJECTS:ecdaq_image> $<TARGET_OBJECTS:ecdaq_reader>)
+set(client_object ${CMAKE_CURRENT_BINARY_DIR}/ecdaq_client.o)
+add_custom_command(OUTPUT ${client_object}
+	COMMAND ${CMAKE_LINKER} -r -o ${client_object} ${client_objects}
+	COMMAND ${CMAKE_OBJCOPY} --wildcard --keep-global-symbol=ecdaq_* ${client_object}
+	DEPENDS ecdaq_base ecdaq_image ecdaq_reader ${client_objects}
+	COMMAND_EXPAND_LISTS VERBATIM)
+add_library(ecdaq_client STATIC ${client_object})
+set_target_properties(ecdaq_client PROPERTIES OUTPUT_NAME ecdaq EXPORT_NAME static LINKER_LANGUAGE C)
+target_link_libraries(ecdaq_client INTERFACE m)
+
+set(client_symbols ${CMAKE_CURRENT_SOURCE_DIR}/cmake/libecdaq.map)
+add_library(ecdaq_client_shared SHARED ${client_objects})
+set_target_properties(ecdaq_client_shared PROPERTIES OUTPUT_NAME ecdaq EXPORT_NAME ecdaq LINKER_LANGUAGE C
+	VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR} LINK_DEPENDS ${client_symbols})
+target_link_options(ecdaq_client_shared PRIVATE "-Wl,--version-script=${client_symbols}")
 target_link_libraries(ecdaq_client_shared PRIVATE m)
-install(TARGETS ecdaq_client ecdaq_client_shared
-	ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
-install(FILES core/base/board.h core/base/clock.h core/base/event.h core/base/histogram.h core/base/limits.h core/base/ring.h
-	core/base/sample.h core/base/status.h core/base/sync0.h core/base/timemap.h
-	DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq/base)
-# Control programs say <ecdaq/control.h>.
-install(FILES master/control/control.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq)
-install(FILES core/reader/feed.h core/reader/page.h core/reader/reader.h core/reader/table.h core/reader/utc.h
-	DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq/reader)
-install(FILES core/image/image.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq/image)
 
+foreach(target ecdaq_client ecdaq_client_shared)
+	target_include_directories(${target} INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+endforeach()
+install(TARGETS ecdaq_client ecdaq_client_shared EXPORT ecdaq
+	ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(FILES core/reader/api.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq RENAME reader.h)
+install(FILES master/control/control.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/ecdaq)
+
+set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/ecdaq)
+install(EXPORT ecdaq NAMESPACE ecdaq:: FILE ecdaqConfig.cmake DESTINATION ${package_dir})
+write_basic_package_version_file(ecdaqConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/ecdaqConfigVersion.cmake DESTINATION ${package_dir})
 file(RELATIVE_PATH ECDAQ_PC_TO_PREFIX "/${CMAKE_INSTALL_LIBDIR}/pkgconfig" "/")
 configure_file(cmake/ecdaq.pc.in ecdaq.pc @ONLY)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/ecdaq.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 
-install(DIRECTORY examples/ DESTINATION ${CMAKE_INSTALL_DATADIR}/ecdaq/examples)
+# The CMakeLists.txt of the folder itself belongs to this tree; that of reader/ is the user's.
+install(DIRECTORY examples/ DESTINATION ${CMAKE_INSTALL_DATADIR}/ecdaq/examples
+	REGEX "examples/CMakeLists.txt$" EXCLUDE)
 install(FILES ../LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/ecdaq/licenses)
 install(DIRECTORY ../LICENSES/ DESTINATION ${CMAKE_INSTALL_DATADIR}/ecdaq/licenses)
 install(FILES third_party/soem.lock third_party/fetch-soem.sh

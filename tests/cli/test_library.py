@@ -1,118 +1,129 @@
 # SPDX-License-Identifier: MIT
-"""The installed library, headers and example are enough for a program of one's own."""
+"""The installed library and headers are enough for a program of one's own."""
 
 from __future__ import annotations
 
 import os
 import subprocess
+import tempfile
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+BUILD = Path(os.environ.get("ECDAQ_BUILD", ROOT / "build" / "release"))
 STAGE = Path(os.environ.get("ECDAQ_STAGE", ROOT / "build" / "stage"))
 SANITIZE = ["-fsanitize=address,undefined"] if os.environ.get("ECDAQ_FLAVOUR") == "asan" else []
 
-# A ring with one 16-bit channel, scaled by a half, and three samples; the last is stale.
-PRODUCER = r"""
-#include <string.h>
-#include "base/ring.h"
-#include "base/sample.h"
-
-struct meta { struct sample_meta head; struct slave_info slave; struct channel channel; };
-
-int main(int argc, char **argv)
-{
-	struct meta meta = {
-		.head = {
-			.version = SAMPLE_VERSION,
-			.slave_count = 1,
-			.channel_count = 1,
-			.image_bytes = 2,
-			.period_ns = 1000000,
-		},
-		.channel = { .name = "a.adc", .type = CHANNEL_UINT, .bit_len = 16, .scale = 0.5 },
-	};
-	struct ring_spec spec = {
-		.path = argv[argc - 1],
-		.kind = "sample",
-		.slot_count = 16,
-		.payload_bytes = sizeof(struct sample_header) + 2,
-		.meta = &meta,
-		.meta_bytes = sizeof(meta),
-		.file_mode = 0640,
-	};
-	struct ring *ring;
-
-	if (ring_create(&spec, &ring) < 0)
-		return 1;
-	for (unsigned char i = 0; i < 3; i++) {
-		struct sample_header header = { .cycle = 7u + i, .dc_time_ns = 1000 + i,
-						.flags = i == 2 ? SAMPLE_LOST : 0 };
-		unsigned char image[2] = { i, 0 };
-
-		ring_push(ring, &header, sizeof(header), image, sizeof(image));
-	}
-	ring_destroy(ring);
-	return 0;
-}
-"""
+EXAMPLES = STAGE / "share" / "ecdaq" / "examples" / "reader"
+PRODUCER = BUILD / "tests" / "cli" / "test_ring_producer"
 
 
-def compile_against_library(source: Path, program: Path, *flags: str) -> None:
+def flags(*words: str) -> list[str]:
     (pc,) = STAGE.rglob("ecdaq.pc")
     found = subprocess.run(
-        ["pkg-config", "--cflags", "--libs", str(pc)], check=True, capture_output=True, text=True
-    ).stdout.split()
-    cc = ["gcc", "-std=c11", "-Wall", "-Wextra", "-Werror", *SANITIZE, *flags]
+        ["pkg-config", *words, str(pc)], check=True, capture_output=True, text=True
+    )
     # Where it stands, the library is on no search path; installed to /usr it is.
-    rpath = f"-Wl,-rpath,{pc.parents[1]}"
-    subprocess.run([*cc, str(source), "-o", str(program), *found, rpath], check=True)
+    return [*found.stdout.split(), f"-Wl,-rpath,{pc.parents[1]}"]
 
 
-@pytest.fixture(scope="module")
-def example(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    program = tmp_path_factory.mktemp("example") / "read_ring"
-    source = STAGE / "share" / "ecdaq" / "examples" / "read_ring.c"
-    compile_against_library(source, program, "-D_GNU_SOURCE")
+def compiled(source: Path, program: Path, *words: str) -> Path:
+    compiler = ["g++", "-std=c++17"] if source.suffix == ".cpp" else ["gcc", "-std=c11"]
+    strict = ["-Wall", "-Wextra", "-Wpedantic", "-Werror", *SANITIZE]
+    libraries = flags("--cflags", "--libs", *words)
+    subprocess.run([*compiler, *strict, str(source), "-o", str(program), *libraries], check=True)
     return program
 
 
+def run(*words: str | Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(words, capture_output=True, text=True, check=False, timeout=60)
+
+
 @pytest.fixture(scope="module")
-def ring(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    folder = tmp_path_factory.mktemp("ring")
-    (folder / "producer.c").write_text(PRODUCER)
-    compile_against_library(folder / "producer.c", folder / "producer")
-    path = Path("/dev/shm") / f"ecdaq-test-{os.getpid()}"
-    subprocess.run([folder / "producer", path], check=True)
-    yield path
-    path.unlink()
+def run_dir() -> Iterator[Path]:
+    """What a master leaves behind that measured 300 cycles, without the cycles 100 to 106."""
+    with tempfile.TemporaryDirectory(dir="/dev/shm") as name:
+        arguments = ["--cycles", "300", "--skip", "100:7", "--events", "3"]
+        subprocess.run([PRODUCER, name, *arguments], check=True, capture_output=True)
+        yield Path(name)
 
 
-def read_ring(example: Path, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [example, *arguments], capture_output=True, text=True, check=False, timeout=60
-    )
+@pytest.fixture(scope="module")
+def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return compiled(EXAMPLES / "samples.c", tmp_path_factory.mktemp("c") / "samples")
 
 
-def test_the_example_prints_what_the_ring_holds(example: Path, ring: Path) -> None:
-    result = read_ring(example, ring, "a.adc")
+def test_the_c_example_prints_every_sample_of_a_channel(samples: Path, run_dir: Path) -> None:
+    result = run(samples, "piccolo0.counter", run_dir)
     assert result.returncode == 0, result.stderr
-    assert result.stdout.splitlines() == ["7 1000 0", "8 1001 0.5", "9 1002 1 bad"]
+    lines = [line.split() for line in result.stdout.splitlines()]
+    cycles = [int(line[0]) for line in lines]
+    assert cycles == [*range(100), *range(107, 300)]
+    assert len({line[2] for line in lines}) > 250, "a counter counts"
+    utc_ns = [int(line[1]) for line in lines]
+    assert all(0 < after - before < 20_000_000 for before, after in pairwise(utc_ns))
 
 
-def test_the_example_names_a_channel_that_is_not_there(example: Path, ring: Path) -> None:
-    result = read_ring(example, ring, "b.adc")
+def test_the_c_example_fails_for_a_channel_that_is_not_there(samples: Path, run_dir: Path) -> None:
+    result = run(samples, "piccolo0.nope", run_dir)
     assert result.returncode == 1
-    assert result.stderr == "read_ring: b.adc: no such channel\n"
+    assert result.stdout == ""
 
 
-def test_the_example_refuses_what_is_no_ring(example: Path, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("no ring")
-    result = read_ring(example, tmp_path / "file")
-    assert result.returncode == 1
-    assert "Protocol error" in result.stderr
+def test_the_cpp_example_prints_events(tmp_path: Path, run_dir: Path) -> None:
+    program = compiled(EXAMPLES / "events.cpp", tmp_path / "events")
+    result = run(program, run_dir)
+    assert result.returncode == 0, result.stderr
+    assert len(result.stdout.splitlines()) == 3
+    assert "set by" in result.stdout
+    assert result.stderr == "0 events were lost\n"
+
+
+def test_the_static_library_is_enough(tmp_path: Path, run_dir: Path) -> None:
+    (archive,) = STAGE.rglob("libecdaq.a")
+    program = tmp_path / "samples"
+    include = ["-I", str(STAGE / "include")]
+    source = str(EXAMPLES / "samples.c")
+    command = ["gcc", "-std=c11", *SANITIZE, *include, source, "-o", str(program), str(archive)]
+    subprocess.run([*command, "-lm"], check=True)
+    assert run(program, "piccolo0.counter", run_dir).returncode == 0
+
+
+def test_find_package_builds_the_examples(tmp_path: Path, run_dir: Path) -> None:
+    sanitize = " ".join(SANITIZE)
+    configure = ["cmake", "-S", EXAMPLES, "-B", tmp_path, f"-DCMAKE_PREFIX_PATH={STAGE}"]
+    configure += [f"-DCMAKE_C_FLAGS={sanitize}", f"-DCMAKE_CXX_FLAGS={sanitize}"]
+    subprocess.run(configure, check=True, capture_output=True)
+    subprocess.run(["cmake", "--build", tmp_path], check=True, capture_output=True)
+    assert run(tmp_path / "samples", "piccolo1.adc", run_dir).returncode == 0
+
+
+@pytest.mark.parametrize("library", ["libecdaq.a", "libecdaq.so"])
+def test_every_symbol_of_the_library_has_its_prefix(library: str) -> None:
+    (file,) = STAGE.rglob(library)
+    kind = ["--dynamic"] if library.endswith(".so") else []
+    listed = subprocess.run(
+        ["nm", *kind, "--defined-only", "--extern-only", "--format=posix", file],
+        check=True,
+        capture_output=True,
+        text=True,
+    ).stdout
+    names = [line.split()[0] for line in listed.splitlines() if len(line.split()) > 1]
+    assert "ecdaq_reader_open" in names
+    assert [name for name in names if not name.startswith("ecdaq_")] == []
+
+
+def test_the_installed_headers_are_c_and_cpp(tmp_path: Path) -> None:
+    headers = sorted((STAGE / "include").rglob("*.h"))
+    assert [h.name for h in headers] == ["control.h", "reader.h"]
+    text = "".join(f"#include <ecdaq/{h.name}>\n" for h in headers)
+    for name, compiler in (("a.c", "gcc"), ("a.cpp", "g++")):
+        (tmp_path / name).write_text(text)
+        command = [compiler, "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fsyntax-only"]
+        subprocess.run([*command, "-I", STAGE / "include", tmp_path / name], check=True)
 
 
 def test_licences_and_the_way_to_soem_are_installed() -> None:

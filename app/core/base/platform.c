@@ -2,6 +2,7 @@
 #include "platform.h"
 
 #include <errno.h>
+#include <sys/timex.h>
 #include <time.h>
 
 static int64_t read_clock(clockid_t id)
@@ -45,4 +46,15 @@ struct platform platform_posix(void)
 		.sleep_until = posix_sleep_until,
 		.ctx = NULL,
 	};
+}
+
+int platform_tai_offset_s(int32_t *ret_offset_s)
+{
+	struct timex tx = { .modes = 0 };
+
+	if (adjtimex(&tx) < 0) {
+		return -errno;
+	}
+	*ret_offset_s = tx.tai;
+	return 0;
 }

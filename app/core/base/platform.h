@@ -45,4 +45,10 @@ struct transport {
 /** The machine's own clocks and sleep. */
 struct platform platform_posix(void);
 
+/**
+ * The kernel's TAI - UTC in seconds; 0: nothing has set it and CLOCK_TAI equals UTC. 0 or -errno
+ * (ret untouched). Context: any but the cycle.
+ */
+int platform_tai_offset_s(int32_t *ret_offset_s);
+
 #endif

@@ -5,7 +5,6 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/timex.h>
 #include <unistd.h>
 
 #include "control/program.h"
@@ -159,9 +158,10 @@ static void degraded(void *ctx, enum event_rt which, int err, const char *text)
 
 static int32_t kernel_tai_offset(void)
 {
-	struct timex tx = { .modes = 0 };
+	int32_t offset_s = 0;
 
-	return adjtimex(&tx) < 0 ? 0 : tx.tai;
+	platform_tai_offset_s(&offset_s);
+	return offset_s;
 }
 
 int machine_session_create(struct program *pg, struct failure *failure)
