@@ -1,8 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* ecdaq, the operator's tool: a table of verbs. */
 #include <errno.h>
+#include <limits.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "cli/cli.h"
 #include "program/args.h"
@@ -18,6 +21,51 @@ static enum exit_code verb_version(struct cli *cli, int argc, char **argv)
 		result = EXIT_CODE_OK;
 	}
 	return result;
+}
+
+/* "ecdaq-VERB" beside the file that is running. */
+static int program_path(const char *verb, char ret_path[PATH_MAX])
+{
+	ssize_t len = readlink("/proc/self/exe", ret_path, PATH_MAX - 1);
+
+	if (len < 0) {
+		return -errno;
+	}
+	while (ret_path[len - 1] != '/') {
+		len--;
+	}
+	return snprintf(ret_path + len, (size_t)(PATH_MAX - len), "ecdaq-%s", verb) < PATH_MAX - len
+		       ? 0
+		       : -ENAMETOOLONG;
+}
+
+/* A verb that is a program of its own, ecdaq-VERB, so that this one needs no libraries for it. */
+static enum exit_code verb_program(struct cli *cli, int argc, char **argv)
+{
+	char path[PATH_MAX];
+	char run_dir[sizeof("--run-dir=") + CONFIG_PATH_BYTES];
+	char config[sizeof("--config=") + PATH_MAX];
+	char **words = calloc((size_t)argc + 4, sizeof(*words));
+	int count = 0;
+	int r = words == NULL ? -ENOMEM : program_path(cli->verb->name, path);
+
+	if (r == 0) {
+		words[count++] = path;
+		if (cli->run_dir != NULL) {
+			snprintf(run_dir, sizeof(run_dir), "--run-dir=%s", cli->run_dir);
+			words[count++] = run_dir;
+		}
+		if (cli->config != NULL) {
+			snprintf(config, sizeof(config), "--config=%s", cli->config);
+			words[count++] = config;
+		}
+		memcpy(words + count, argv, (size_t)argc * sizeof(*words));
+		execv(path, words);
+		r = -errno;
+	}
+	free(words);
+	return r == -ENOENT ? cli_fail(cli, EXIT_CODE_FAILED, "%s: not installed", path)
+			    : cli_fail(cli, EXIT_CODE_FAILED, "%s", strerror(-r));
 }
 
 static const struct verb verbs[] = {
@@ -58,15 +106,9 @@ static const struct verb verbs[] = {
 	  "program.\n",
 	  verb_histogram },
 	{ "log", "...", "Recordings: list, info, check, recover, export (see ecdaq log --help).",
-	  NULL, verb_log },
-	{ "security", "init|add-appliance|add-subscriber|add-commander|check [NAME|DIR]",
-	  "The keys of DDS Security (app/doc/reference/dds.md).",
-	  "ecdaq security init makes a store with the appliance's keys, add-subscriber NAME and\n"
-	  "add-commander NAME those of a participant; check DIR looks at one participant's "
-	  "folder.\n"
-	  "add-appliance renews the appliance's, once its folder has been removed from the "
-	  "store.\n",
-	  verb_security },
+	  NULL, verb_program },
+	{ "security", "...", "The keys of DDS Security (see ecdaq security --help).", NULL,
+	  verb_program },
 	{ "doctor", "", "Is this machine fit for the cycle? Each check with what mends it.",
 	  "OK, WARN: costs latency or safety. FAIL: measuring cannot be relied on. SKIP: does not\n"
 	  "apply, or could not be read. Exit code 1 with a FAIL (--strict: or a WARN).\n",

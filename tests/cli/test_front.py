@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
-from ecdaq import BIN, CONFIG, DISABLED, OK, ROOT, USAGE, Result, environment
+from ecdaq import BIN, CONFIG, DISABLED, FAILED, OK, ROOT, USAGE, Result, environment
 
 # Those that run until they are stopped, and the option that switches each on.
 SERVICES = {
@@ -18,6 +19,7 @@ SERVICES = {
     "ecdaq-sync0": "sync0.enable",
 }
 PROGRAMS = [*SERVICES, "ecdaq"]
+RUN_BY_ECDAQ = ["log", "security"]
 STANDARD = [
     "--config FILE",
     "--set OPTION=VALUE",
@@ -135,6 +137,43 @@ def test_the_run_directory_is_part_of_what_is_checked(program: str) -> None:
     one_line(program, result, CONFIG, "runtime.run_dir: ")
 
 
+@pytest.mark.parametrize("verb", RUN_BY_ECDAQ)
+def test_a_verb_that_is_a_program_gets_the_global_options(verb: str) -> None:
+    globals_ = ["--run-dir", "/nonexistent", "--config", "/dev/null"]
+    assert run("ecdaq", *globals_, verb, "--version").stdout.startswith(f"ecdaq-{verb} ")
+    helped = run("ecdaq", verb, "--help")
+    assert helped.returncode == OK and helped.stdout == run(f"ecdaq-{verb}", "--help").stdout
+    assert helped.stdout.startswith(f"usage: ecdaq {verb}")
+    for words, text in (([], "missing command: "), (["frob"], "frob: unknown command (see ")):
+        one_line("ecdaq", run("ecdaq", *globals_, verb, *words), USAGE, f"ecdaq: {verb}: {text}")
+
+
+def test_the_recordings_of_a_configuration_are_listed(tmp_path: Path) -> None:
+    config = tmp_path / "ecdaq.yaml"
+    config.write_text(f"record:\n  dir: {tmp_path / 'nowhere'}\n")
+    for words in (
+        ["--config", str(config), "log", "list"],
+        ["log", "list", "--config", str(config)],
+    ):
+        one_line("ecdaq", run("ecdaq", *words), FAILED, f"{tmp_path / 'nowhere'}: ")
+
+
+@pytest.mark.parametrize("verb", RUN_BY_ECDAQ)
+def test_a_verb_whose_program_is_missing_is_named(verb: str, tmp_path: Path) -> None:
+    alone = tmp_path / "ecdaq"
+    shutil.copy(BIN / "ecdaq", alone)
+    result = subprocess.run([alone, verb], capture_output=True, text=True, timeout=60, check=False)
+    one_line("ecdaq", result, FAILED, f"{tmp_path}/ecdaq-{verb}: not installed")
+
+
+def test_ecdaq_itself_links_neither_openssl_nor_zstd() -> None:
+    libraries = subprocess.run(
+        ["ldd", BIN / "ecdaq"], capture_output=True, text=True, check=True
+    ).stdout
+    assert "libc.so" in libraries
+    assert not re.search("crypto|ssl|zstd", libraries)
+
+
 def exit_codes(program: str) -> dict[int, str]:
     """The table at the end of --help."""
     table = run(program, "--help").stdout.split("exit codes:\n")[1]
@@ -154,7 +193,7 @@ def test_the_page_of_exit_codes_has_every_code_once() -> None:
     assert [code for code, _, _ in documented()] == codes
 
 
-@pytest.mark.parametrize("program", PROGRAMS)
+@pytest.mark.parametrize("program", [*PROGRAMS, *(f"ecdaq-{verb}" for verb in RUN_BY_ECDAQ)])
 def test_the_exit_codes_of_help_are_those_of_the_page(program: str) -> None:
     listed = {
         code: text

@@ -33,7 +33,9 @@ CASES = [
     ),
     Case(rules.rule_includes, "app/core/base/a.c", '#include "wire/al.h"', '#include "clock.h"'),
     Case(rules.rule_includes, "app/cli/a.c", '#include "cycle/cycle.h"', '#include "base/ring.h"'),
-    Case(rules.rule_includes, "app/cli/a.c", '#include "record/mcap.h"', '#include "record/log.h"'),
+    Case(
+        rules.rule_includes, "app/cli/a.c", '#include "record/mcap.h"', '#include "program/args.h"'
+    ),
     Case(
         rules.rule_includes,
         "app/cli/a.c",

@@ -23,7 +23,7 @@ static void make_standard(struct standard *s, struct args_option options[STANDAR
 		{ "config", 0, args_text, &s->config_path, "FILE",
 		  "ecdaq.yaml (default: built-in defaults)" },
 		{ "set", 0, args_list, &s->set, "OPTION=VALUE",
-		  "set one option over the file; may be repeated: --set cycle.period=500us" },
+		  "set one option over the file: cycle.period=500us; may be repeated" },
 		{ "run-dir", 0, args_text, &s->run_dir, "DIR",
 		  "run directory of ecdaqd: rings, status page, sockets (runtime.run_dir)" },
 		{ "check", 0, args_flag, &s->is_check, NULL,

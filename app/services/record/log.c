@@ -3,38 +3,34 @@
 #include "record/log.h"
 
 #include <errno.h>
-#include <getopt.h> /* IWYU pragma: keep */
-#include <inttypes.h>
 #include <limits.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "config/config.h"
+#include "program/args.h"
+#include "program/error.h"
 #include "record/log_common.h"
 
 struct arguments {
 	const char *dir;
 	const char *config_path;
+	const char *run_dir; /* a global option of ecdaq: accepted, not used */
 	const char *output;
 	struct log_export_options export;
-	enum log_format format;
-	int is_help;
+	int is_json;
 };
 
-/* Options that a verb takes. */
+/* Options that a command takes. */
 enum {
+	TAKES_ALL = 0,
 	TAKES_DIR = 1 << 0,
 	TAKES_OUTPUT = 1 << 1,
 	TAKES_EXPORT = 1 << 2,
 };
 
-static const struct option known[] = {
-	{ "dir", required_argument, NULL, 'd' },    { "config", required_argument, NULL, 'c' },
-	{ "output", required_argument, NULL, 'o' }, { "channels", required_argument, NULL, 'n' },
-	{ "from", required_argument, NULL, 'f' },   { "to", required_argument, NULL, 't' },
-	{ "raw", no_argument, NULL, 'r' },          { "json", no_argument, NULL, 'j' },
-	{ "help", no_argument, NULL, 'h' },         { NULL, 0, NULL, 0 },
-};
+enum { OPTIONS = 9 };
+
+static const char program[] = "ecdaq: log";
 
 static void help(FILE *out)
 {
@@ -50,7 +46,7 @@ static void help(FILE *out)
 	      "  info     topics with their fields, counts, metadata of one recording\n"
 	      "  check    read all: CRC of each chunk, cycle numbers without a gap in and between "
 	      "files\n"
-	      "  recover  mend a recording that was not finished; --output copies what is whole\n"
+	      "  recover  repair an incomplete recording; --output copies what is intact\n"
 	      "  export   a table with a row a cycle, as CSV (pandas.read_csv takes it as it is)\n"
 	      "\n"
 	      "  --dir DIR        the recordings' directory (default: record.dir)\n"
@@ -60,99 +56,65 @@ static void help(FILE *out)
 	      "  --raw            values as on the wire (default: physical, raw * scale + offset)\n"
 	      "  --output FILE    where to (export: default is standard output)\n"
 	      "  --json           JSON (export: an object a line)\n"
-	      "\n"
-	      "Exit codes: 0 done, check: clean; 1 failed, check: gaps or damage; 2 command "
-	      "line.\n",
+	      "\n",
 	      out);
+	exit_code_help(out, EXIT_CODE_COMMON);
+	fputs("check: 1 for gaps or damage.\n", out);
 }
 
-static int usage(const char *what, const char *why)
+static int usage(const char *message)
 {
-	fprintf(stderr, "ecdaq: log: %s: %s (see ecdaq log --help)\n", what, why);
-	return LOG_USAGE;
+	error_print(program, "%s (see ecdaq log --help)", message);
+	return EXIT_CODE_USAGE;
 }
 
-static int parse_cycle(const char *name, const char *text, uint64_t *ret_cycle)
+/* The options that @takes allows, into @ret_options. Their number. */
+static size_t select_options(unsigned takes, struct arguments *a, struct args_option *ret_options)
 {
-	unsigned long long value;
-	char *end;
+	const struct {
+		unsigned need;
+		struct args_option option;
+	} rows[OPTIONS] = {
+		{ TAKES_ALL, { "config", 0, args_text, &a->config_path, "FILE", NULL } },
+		{ TAKES_ALL, { "run-dir", 0, args_text, &a->run_dir, "DIR", NULL } },
+		{ TAKES_ALL, { "json", 0, args_flag, &a->is_json, NULL, NULL } },
+		{ TAKES_DIR, { "dir", 0, args_text, &a->dir, "DIR", NULL } },
+		{ TAKES_OUTPUT, { "output", 0, args_text, &a->output, "FILE", NULL } },
+		{ TAKES_EXPORT, { "channels", 0, args_text, &a->export.channels, "LIST", NULL } },
+		{ TAKES_EXPORT, { "from", 0, args_cycle, &a->export.from, "CYCLE", NULL } },
+		{ TAKES_EXPORT, { "to", 0, args_cycle, &a->export.to, "CYCLE", NULL } },
+		{ TAKES_EXPORT, { "raw", 0, args_flag, &a->export.is_raw, NULL, NULL } },
+	};
+	size_t count = 0;
 
-	errno = 0;
-	value = strtoull(text, &end, 10);
-	if (text[0] < '0' || text[0] > '9' || *end != '\0' || errno != 0) {
-		return usage(name, "not a cycle number");
-	}
-	*ret_cycle = value;
-	return LOG_OK;
-}
-
-static int take_option(struct arguments *a, int c)
-{
-	switch (c) {
-	case 'd':
-		a->dir = optarg;
-		break;
-	case 'c':
-		a->config_path = optarg;
-		break;
-	case 'o':
-		a->output = optarg;
-		break;
-	case 'n':
-		a->export.channels = optarg;
-		break;
-	case 'f':
-		return parse_cycle("--from", optarg, &a->export.from);
-	case 't':
-		return parse_cycle("--to", optarg, &a->export.to);
-	case 'r':
-		a->export.is_raw = 1;
-		break;
-	case 'j':
-		a->format = LOG_JSON;
-		break;
-	default:
-		a->is_help = 1;
-		break;
-	}
-	return LOG_OK;
-}
-
-static unsigned needs(int c)
-{
-	return c == 'd' || c == 'c'                           ? TAKES_DIR
-	       : c == 'o'                                     ? TAKES_OUTPUT
-	       : c == 'n' || c == 'f' || c == 't' || c == 'r' ? TAKES_EXPORT
-							      : 0;
-}
-
-/* Leaves optind at the first operand. */
-static int parse(int argc, char **argv, unsigned takes, struct arguments *a)
-{
-	int c;
-
-	*a = (struct arguments){ .export = { .to = UINT64_MAX } };
-	opterr = 0;
-	optind = 0; /* begin anew: the caller may have used getopt itself */
-	while ((c = getopt_long(argc, argv, ":h", known, NULL)) != -1) {
-		int r;
-
-		if (c == ':' || c == '?') {
-			return usage(argv[optind - 1],
-				     c == ':' ? "needs a value" : "no such option");
-		}
-		if ((needs(c) & ~takes) != 0) {
-			return usage(argv[0], "does not take this option");
-		}
-		r = take_option(a, c);
-		if (r != LOG_OK) {
-			return r;
+	for (size_t i = 0; i < OPTIONS; i++) {
+		if ((rows[i].need & ~takes) == 0) {
+			ret_options[count++] = rows[i].option;
 		}
 	}
-	if (a->export.from > a->export.to) {
-		return usage("--from", "is after --to");
+	return count;
+}
+
+/* 1 with @args filled; 0 with the exit code in @ret_code. */
+static int parse(struct args *args, int argc, char **argv, int *ret_code)
+{
+	char error[ARGS_ERROR_BYTES];
+
+	*ret_code = EXIT_CODE_OK;
+	switch (args_parse(args, argc, argv, error)) {
+	case ARGS_OK:
+		return 1;
+	case ARGS_HELP:
+		help(stdout);
+		return 0;
+	case ARGS_VERSION:
+		puts("ecdaq-log " ECDAQ_VERSION);
+		return 0;
+	case ARGS_ERROR:
+		*ret_code = usage(error);
+		return 0;
 	}
-	return LOG_OK;
+	return 0;
 }
 
 /* The directory asked for, or record.dir. */
@@ -164,11 +126,16 @@ static int find_dir(const struct arguments *a, char *dir, size_t dir_bytes)
 	config_defaults(&cfg);
 	if (a->dir == NULL && a->config_path != NULL &&
 	    config_load(a->config_path, &cfg, error, sizeof(error)) < 0) {
-		fprintf(stderr, "ecdaq: log: %s\n", error);
-		return LOG_FAILED;
+		error_print(program, "%s", error);
+		return EXIT_CODE_FAILED;
 	}
 	snprintf(dir, dir_bytes, "%s", a->dir != NULL ? a->dir : cfg.record_dir);
-	return LOG_OK;
+	return EXIT_CODE_OK;
+}
+
+static enum log_format format_of(const struct arguments *a)
+{
+	return a->is_json ? LOG_JSON : LOG_TEXT;
 }
 
 static int run_list(const struct arguments *a, char **operands, int count)
@@ -176,16 +143,15 @@ static int run_list(const struct arguments *a, char **operands, int count)
 	char dir[PATH_MAX];
 	int r = find_dir(a, dir, sizeof(dir));
 
-	if (count > 0) {
-		return usage(operands[0], "list takes no operand");
-	}
-	return r != LOG_OK ? r : log_list(dir, a->format, stdout, stderr);
+	(void)operands;
+	(void)count;
+	return r != EXIT_CODE_OK ? r : log_list(dir, format_of(a), stdout, stderr);
 }
 
 static int run_info(const struct arguments *a, char **operands, int count)
 {
-	return count != 1 ? usage("info", "takes one file")
-			  : log_info(operands[0], a->format, stdout, stderr);
+	(void)count;
+	return log_info(operands[0], format_of(a), stdout, stderr);
 }
 
 static int run_check(const struct arguments *a, char **operands, int count)
@@ -195,17 +161,17 @@ static int run_check(const struct arguments *a, char **operands, int count)
 	int r;
 
 	if (count > 0) {
-		return log_check((const char *const *)operands, (size_t)count, a->format, stdout,
+		return log_check((const char *const *)operands, (size_t)count, format_of(a), stdout,
 				 stderr);
 	}
 	r = find_dir(a, dir, sizeof(dir));
-	return r != LOG_OK ? r : log_check(paths, 1, a->format, stdout, stderr);
+	return r != EXIT_CODE_OK ? r : log_check(paths, 1, format_of(a), stdout, stderr);
 }
 
 static int run_recover(const struct arguments *a, char **operands, int count)
 {
-	return count != 1 ? usage("recover", "takes one file")
-			  : log_recover(operands[0], a->output, a->format, stdout, stderr);
+	(void)count;
+	return log_recover(operands[0], a->output, format_of(a), stdout, stderr);
 }
 
 static int run_export(const struct arguments *a, char **operands, int count)
@@ -214,14 +180,14 @@ static int run_export(const struct arguments *a, char **operands, int count)
 	char dir[PATH_MAX];
 	const char *paths[1] = { dir };
 	FILE *out = stdout;
-	int r = count > 0 ? LOG_OK : find_dir(a, dir, sizeof(dir));
+	int r = count > 0 ? EXIT_CODE_OK : find_dir(a, dir, sizeof(dir));
 
-	if (r != LOG_OK) {
+	if (r != EXIT_CODE_OK) {
 		return r;
 	}
 	options.paths = count > 0 ? (const char *const *)operands : paths;
 	options.path_count = count > 0 ? (size_t)count : 1;
-	options.format = a->format;
+	options.format = format_of(a);
 	if (a->output != NULL) {
 		out = fopen(a->output, "we");
 		if (out == NULL) {
@@ -229,49 +195,66 @@ static int run_export(const struct arguments *a, char **operands, int count)
 		}
 	}
 	r = log_export(&options, out, stderr);
-	if (out != stdout && fclose(out) != 0 && r == LOG_OK) {
+	if (out != stdout && fclose(out) != 0 && r == EXIT_CODE_OK) {
 		r = log_fail(stderr, a->output, strerror(errno));
 	}
 	return r;
 }
 
-static const struct {
+static const struct command {
 	const char *name;
 	unsigned takes;
+	int operands_min;
+	int operands_max;
+	const char *operands;
 	int (*run)(const struct arguments *a, char **operands, int count);
-} verbs[] = {
-	{ "list", TAKES_DIR, run_list },
-	{ "info", 0, run_info },
-	{ "check", TAKES_DIR, run_check },
-	{ "recover", TAKES_OUTPUT, run_recover },
-	{ "export", TAKES_DIR | TAKES_OUTPUT | TAKES_EXPORT, run_export },
+} commands[] = {
+	{ "list", TAKES_DIR, 0, 0, "", run_list },
+	{ "info", 0, 1, 1, "FILE", run_info },
+	{ "check", TAKES_DIR, 0, INT_MAX, "", run_check },
+	{ "recover", TAKES_OUTPUT, 1, 1, "FILE", run_recover },
+	{ "export", TAKES_DIR | TAKES_OUTPUT | TAKES_EXPORT, 0, INT_MAX, "", run_export },
 };
+
+static int run_command(const struct command *command, struct arguments *a, const struct args *words)
+{
+	struct args_option options[OPTIONS];
+	struct args args = { .options = options,
+			     .option_count = select_options(command->takes, a, options),
+			     .operands_min = command->operands_min,
+			     .operands_max = command->operands_max,
+			     .operands_usage = command->operands };
+	int code;
+
+	if (!parse(&args, words->operand_count - 1, words->operands + 1, &code)) {
+		return code;
+	}
+	if (a->export.from > a->export.to) {
+		return usage("--from: is after --to");
+	}
+	return command->run(a, args.operands, args.operand_count);
+}
 
 int log_main(int argc, char **argv)
 {
-	struct arguments a;
-	int r;
+	struct arguments a = { .export = { .to = UINT64_MAX } };
+	struct args_option options[OPTIONS];
+	struct args args = { .options = options,
+			     .option_count = select_options(TAKES_ALL, &a, options),
+			     .operands_min = 1,
+			     .operands_usage = "command: list, info, check, recover or export",
+			     .ends_at_operand = 1 };
+	char error[ARGS_ERROR_BYTES];
+	int code;
 
-	if (argc < 2) {
-		return usage("no verb", "list, info, check, recover or export");
+	if (!parse(&args, argc - 1, argv + 1, &code)) {
+		return code;
 	}
-	if (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0) {
-		help(stdout);
-		return LOG_OK;
+	for (size_t i = 0; i < sizeof(commands) / sizeof(commands[0]); i++) {
+		if (strcmp(commands[i].name, args.operands[0]) == 0) {
+			return run_command(&commands[i], &a, &args);
+		}
 	}
-	for (size_t i = 0; i < sizeof(verbs) / sizeof(verbs[0]); i++) {
-		if (strcmp(verbs[i].name, argv[1]) != 0) {
-			continue;
-		}
-		r = parse(argc - 1, argv + 1, verbs[i].takes, &a);
-		if (r != LOG_OK) {
-			return r;
-		}
-		if (a.is_help) {
-			help(stdout);
-			return LOG_OK;
-		}
-		return verbs[i].run(&a, argv + 1 + optind, argc - 1 - optind);
-	}
-	return usage(argv[1], "no such verb");
+	snprintf(error, sizeof(error), "%.200s: unknown command", args.operands[0]);
+	return usage(error);
 }

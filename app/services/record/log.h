@@ -9,20 +9,15 @@
 #include <stdint.h>
 #include <stdio.h>
 
-/* Exit codes; part of the interface. */
-enum log_exit {
-	LOG_OK = 0,
-	LOG_FAILED = 1, /* what was asked for could not be done; check: gaps or damage were found */
-	LOG_USAGE = 2,  /* the command line */
-};
+#include "program/exit_code.h"
 
 enum log_format { LOG_TEXT, LOG_JSON };
 
-/** `ecdaq log ...`: @argv[0] is "log". Output goes to stdout, failures as one line each to stderr.
- */
-int log_main(int argc, char **argv);
+/* Each returns an exit code; an error is one line "ecdaq: log: what: why" to @err. */
 
-/* The same as calls; failures are one line "ecdaq: log: what: why" to @err. */
+/** The command line of `ecdaq log`: ecdaq-log, run by ecdaq. Output goes to stdout, errors to
+ * stderr. */
+int log_main(int argc, char **argv);
 
 /** A table of the recordings in @dir: start, duration, cycles, size, state. */
 int log_list(const char *dir, enum log_format format, FILE *out, FILE *err);
@@ -30,10 +25,10 @@ int log_list(const char *dir, enum log_format format, FILE *out, FILE *err);
 int log_info(const char *path, enum log_format format, FILE *out, FILE *err);
 /**
  * Read all of the files (or of the directories) at @paths: CRC of every chunk, and cycle numbers
- * without a gap inside of files and from one to the next. LOG_OK: clean.
+ * without a gap inside of files and from one to the next. EXIT_CODE_OK: clean.
  */
 int log_check(const char *const *paths, size_t count, enum log_format format, FILE *out, FILE *err);
-/** Mend @path in place, or copy what is whole to @output where that is not NULL. */
+/** Repair @path in place, or copy what is whole to @output where that is not NULL. */
 int log_recover(const char *path, const char *output, enum log_format format, FILE *out, FILE *err);
 
 struct log_export_options {

@@ -285,15 +285,15 @@ static int put_result(const struct check *ck, enum log_format format, FILE *out,
 			ck->count, sum.cycles, sum.gaps, sum.missing, sum.damaged,
 			is_clean ? "clean" : "NOT CLEAN");
 	}
-	return is_clean ? LOG_OK : LOG_FAILED;
+	return is_clean ? EXIT_CODE_OK : EXIT_CODE_FAILED;
 }
 
 int log_check(const char *const *paths, size_t count, enum log_format format, FILE *out, FILE *err)
 {
 	struct check ck = { .count = 0 };
-	int result = LOG_OK;
+	int result = EXIT_CODE_OK;
 
-	for (size_t i = 0; i < count && result == LOG_OK; i++) {
+	for (size_t i = 0; i < count && result == EXIT_CODE_OK; i++) {
 		struct stat st;
 		int r = stat(paths[i], &st) < 0 ? -errno
 			: S_ISDIR(st.st_mode) ? add_directory(&ck, paths[i])
@@ -303,13 +303,13 @@ int log_check(const char *const *paths, size_t count, enum log_format format, FI
 			result = log_fail_errno(err, paths[i], r);
 		}
 	}
-	if (result == LOG_OK) {
+	if (result == EXIT_CODE_OK) {
 		if (ck.count > 1) {
 			qsort(ck.file, ck.count, sizeof(ck.file[0]), by_sequence);
 		}
 		result = put_result(&ck, format, out, err);
-		if (log_finish_output(out, err) != LOG_OK) {
-			result = LOG_FAILED;
+		if (log_finish_output(out, err) != EXIT_CODE_OK) {
+			result = EXIT_CODE_FAILED;
 		}
 	}
 	for (size_t i = 0; i < ck.count; i++) {

@@ -16,7 +16,7 @@
 int log_fail(FILE *err, const char *what, const char *why)
 {
 	fprintf(err, "ecdaq: log: %s: %s\n", what, why);
-	return LOG_FAILED;
+	return EXIT_CODE_FAILED;
 }
 
 int log_fail_errno(FILE *err, const char *what, int error)
@@ -97,7 +97,7 @@ int log_finish_output(FILE *out, FILE *err)
 	if (fflush(out) != 0 || ferror(out)) {
 		return log_fail(err, "output", errno != 0 ? strerror(errno) : "write error");
 	}
-	return LOG_OK;
+	return EXIT_CODE_OK;
 }
 
 const char *log_ending_to_str(enum mcap_ending ending)

@@ -7,7 +7,7 @@
 #include "record/mcap_recover.h"
 #include "record/track.h"
 
-/** "ecdaq: log: what: why" to @err. Returns LOG_FAILED. */
+/** "ecdaq: log: what: why" to @err. Returns EXIT_CODE_FAILED. */
 int log_fail(FILE *err, const char *what, const char *why);
 /** The same for a negative errno @error of reading a recording. */
 int log_fail_errno(FILE *err, const char *what, int error);
@@ -31,7 +31,7 @@ int log_is_recording(const char *path);
 enum { LOG_TIME_BYTES = 40 };
 void log_format_time(uint64_t utc_ns, char buf[LOG_TIME_BYTES]);
 
-/** LOG_OK, or LOG_FAILED if writing to @out failed. */
+/** EXIT_CODE_OK, or EXIT_CODE_FAILED if writing to @out failed. */
 int log_finish_output(FILE *out, FILE *err);
 
 const char *log_ending_to_str(enum mcap_ending ending);

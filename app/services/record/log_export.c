@@ -58,7 +58,7 @@ static int freeze(struct export *ex, struct columns *c, const char *path)
 		return log_fail(ex->err, path,
 				"has other channels than the files before: export it by itself");
 	}
-	return LOG_OK;
+	return EXIT_CODE_OK;
 }
 
 static int take_message(struct export *ex, struct columns *c, const struct mcap_item *item,
@@ -69,7 +69,7 @@ static int take_message(struct export *ex, struct columns *c, const struct mcap_
 	if (!columns_is_frozen(c)) {
 		int result = freeze(ex, c, path);
 
-		if (result != LOG_OK) {
+		if (result != EXIT_CODE_OK) {
 			return result;
 		}
 	}
@@ -79,14 +79,15 @@ static int take_message(struct export *ex, struct columns *c, const struct mcap_
 	} else {
 		r = columns_take(c, item);
 	}
-	return r < 0 ? log_fail(ex->err, path, "a message does not fit to its definition") : LOG_OK;
+	return r < 0 ? log_fail(ex->err, path, "a message does not fit to its definition")
+		     : EXIT_CODE_OK;
 }
 
 static int read_items(struct export *ex, struct columns *c, struct mcap_reader *reader,
 		      const char *path)
 {
 	struct mcap_item item;
-	int result = LOG_OK;
+	int result = EXIT_CODE_OK;
 	int r;
 
 	while ((r = mcap_reader_next(reader, &item)) > 0) {
@@ -97,7 +98,7 @@ static int read_items(struct export *ex, struct columns *c, struct mcap_reader *
 		} else if (item.kind == MCAP_ITEM_MESSAGE) {
 			int taken = take_message(ex, c, &item, path);
 
-			if (taken != LOG_OK) {
+			if (taken != EXIT_CODE_OK) {
 				return taken;
 			}
 		} else if (item.kind == MCAP_ITEM_DAMAGE && !log_is_recording(path)) {
@@ -141,7 +142,7 @@ static int export_directory(struct export *ex, const char *dir)
 {
 	struct store_entry *entries;
 	size_t count;
-	int result = LOG_OK;
+	int result = EXIT_CODE_OK;
 	int r = store_list(dir, &entries, &count);
 
 	if (r < 0) {
@@ -150,10 +151,10 @@ static int export_directory(struct export *ex, const char *dir)
 	for (size_t i = 0; i < count && !ex->is_hopeless; i++) {
 		char path[PATH_MAX];
 		int one = store_path(dir, entries[i].name, path, sizeof(path)) < 0
-				  ? LOG_FAILED
+				  ? EXIT_CODE_FAILED
 				  : export_file(ex, path);
 
-		result = result != LOG_OK ? result : one;
+		result = result != EXIT_CODE_OK ? result : one;
 	}
 	free(entries);
 	return result;
@@ -162,7 +163,7 @@ static int export_directory(struct export *ex, const char *dir)
 int log_export(const struct log_export_options *options, FILE *out, FILE *err)
 {
 	struct export ex = { .options = options, .out = out, .err = err };
-	int result = LOG_OK;
+	int result = EXIT_CODE_OK;
 
 	for (size_t i = 0; i < options->path_count && !ex.is_hopeless; i++) {
 		const char *path = options->paths[i];
@@ -171,12 +172,12 @@ int log_export(const struct log_export_options *options, FILE *out, FILE *err)
 			  : S_ISDIR(st.st_mode) ? export_directory(&ex, path)
 						: export_file(&ex, path);
 
-		result = result != LOG_OK ? result : one;
+		result = result != EXIT_CODE_OK ? result : one;
 	}
-	if (result == LOG_OK && ex.rows == 0) {
+	if (result == EXIT_CODE_OK && ex.rows == 0) {
 		result = log_fail(err, options->path_count > 0 ? options->paths[0] : "no file",
 				  "there is no such cycle");
 	}
 	columns_destroy(ex.first);
-	return log_finish_output(out, err) != LOG_OK ? LOG_FAILED : result;
+	return log_finish_output(out, err) != EXIT_CODE_OK ? EXIT_CODE_FAILED : result;
 }

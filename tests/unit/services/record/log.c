@@ -90,14 +90,14 @@ TEST(log, list_has_a_line_a_recording)
 
 	record(&b);
 	open_both(&p);
-	CHECK_EQ(log_list(b.dir, LOG_TEXT, p.out_file, p.err_file), LOG_OK);
+	CHECK_EQ(log_list(b.dir, LOG_TEXT, p.out_file, p.err_file), EXIT_CODE_OK);
 	close_both(&p);
 	CHECK_EQ(lines_of(p.out), 1 + 3);
 	CHECK(strstr(p.out, "finished") != NULL);
 	CHECK_EQ(p.err_len, 0);
 	done(&p);
 	open_both(&p);
-	CHECK_EQ(log_list("/nowhere", LOG_TEXT, p.out_file, p.err_file), LOG_FAILED);
+	CHECK_EQ(log_list("/nowhere", LOG_TEXT, p.out_file, p.err_file), EXIT_CODE_FAILED);
 	close_both(&p);
 	CHECK_STR(p.err, "ecdaq: log: /nowhere: No such file or directory\n");
 	done(&p);
@@ -113,7 +113,7 @@ TEST(log, check_finds_the_gap_where_a_file_between_two_is_gone)
 
 	record(&b);
 	open_both(&p);
-	CHECK_EQ(log_check(paths, 1, LOG_TEXT, p.out_file, p.err_file), LOG_OK);
+	CHECK_EQ(log_check(paths, 1, LOG_TEXT, p.out_file, p.err_file), EXIT_CODE_OK);
 	close_both(&p);
 	CHECK(strstr(p.out, "3 files, 1500 cycles, 0 gaps, 0 cycles missing, 0 damaged: clean") !=
 	      NULL);
@@ -121,7 +121,7 @@ TEST(log, check_finds_the_gap_where_a_file_between_two_is_gone)
 	path_of(&b, 1, path, sizeof(path));
 	CHECK_EQ(unlink(path), 0);
 	open_both(&p);
-	CHECK_EQ(log_check(paths, 1, LOG_JSON, p.out_file, p.err_file), LOG_FAILED);
+	CHECK_EQ(log_check(paths, 1, LOG_JSON, p.out_file, p.err_file), EXIT_CODE_FAILED);
 	close_both(&p);
 	CHECK(strstr(p.out, "\"missing_before\":500,") != NULL ||
 	      strstr(p.out, "\"missing_before\":550,") != NULL);
@@ -142,13 +142,13 @@ TEST(log, check_takes_a_file_that_is_being_recorded_for_no_damage)
 	bench_push(&b, 0, 500);
 	bench_wait(&b, NS_PER_S);
 	open_both(&p);
-	CHECK_EQ(log_check(paths, 1, LOG_TEXT, p.out_file, p.err_file), LOG_OK);
+	CHECK_EQ(log_check(paths, 1, LOG_TEXT, p.out_file, p.err_file), EXIT_CODE_OK);
 	close_both(&p);
 	CHECK(strstr(p.out, "being recorded") != NULL);
 	done(&p);
 	bench_kill(&b);
 	open_both(&p);
-	CHECK_EQ(log_check(paths, 1, LOG_TEXT, p.out_file, p.err_file), LOG_FAILED);
+	CHECK_EQ(log_check(paths, 1, LOG_TEXT, p.out_file, p.err_file), EXIT_CODE_FAILED);
 	close_both(&p);
 	CHECK(strstr(p.out, "DAMAGED") != NULL);
 	CHECK(strstr(p.out, "not finished") != NULL);
@@ -169,25 +169,25 @@ TEST(log, recover_mends_an_unfinished_recording_and_not_one_in_the_making)
 	bench_wait(&b, NS_PER_S);
 	path_of(&b, 0, path, sizeof(path));
 	open_both(&p);
-	CHECK_EQ(log_recover(path, NULL, LOG_TEXT, p.out_file, p.err_file), LOG_FAILED);
+	CHECK_EQ(log_recover(path, NULL, LOG_TEXT, p.out_file, p.err_file), EXIT_CODE_FAILED);
 	close_both(&p);
 	CHECK(strstr(p.err, "is being recorded") != NULL);
 	done(&p);
 	bench_kill(&b);
 	open_both(&p);
-	CHECK_EQ(log_recover(path, NULL, LOG_TEXT, p.out_file, p.err_file), LOG_OK);
+	CHECK_EQ(log_recover(path, NULL, LOG_TEXT, p.out_file, p.err_file), EXIT_CODE_OK);
 	close_both(&p);
 	CHECK(strstr(p.out, "mended") != NULL);
 	CHECK(strstr(p.out, "lost after cycle 499") != NULL);
 	done(&p);
 	open_both(&p);
-	CHECK_EQ(log_check(paths, 1, LOG_TEXT, p.out_file, p.err_file), LOG_OK);
+	CHECK_EQ(log_check(paths, 1, LOG_TEXT, p.out_file, p.err_file), EXIT_CODE_OK);
 	close_both(&p);
 	done(&p);
 	path_of(&b, 0, path, sizeof(path));
 	CHECK_STR(path + strlen(path) - 5, ".mcap");
 	open_both(&p);
-	CHECK_EQ(log_recover(path, path, LOG_TEXT, p.out_file, p.err_file), LOG_FAILED);
+	CHECK_EQ(log_recover(path, path, LOG_TEXT, p.out_file, p.err_file), EXIT_CODE_FAILED);
 	close_both(&p);
 	CHECK(strstr(p.err, "is there already") != NULL);
 	done(&p);
@@ -203,7 +203,7 @@ TEST(log, info_tells_topics_fields_and_metadata)
 	record(&b);
 	path_of(&b, 0, path, sizeof(path));
 	open_both(&p);
-	CHECK_EQ(log_info(path, LOG_TEXT, p.out_file, p.err_file), LOG_OK);
+	CHECK_EQ(log_info(path, LOG_TEXT, p.out_file, p.err_file), EXIT_CODE_OK);
 	close_both(&p);
 	CHECK(strstr(p.out, "topic /ecdaq/adc: ") != NULL);
 	CHECK(strstr(p.out, "uint32 value") != NULL);
@@ -225,7 +225,7 @@ static char *export_of(struct bench *b, struct log_export_options options, int w
 	open_both(&p);
 	CHECK_EQ(log_export(&options, p.out_file, p.err_file), wanted);
 	close_both(&p);
-	CHECK_EQ(p.err_len > 0, wanted != LOG_OK);
+	CHECK_EQ(p.err_len > 0, wanted != EXIT_CODE_OK);
 	out = p.out;
 	free(p.err);
 	return out;
@@ -237,7 +237,7 @@ TEST(log, export_has_a_row_a_cycle_over_all_files)
 	char *out;
 
 	record(&b);
-	out = export_of(&b, (struct log_export_options){ .to = UINT64_MAX }, LOG_OK);
+	out = export_of(&b, (struct log_export_options){ .to = UINT64_MAX }, EXIT_CODE_OK);
 	CHECK_EQ(lines_of(out), 1 + 1500);
 	CHECK_EQ(strncmp(out, "cycle,utc_ns,dc_time_ns,flags,adc.good,adc.value\n0,", 51), 0);
 	CHECK(strstr(out, "\n1499,") != NULL);
@@ -247,7 +247,7 @@ TEST(log, export_has_a_row_a_cycle_over_all_files)
 		&b,
 		(struct log_export_options){
 			.channels = "adc.value", .from = 700, .to = 702, .format = LOG_JSON },
-		LOG_OK);
+		EXIT_CODE_OK);
 	CHECK_EQ(lines_of(out), 3);
 	CHECK(strstr(out, "{\"cycle\":701,\"utc_ns\":") != NULL);
 	CHECK(strstr(out, ",\"adc.value\":701}") != NULL);
@@ -255,11 +255,11 @@ TEST(log, export_has_a_row_a_cycle_over_all_files)
 	out = export_of(&b,
 			(struct log_export_options){ .channels = "adc.value,adc.nothing",
 						     .to = UINT64_MAX },
-			LOG_FAILED);
+			EXIT_CODE_FAILED);
 	CHECK_STR(out, "");
 	free(out);
 	out = export_of(&b, (struct log_export_options){ .from = 9999, .to = UINT64_MAX },
-			LOG_FAILED);
+			EXIT_CODE_FAILED);
 	free(out);
 	bench_done(&b);
 }
@@ -289,7 +289,7 @@ TEST(log, export_gives_each_cycle_its_utc)
 	char *out;
 
 	record(&b);
-	out = export_of(&b, options, LOG_OK);
+	out = export_of(&b, options, EXIT_CODE_OK);
 	utc_ns = number_of(out, 0, "\"utc_ns\":");
 	CHECK(utc_ns / NS_PER_S == INT64_C(1766000000)); /* as bench_push() set the host's clock */
 	CHECK_EQ(number_of(out, 1, "\"utc_ns\":") - utc_ns, NS_PER_MS);
@@ -307,10 +307,10 @@ TEST(log, usage_errors_have_their_exit_code)
 	char *foreign[] = { (char *)"log", (char *)"list", (char *)"--raw", NULL };
 	char *missing[] = { (char *)"log", (char *)"info", NULL };
 
-	CHECK_EQ(log_main(1, none), LOG_USAGE);
-	CHECK_EQ(log_main(2, verb), LOG_USAGE);
-	CHECK_EQ(log_main(3, option), LOG_USAGE);
-	CHECK_EQ(log_main(4, value), LOG_USAGE);
-	CHECK_EQ(log_main(3, foreign), LOG_USAGE);
-	CHECK_EQ(log_main(2, missing), LOG_USAGE);
+	CHECK_EQ(log_main(1, none), EXIT_CODE_USAGE);
+	CHECK_EQ(log_main(2, verb), EXIT_CODE_USAGE);
+	CHECK_EQ(log_main(3, option), EXIT_CODE_USAGE);
+	CHECK_EQ(log_main(4, value), EXIT_CODE_USAGE);
+	CHECK_EQ(log_main(3, foreign), EXIT_CODE_USAGE);
+	CHECK_EQ(log_main(2, missing), EXIT_CODE_USAGE);
 }

@@ -61,7 +61,7 @@ TEST(recorder, records_from_the_oldest_slot_of_a_session_it_does_not_know)
 	CHECK_EQ(recorder_status(b.recorder)->synced_cycle, 1499);
 	CHECK_EQ(bench_stop(&b), 0);
 	check_cycles(&b, 0, 1500, 1);
-	CHECK_EQ(check_log(&b), LOG_OK);
+	CHECK_EQ(check_log(&b), EXIT_CODE_OK);
 	bench_done(&b);
 }
 
@@ -99,7 +99,7 @@ TEST(recorder, closed_ring_ends_the_session_and_the_next_run_of_the_master_is_an
 	CHECK_EQ(recorder_status(b.recorder)->session, 200);
 	CHECK_EQ(recorder_status(b.recorder)->recorded_cycles, 50);
 	CHECK_EQ(bench_stop(&b), 0);
-	CHECK_EQ(check_log(&b), LOG_OK);
+	CHECK_EQ(check_log(&b), EXIT_CODE_OK);
 	bench_done(&b);
 }
 
@@ -121,7 +121,7 @@ TEST(recorder, a_replaced_ring_is_drained_before_the_next_is_opened)
 	/* The second session starts at 0 again: once back, and all cycles of both are there. */
 	CHECK_EQ(bench_read(&b, &finished, &parts).cycles, 3010 + 20);
 	CHECK_EQ(finished, 2);
-	CHECK_EQ(check_log(&b), LOG_OK);
+	CHECK_EQ(check_log(&b), EXIT_CODE_OK);
 	bench_done(&b);
 }
 
@@ -154,7 +154,7 @@ TEST(recorder, killed_and_started_again_no_cycle_is_missing_or_doubled)
 		CHECK_EQ(parts, 0);
 		CHECK_EQ(t.event_next, 10);
 	}
-	CHECK_EQ(check_log(&b), LOG_OK);
+	CHECK_EQ(check_log(&b), EXIT_CODE_OK);
 	bench_done(&b);
 }
 
@@ -225,7 +225,7 @@ TEST(recorder, away_for_longer_than_the_ring_is_deep_is_one_exact_gap)
 	CHECK_EQ(recorder_status(b.recorder)->cycles_missing, t.missing);
 	CHECK_EQ(recorder_status(b.recorder)->recorded_cycles, t.cycles + 1);
 	CHECK_EQ(bench_stop(&b), 0);
-	CHECK_EQ(check_log(&b), LOG_FAILED);
+	CHECK_EQ(check_log(&b), EXIT_CODE_FAILED);
 	bench_done(&b);
 }
 
@@ -251,7 +251,7 @@ TEST(recorder, rotates_by_size_and_by_time_without_a_gap)
 	CHECK_EQ(parts, 0);
 	CHECK_EQ(t.gaps + t.backward, 0);
 	CHECK_EQ(t.cycles, 5000);
-	CHECK_EQ(check_log(&b), LOG_OK);
+	CHECK_EQ(check_log(&b), EXIT_CODE_OK);
 	bench_done(&b);
 }
 
