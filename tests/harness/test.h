@@ -2,12 +2,14 @@
 /*
  * A test is a sentence about behaviour. TEST(module, sentence) registers itself; the program runs
  * every test, or those named on its command line. A failed CHECK prints both values and ends the
- * test program with 1; SKIP(why) ends it with 77, which ctest counts as skipped.
+ * test program with 1. SKIP(reason) ends the test; the program exits with 77, which ctest counts as
+ * skipped, if no test ran to its end.
  */
 #ifndef TESTS_HARNESS_TEST_H
 #define TESTS_HARNESS_TEST_H
 
 #include <inttypes.h>
+#include <setjmp.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -24,7 +26,10 @@ void test_register(struct test *t);
 const struct test *test_first(void);
 void test_fail(const char *file, int line, const char *format, ...)
 	__attribute__((noreturn, format(printf, 3, 4)));
-void test_skip(const char *why) __attribute__((noreturn));
+void test_skip(const char *reason) __attribute__((noreturn));
+
+/* Where test_skip() continues; NULL: it ends the program. */
+extern jmp_buf *test_after_skip;
 
 #define TEST(module, sentence)                                                                     \
 	static void test_##module##_##sentence(void);                                              \
@@ -70,6 +75,6 @@ void test_skip(const char *why) __attribute__((noreturn));
 		}                                                                                  \
 	} while (0)
 
-#define SKIP(why) test_skip(why)
+#define SKIP(reason) test_skip(reason)
 
 #endif

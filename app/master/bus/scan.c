@@ -33,20 +33,16 @@ static void silence(struct bus *bus)
 	register_broadcast(bus, ESC_REG_DC_ACTIVATION, &off, sizeof(off));
 }
 
-/* 0x0980 is written where it is set, and nowhere else: some drives mind (T12). */
+/* 0x0980 is written where it is set, and nowhere else: some drives fail on it (T12). */
 static void free_sync(struct bus *bus, size_t pos)
 {
-	uint8_t unit[2];
-	const uint8_t off[2] = { 0, 0 };
+	const uint8_t off = 0;
+	uint8_t owner;
 
-	if (register_read(bus, pos, ESC_REG_DC_CYCLIC_CONTROL, unit, sizeof(unit)) < 0) {
-		return;
-	}
-	if (unit[0] != 0) {
-		register_write(bus, pos, ESC_REG_DC_CYCLIC_CONTROL, off, 1);
-	}
-	if (unit[0] != 0 || unit[1] != 0) {
-		register_write(bus, pos, ESC_REG_DC_ACTIVATION, off, 1);
+	if (register_read(bus, pos, ESC_REG_DC_CYCLIC_CONTROL, &owner, sizeof(owner)) >= 0 &&
+	    owner != 0) {
+		register_write(bus, pos, ESC_REG_DC_CYCLIC_CONTROL, &off, sizeof(off));
+		register_write(bus, pos, ESC_REG_DC_ACTIVATION, &off, sizeof(off));
 	}
 }
 

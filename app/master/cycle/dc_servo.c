@@ -118,8 +118,7 @@ struct dc_servo_result dc_servo_coast(struct dc_servo *servo)
 		servo->coasted++;
 	} else if (servo->state == DC_LOCKED) {
 		servo->state = DC_LOST;
-		servo->in_window = 0;
-		servo->has_jumped = 0;
+		servo->has_jumped = 0; /* the next measurement starts anew */
 	}
 	return apply(servo, 0, servo->has_jumped ? servo->integral_ns : 0);
 }

@@ -84,13 +84,13 @@ static void make_segment(struct bus_bench *b, const struct bench_spec *spec)
  * the write that the others would see. It counts the reference itself as one of them, which is
  * taken back on the way in.
  */
-static void mute(uint8_t *frame, size_t frame_len)
+static void mute(uint8_t *frame, size_t frame_len, uint16_t reference)
 {
 	struct ecat_datagram dg;
 	size_t pos = 0;
 
 	while (ecat_frame_next(frame, frame_len, &pos, &dg) == 1) {
-		if (dg.ado == ESC_REG_DC_SYSTEM_TIME &&
+		if (dg.ado == ESC_REG_DC_SYSTEM_TIME && dg.adp == reference &&
 		    (dg.cmd == ECAT_CMD_FRMW || dg.cmd == ECAT_CMD_FPRD)) {
 			put_le16(dg.data - 8, NOBODY);
 		}
@@ -107,7 +107,7 @@ static int muted_send(struct bus_bench *b, const uint8_t *frame, size_t frame_le
 	uint8_t copy[LIMIT_FRAME_BYTES];
 
 	memcpy(copy, frame, frame_len);
-	mute(copy, frame_len);
+	mute(copy, frame_len, bus_plan(b->bus)->dc_reference);
 	return b->wire.send(b->wire.ctx, copy, frame_len);
 }
 

@@ -33,6 +33,7 @@ static struct bus_bench *start(unsigned piccolos, uint64_t seed)
 	struct bus_bench *b =
 		bench_create(&(struct bench_spec){ .piccolos = piccolos, .seed = seed });
 
+	memset(&heard, 0, sizeof(heard));
 	bus_listen(b->bus, hear, NULL);
 	bench_bring_up(b);
 	bench_run(b, 100);

@@ -142,6 +142,7 @@ TEST(control, what_a_failing_init_says_is_one_plain_line)
 {
 	struct probe *probe = bench_configure();
 
+	exits = 0;
 	probe->init = say_two_lines;
 	probe->exit = count_exit;
 	CHECK_EQ(bench_begin(), -EINVAL);

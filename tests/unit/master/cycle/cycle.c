@@ -196,6 +196,9 @@ static void start_in_op(void)
 	start();
 	steps(1000);
 	CHECK_EQ(stats.dc_state, DC_LOCKED);
+	/* From the first wake to the lock; not less than the cycles it must be near. */
+	CHECK(stats.dc_lock_ns >= cfg.dc_lock_cycles * (int64_t)PERIOD_NS);
+	CHECK(stats.dc_lock_ns < 600 * (int64_t)PERIOD_NS);
 	cycle_phase_set(cy, CYCLE_SYNCED);
 	steps(10);
 	cycle_phase_set(cy, CYCLE_OP);
@@ -218,6 +221,41 @@ static struct got next_sample(void)
 
 	CHECK_EQ(ring_read(reader, &got, sizeof(got), &lost), RING_OK);
 	return got;
+}
+
+/* The next event of @id; the test ends if there is none. */
+static struct event next_event(enum event_id id)
+{
+	struct event ev;
+	uint64_t lost;
+
+	while (ring_read(event_reader, &ev, sizeof(ev), &lost) == RING_OK) {
+		if (ev.id == id) {
+			return ev;
+		}
+	}
+	test_fail(__FILE__, __LINE__, "no event %d", (int)id);
+}
+
+static unsigned count_events(enum event_id id)
+{
+	struct event ev;
+	uint64_t lost;
+	unsigned count = 0;
+
+	while (ring_read(event_reader, &ev, sizeof(ev), &lost) == RING_OK) {
+		count += ev.id == id;
+	}
+	return count;
+}
+
+static void check_event(struct event ev, uint16_t slave_pos, int64_t value, int32_t arg0,
+			int32_t arg1)
+{
+	CHECK_EQ(ev.slave_pos, slave_pos);
+	CHECK_EQ(ev.value, value);
+	CHECK_EQ(ev.arg[0], arg0);
+	CHECK_EQ(ev.arg[1], arg1);
 }
 
 TEST(cycle, every_sample_is_numbered_by_its_sync0_edge_and_good)
@@ -258,6 +296,39 @@ TEST(cycle, a_lost_frame_costs_one_bad_sample_a_slave_and_no_overrun)
 	CHECK_EQ(s.h.slaves_bad, 3);
 	CHECK_EQ(s.h.round_trip_ns, -1);
 	CHECK_EQ(next_sample().h.slaves_bad, 0);
+	check_event(next_event(EVENT_FRAME_LOST), EVENT_NO_SLAVE, (int64_t)s.h.cycle, 1, 0);
+	CHECK_EQ(count_events(EVENT_FRAME_LOST), 0);
+}
+
+TEST(cycle, a_long_loss_is_an_event_at_the_first_and_each_power_of_two)
+{
+	uint64_t first;
+
+	start_in_op();
+	world.status = EXCHANGE_NO_FRAME;
+	steps(9);
+	first = next_sample().h.cycle;
+	for (int row = 1; row <= 8; row *= 2) {
+		check_event(next_event(EVENT_FRAME_LOST), EVENT_NO_SLAVE, (int64_t)first + row - 1,
+			    row, 0);
+	}
+	CHECK_EQ(count_events(EVENT_FRAME_LOST), 0);
+}
+
+TEST(cycle, a_sample_carries_the_phase_error_of_its_frame)
+{
+	struct got s;
+
+	start_in_op();
+	steps(1);
+	CHECK(abs(next_sample().h.phase_error_ns) < 200);
+	world.transit_ns += 7000;
+	steps(1);
+	s = next_sample();
+	CHECK(abs(s.h.phase_error_ns - 7000) < 200);
+	CHECK_EQ(s.h.phase_error_ns,
+		 s.h.frame_dc_ns - s.h.dc_time_ns - PERIOD_NS / 2 - s.h.wake_latency_ns);
+	CHECK(histogram_max_magnitude(&stats.phase) >= 6800);
 }
 
 TEST(cycle, a_wake_three_periods_late_leaves_three_skipped_samples_and_goes_on_in_step)
@@ -285,9 +356,6 @@ TEST(cycle, a_wake_three_periods_late_leaves_three_skipped_samples_and_goes_on_i
 TEST(cycle, a_stall_too_long_for_placeholders_jumps_the_numbers_by_exactly_the_stall)
 {
 	uint64_t cycle;
-	struct event ev;
-	uint64_t lost;
-	int jumps = 0;
 
 	start_in_op();
 	steps(1);
@@ -296,10 +364,9 @@ TEST(cycle, a_stall_too_long_for_placeholders_jumps_the_numbers_by_exactly_the_s
 	steps(2);
 	CHECK_EQ(next_sample().h.cycle, cycle + 5001);
 	CHECK_EQ(next_sample().h.slaves_bad, 0);
-	while (ring_read(event_reader, &ev, sizeof(ev), &lost) == RING_OK) {
-		jumps += ev.id == EVENT_NUMBERING_JUMP && ev.arg[0] == 5000;
-	}
-	CHECK_EQ(jumps, 1);
+	check_event(next_event(EVENT_NUMBERING_JUMP), EVENT_NO_SLAVE, (int64_t)cycle + 5001, 5000,
+		    0);
+	CHECK_EQ(count_events(EVENT_NUMBERING_JUMP), 0);
 }
 
 TEST(cycle, a_counter_that_stands_still_is_a_bad_sample_of_that_slave_alone)
@@ -316,6 +383,8 @@ TEST(cycle, a_counter_that_stands_still_is_a_bad_sample_of_that_slave_alone)
 	CHECK_EQ(stats.samples_bad_unexplained, 1);
 	CHECK_EQ(stats.slave_bad[1], 1);
 	CHECK_EQ(stats.slave_bad[0], 0);
+	check_event(next_event(EVENT_COUNTER_BAD), 1, (int64_t)s.h.cycle, world.counter[1],
+		    world.counter[1] + 1);
 	world.counter[0]++;
 	world.counter[1]++;
 	steps(1);
@@ -336,6 +405,8 @@ TEST(cycle, a_late_or_doubled_frame_is_counted_and_flagged)
 	CHECK_EQ(stats.frames_late, 1);
 	CHECK_EQ(stats.frames_doubled, 1);
 	CHECK_EQ(s.h.slaves_bad, 0);
+	check_event(next_event(EVENT_FRAME_LATE), EVENT_NO_SLAVE, (int64_t)s.h.cycle, 1, 0);
+	check_event(next_event(EVENT_FRAME_DOUBLED), EVENT_NO_SLAVE, (int64_t)s.h.cycle, 0, 0);
 }
 
 TEST(cycle, a_frame_that_passes_while_the_slaves_convert_is_not_taken)
@@ -423,6 +494,8 @@ TEST(cycle, an_output_that_is_not_there_is_one_clear_line)
 	cfg.output[0] = (struct config_output){ .channel = "a.led", .fail_safe = 3, .line = 13 };
 	CHECK_EQ(cycle_create(&spec, &cy, error, sizeof(error)), -22);
 	CHECK_STR(error, "x.yaml:13: outputs: a.led: the channel cannot hold its fail_safe value");
+	cfg.output_count = 0;
+	cfg.path[0] = '\0';
 }
 
 TEST(cycle, a_silent_owner_loses_its_output_after_its_timeout_in_cycles)
@@ -463,18 +536,6 @@ TEST(cycle, events_of_one_kind_are_limited_but_the_counters_are_not)
 	}
 	CHECK_EQ(stats.frames_late, 500);
 	CHECK(count >= 20 && count <= 40);
-}
-
-static unsigned count_events(enum event_id id)
-{
-	struct event ev;
-	uint64_t lost;
-	unsigned count = 0;
-
-	while (ring_read(event_reader, &ev, sizeof(ev), &lost) == RING_OK) {
-		count += ev.id == id;
-	}
-	return count;
 }
 
 TEST(cycle, going_to_fail_safe_is_an_event_only_when_outputs_were_live)
