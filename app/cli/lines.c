@@ -7,6 +7,7 @@
 #include "cli/json.h"
 #include "cli/text.h"
 #include "image/image.h"
+#include "reader/table.h"
 
 static const struct channel *chosen(const struct lines *lines, unsigned i)
 {
@@ -15,9 +16,7 @@ static const struct channel *chosen(const struct lines *lines, unsigned i)
 
 int lines_is_bad(const struct sample_header *header, const struct channel *ch)
 {
-	int is_slave_bad = ch->slave_pos < 64 && (header->slaves_bad >> ch->slave_pos & 1) != 0;
-
-	return samples_is_stale(header->flags) || is_slave_bad;
+	return !sample_is_good(header, ch->slave_pos);
 }
 
 void lines_write_head(const struct lines *lines)

@@ -12,7 +12,7 @@ struct lines {
 	int is_raw;
 };
 
-/** Is @ch of this sample not what it should be: stale, or its slave's sample bad? */
+/** 1 if the sample of the channel's slave is not good (reader/table.h). */
 int lines_is_bad(const struct sample_header *header, const struct channel *ch);
 
 void lines_write_head(const struct lines *lines);

@@ -13,6 +13,7 @@
 #include "cli/text.h"
 #include "image/image.h"
 #include "program/args.h"
+#include "reader/table.h"
 
 /* Entries of the FB1111-Piccolo. */
 #define ENTRY_TIME "oneshot_time"
@@ -137,7 +138,7 @@ static void look(struct oneshot *one, struct shot *shot)
 	const uint8_t *image = samples_image(samples);
 	int64_t sampled_ns;
 
-	if (shot->is_done || samples_is_stale(header.flags)) {
+	if (shot->is_done || !sample_is_good(&header, shot->slave_pos)) {
 		return;
 	}
 	sampled_ns = (int64_t)image_get_raw(image, &samples->channels[shot->sample_time]);

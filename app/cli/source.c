@@ -208,11 +208,6 @@ const uint8_t *samples_image(const struct samples *samples)
 	return samples->payload + sizeof(struct sample_header);
 }
 
-int samples_is_stale(uint32_t flags)
-{
-	return (flags & (SAMPLE_LOST | SAMPLE_WKC_LOW | SAMPLE_SKIPPED)) != 0;
-}
-
 const char *samples_flag_name(unsigned bit)
 {
 	static const char *const names[] = { "lost",        "late",        "wkc_low",

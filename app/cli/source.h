@@ -48,9 +48,6 @@ void samples_close(struct samples *samples);
 struct sample_header samples_header(const struct samples *samples);
 const uint8_t *samples_image(const struct samples *samples);
 
-/** Flags that make the inputs of a sample those of an earlier cycle. */
-int samples_is_stale(uint32_t flags);
-
 /** The words of @flags, "lost late", separated by blanks. */
 void samples_flags_format(uint32_t flags, char *buf, size_t buf_len);
 /** The word of bit @bit; NULL for one that has none. */

@@ -18,7 +18,7 @@
 enum sample_flag {
 	SAMPLE_LOST = 1u << 0,    /* no frame back before the receive deadline: inputs are stale */
 	SAMPLE_LATE = 1u << 1,    /* a frame of an earlier cycle came, and was thrown away */
-	SAMPLE_WKC_LOW = 1u << 2, /* fewer slaves answered than expected: inputs are stale */
+	SAMPLE_WKC_LOW = 1u << 2, /* fewer slaves answered than expected: see slaves_bad */
 	SAMPLE_NOT_OP = 1u << 3,  /* the bus is not in OP */
 	SAMPLE_FAIL_SAFE = 1u << 4,   /* outputs hold their fail-safe values */
 	SAMPLE_SKIPPED = 1u << 5,     /* the master overran: no frame was sent for this SYNC0 */
@@ -40,7 +40,7 @@ struct sample_header {
 	uint32_t flags;          /* enum sample_flag */
 	uint16_t wkc;            /* working counter of the process data, sum over its datagrams */
 	uint16_t wkc_expected;
-	uint64_t slaves_bad; /* bit n: the sample of slave n is not good */
+	uint64_t slaves_bad; /* bit n: the sample of slave n is not good (reader/table.h) */
 };
 
 static_assert(sizeof(struct sample_header) == 72, "part of the ring's format");

@@ -134,7 +134,7 @@ static uint64_t *find_alive(struct commands *c, uint64_t sender)
  * Revert the outputs that @sender (0: anybody) set to fail-safe. Outputs without a timeout hold
  * their value, unless there is no @table.
  */
-static void revert_outputs(struct commands *c, const struct slave_table *table, uint64_t sender)
+static void revert_outputs(struct commands *c, const struct channel_table *table, uint64_t sender)
 {
 	struct board *board = c->board.board;
 
@@ -153,7 +153,7 @@ static void revert_outputs(struct commands *c, const struct slave_table *table, 
 	board_commit(board);
 }
 
-static void remove_commander(struct commands *c, const struct slave_table *table, uint64_t sender)
+static void remove_commander(struct commands *c, const struct channel_table *table, uint64_t sender)
 {
 	uint64_t *place = find_alive(c, sender);
 
@@ -174,7 +174,7 @@ static void add_commander(struct commands *c, uint64_t sender)
 	}
 }
 
-static void handle_liveliness(struct commands *c, const struct slave_table *table)
+static void handle_liveliness(struct commands *c, const struct channel_table *table)
 {
 	struct liveliness_change change[CHANGES_MAX];
 	size_t count;
@@ -344,7 +344,7 @@ int commands_step(struct commands *commands, const struct topics *topics,
 		  const struct gate_view *view)
 {
 	struct commands *c = commands;
-	uint64_t session = view->table == NULL ? 0 : view->table->meta->session;
+	uint64_t session = view->table == NULL ? 0 : view->table->meta.session;
 
 	handle_liveliness(c, view->table);
 	check_pending(c, topics, view->now_ns);

@@ -158,7 +158,7 @@ static int check_order(struct commander *c, const struct gate_command *cmd,
 	}
 	c->has_id = 1;
 	c->last_id = cmd->id;
-	if (cmd->session != 0 && cmd->session != view->table->meta->session) {
+	if (cmd->session != 0 && cmd->session != view->table->meta.session) {
 		return refuse(reason, -ESTALE, "meant for session %" PRIu64 ", not for this: stale",
 			      cmd->session);
 	}
@@ -171,10 +171,9 @@ static int check_order(struct commander *c, const struct gate_command *cmd,
 }
 
 static int check_item(const struct gate *gate, const struct gate_command *cmd, uint32_t i,
-		      const struct slave_table *table, struct gate_item *ret_item, char *reason)
+		      const struct channel_table *table, struct gate_item *ret_item, char *reason)
 {
-	int index =
-		image_channel_find(table->channels, table->meta->channel_count, cmd->channel[i]);
+	int index = image_channel_find(table->channels, table->meta.channel_count, cmd->channel[i]);
 	const struct channel *ch;
 	struct gate_item item;
 	int r;
@@ -260,11 +259,11 @@ int gate_check(struct gate *gate, const struct gate_command *cmd, const struct g
 	return r;
 }
 
-int gate_has_timeout(const struct slave_table *table, const struct config *cfg, unsigned output)
+int gate_has_timeout(const struct channel_table *table, const struct config *cfg, unsigned output)
 {
 	unsigned n = 0;
 
-	for (uint32_t i = 0; i < table->meta->channel_count; i++) {
+	for (uint32_t i = 0; i < table->meta.channel_count; i++) {
 		if (table->channels[i].direction == CHANNEL_OUTPUT && n++ == output) {
 			const struct config_output *rules =
 				config_output_find(cfg, table->channels[i].name);

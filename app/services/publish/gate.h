@@ -11,7 +11,7 @@
 
 #include "base/board.h"
 #include "config/config.h"
-#include "publish/slave_view.h"
+#include "reader/table.h"
 
 enum { GATE_COMMANDERS = 32, GATE_ITEMS = 64, GATE_NAME_BYTES = 64, GATE_REASON_BYTES = 200 };
 
@@ -31,7 +31,7 @@ struct gate_command {
 
 /* How the master is at this moment. */
 struct gate_view {
-	const struct slave_table *table; /* NULL: no master */
+	const struct channel_table *table; /* NULL: no master */
 	int is_op;
 	uint64_t cycle; /* newest */
 	int64_t now_ns; /* CLOCK_MONOTONIC */
@@ -68,7 +68,7 @@ void gate_remove(struct gate *gate, uint64_t sender);
  */
 void gate_note_set(struct gate *gate, unsigned output, uint64_t sender);
 uint64_t gate_setter(const struct gate *gate, unsigned output);
-int gate_has_timeout(const struct slave_table *table, const struct config *cfg, unsigned output);
+int gate_has_timeout(const struct channel_table *table, const struct config *cfg, unsigned output);
 
 /** Longest liveliness lease a commander may have: half the shortest time-out, 20 ms to 1 s. */
 int64_t gate_lease_ns(const struct config *cfg);

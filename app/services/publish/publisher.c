@@ -15,7 +15,6 @@
 #include "publish/commands.h"
 #include "publish/domain.h"
 #include "publish/events.h"
-#include "publish/mapped_time.h"
 #include "publish/own_status.h"
 #include "publish/samples.h"
 #include "publish/state.h"
@@ -32,19 +31,19 @@ struct publisher {
 	const struct config *cfg;
 	struct topics topics;
 	struct commands *commands;
-	struct events events;
-	struct events sync0_events; /* its alarms go to ecdaq/event, too */
-	struct sync0 sync0;
+	struct feed *events;
+	struct feed *sync0_events; /* its alarms go to ecdaq/event, too */
+	struct feed *sync0;
 	struct own_status own;
 	char ring_path[CONFIG_PATH_BYTES];
 	char status_path[CONFIG_PATH_BYTES];
 	struct status_page page_copy;
 	const struct status_page *page; /* page_copy; NULL: none */
 	int64_t page_read_ns;
-	struct ring_reader *ring; /* NULL: none */
-	struct samples *samples;  /* NULL: no master, or the ring is done with */
+	struct reader *reader;
+	int reader_error;        /* reported last */
+	struct samples *samples; /* NULL: no session */
 	struct samples_counts counts;
-	int had_ring;
 	int64_t looked_ns;
 	unsigned looks;
 	const char *time_quality; /* as it was told last; NULL: not yet */
@@ -58,18 +57,28 @@ static int64_t now_ns(void)
 	return now.tv_sec * NS_PER_S + now.tv_nsec;
 }
 
-static int find_paths(struct publisher *p)
+static int open_feed(const struct publisher *p, enum feed_kind kind, const char *name,
+		     struct feed **ret_feed)
+{
+	char path[CONFIG_PATH_BYTES];
+	int r = config_run_path(p->cfg, name, path, sizeof(path));
+
+	if (r < 0) {
+		return r;
+	}
+	/* What happened before we came is in the recording; of a later writer all is published. */
+	*ret_feed = feed_create(kind, path, FEED_AT_NEWEST);
+	return *ret_feed == NULL ? -ENOMEM : 0;
+}
+
+static int open_sources(struct publisher *p)
 {
 	int r = config_run_path(p->cfg, CONFIG_RUN_SAMPLES, p->ring_path, sizeof(p->ring_path));
 
-	r = r < 0 ? r
-		  : config_run_path(p->cfg, CONFIG_RUN_EVENTS, p->events.path,
-				    sizeof(p->events.path));
-	r = r < 0 ? r
-		  : config_run_path(p->cfg, CONFIG_RUN_SYNC0_EVENTS, p->sync0_events.path,
-				    sizeof(p->sync0_events.path));
-	r = r < 0 ? r
-		  : config_run_path(p->cfg, CONFIG_RUN_SYNC0, p->sync0.path, sizeof(p->sync0.path));
+	r = r < 0 ? r : reader_create(p->ring_path, READER_AT_NEWEST, &p->reader);
+	r = r < 0 ? r : open_feed(p, FEED_EVENTS, CONFIG_RUN_EVENTS, &p->events);
+	r = r < 0 ? r : open_feed(p, FEED_EVENTS, CONFIG_RUN_SYNC0_EVENTS, &p->sync0_events);
+	r = r < 0 ? r : open_feed(p, FEED_SYNC0, CONFIG_RUN_SYNC0, &p->sync0);
 	r = r < 0 ? r
 		  : config_run_path(p->cfg, CONFIG_RUN_DDS_STATUS, p->own.path,
 				    sizeof(p->own.path));
@@ -122,7 +131,7 @@ int publisher_create(const struct config *cfg, struct publisher **ret_publisher,
 	}
 	p->cfg = cfg;
 	p->looked_ns = INT64_MIN / 2;
-	r = find_paths(p);
+	r = open_sources(p);
 	if (r < 0) {
 		snprintf(error, error_bytes, "runtime.run_dir: %s", strerror(-r));
 	} else {
@@ -146,8 +155,8 @@ int publisher_create(const struct config *cfg, struct publisher **ret_publisher,
 static void tell_own(struct publisher *p)
 {
 	own_status_put(&p->own, p->cfg, &p->topics,
-		       p->samples == NULL ? 0 : samples_table(p->samples)->meta->session,
-		       &p->counts, commands_counts(p->commands));
+		       p->samples == NULL ? 0 : samples_table(p->samples)->meta.session, &p->counts,
+		       commands_counts(p->commands));
 }
 
 static void end_session(struct publisher *p)
@@ -155,7 +164,7 @@ static void end_session(struct publisher *p)
 	if (p->samples != NULL) {
 		tell_own(p);
 		fprintf(stderr, "ecdaq-dds: session %" PRIu64 " ended\n",
-			samples_table(p->samples)->meta->session);
+			samples_table(p->samples)->meta.session);
 		samples_destroy(p->samples);
 		p->samples = NULL;
 	}
@@ -170,51 +179,46 @@ void publisher_destroy(struct publisher *p)
 	own_status_close(&p->own);
 	topics_close(&p->topics); /* no listener is called from here on */
 	commands_destroy(p->commands);
-	events_close(&p->events);
-	events_close(&p->sync0_events);
-	sync0_close(&p->sync0);
-	ring_reader_destroy(p->ring);
+	feed_destroy(p->events);
+	feed_destroy(p->sync0_events);
+	feed_destroy(p->sync0);
+	reader_destroy(p->reader);
 	free(p);
 }
 
 static void begin_session(struct publisher *p)
 {
-	int r = ring_reader_open(p->ring_path, &p->ring);
+	int r = samples_create(p->reader, p->cfg, &p->topics, &p->counts, &p->samples);
 
-	if (r == 0) {
-		/* What was before our start is in the recording; of a new master we publish all. */
-		if (p->had_ring) {
-			ring_seek(p->ring, ring_oldest(p->ring));
-		}
-		p->had_ring = 1;
-		r = samples_create(p->ring, p->cfg, &p->topics, &p->counts, &p->samples);
+	r = r < 0 ? r : state_put_channels(&p->topics, p->cfg, samples_table(p->samples));
+	if (r < 0) {
+		fprintf(stderr, "ecdaq-dds: %s: %s\n", p->ring_path, strerror(-r));
+		reader_skip_session(p->reader);
+		return;
 	}
-	if (r == 0) {
-		r = state_put_channels(&p->topics, p->cfg, samples_table(p->samples));
+	fprintf(stderr, "ecdaq-dds: publishing session %" PRIu64 " in domain %u on %s\n",
+		samples_table(p->samples)->meta.session, p->cfg->dds_domain, p->cfg->dds_interface);
+}
+
+/* Report once why no session can be read. */
+static void report_error(struct publisher *p)
+{
+	int error = reader_error(p->reader);
+
+	if (error != p->reader_error && error < 0 && error != -ENOENT && error != -EPIPE) {
+		fprintf(stderr, "ecdaq-dds: %s: %s\n", p->ring_path, reader_error_to_str(error));
 	}
-	if (r == 0) {
-		fprintf(stderr, "ecdaq-dds: publishing session %" PRIu64 " in domain %u on %s\n",
-			samples_table(p->samples)->meta->session, p->cfg->dds_domain,
-			p->cfg->dds_interface);
-	} else if (r != -ENOENT) {
-		fprintf(stderr, "ecdaq-dds: %s: %s\n", p->ring_path,
-			r == -EPROTO ? "not a sample ring of this version" : strerror(-r));
-	}
+	p->reader_error = error;
 }
 
 static void follow_ring(struct publisher *p)
 {
-	if (p->ring != NULL && ring_cursor(p->ring) >= ring_newest(p->ring) &&
-	    (ring_is_replaced(p->ring) || ring_is_orphaned(p->ring))) {
-		end_session(p);
-	}
-	if (p->ring != NULL && p->samples == NULL && ring_is_replaced(p->ring)) {
-		ring_reader_destroy(p->ring);
-		p->ring = NULL;
-	}
-	if (p->ring == NULL) {
+	uint64_t lost;
+
+	if (p->samples == NULL && reader_next(p->reader, &lost) == READER_BEGUN) {
 		begin_session(p);
 	}
+	report_error(p);
 }
 
 static void tell_state(struct publisher *p)
@@ -238,9 +242,9 @@ static int look(struct publisher *p, int64_t now, char *error, size_t error_byte
 {
 	p->looked_ns = now;
 	follow_ring(p);
-	events_follow(&p->events);
-	events_follow(&p->sync0_events);
-	sync0_follow(&p->sync0);
+	(void)feed_open(p->events, NULL);
+	(void)feed_open(p->sync0_events, NULL);
+	(void)feed_open(p->sync0, NULL);
 	commands_follow(p->commands);
 	if (p->looks++ % LOOKS_A_STATUS == 0) {
 		tell_state(p);
@@ -250,22 +254,22 @@ static int look(struct publisher *p, int64_t now, char *error, size_t error_byte
 								   : 0;
 }
 
-static int is_op(const struct publisher *p, const struct slave_table *table)
+static int is_op(const struct publisher *p, const struct channel_table *table)
 {
-	return p->page != NULL && table != NULL && p->page->session == table->meta->session &&
+	return p->page != NULL && table != NULL && p->page->session == table->meta.session &&
 	       atomic_load_explicit(&p->page->bus_state, memory_order_relaxed) == BUS_OP;
 }
 
 /* Once, and again when it changes: what UTC in the samples is worth. */
 static void tell_time_quality(struct publisher *p, const struct timemap_state *map)
 {
-	const char *quality = mapped_time_quality(map);
+	const char *quality = utc_quality(map);
 
 	if (p->time_quality != NULL && strcmp(p->time_quality, quality) == 0) {
 		return;
 	}
 	p->time_quality = quality;
-	fprintf(stderr, "ecdaq-dds: time: %s: %s\n", quality, mapped_time_explain(map));
+	fprintf(stderr, "ecdaq-dds: time: %s: %s\n", quality, utc_explain(map));
 }
 
 static int publish(struct publisher *p)
@@ -277,8 +281,8 @@ static int publish(struct publisher *p)
 		return 0;
 	}
 	result = samples_step(p->samples, SAMPLES_A_STEP);
-	if (samples_timemap_news(p->samples, &map)) {
-		state_put_timemap(&p->topics, samples_table(p->samples)->meta->session, &map);
+	if (samples_utc_changed(p->samples, &map) != UTC_UNCHANGED) {
+		state_put_timemap(&p->topics, samples_table(p->samples)->meta.session, &map);
 		tell_time_quality(p, &map);
 	}
 	if (result == SAMPLES_ENDED) {
@@ -322,9 +326,9 @@ int publisher_step(struct publisher *publisher, char *error, size_t error_bytes)
 		view.is_op = is_op(p, view.table);
 	}
 	is_pending = commands_step(p->commands, &p->topics, &view);
-	events_step(&p->events, &p->topics, p->samples);
-	events_step(&p->sync0_events, &p->topics, p->samples);
-	sync0_step(&p->sync0, &p->topics, p->samples);
+	events_step(p->events, &p->topics, p->samples);
+	events_step(p->sync0_events, &p->topics, p->samples);
+	sync0_step(p->sync0, &p->topics, p->samples);
 	if (!has_more) {
 		wait_for_work(p, is_pending);
 	}

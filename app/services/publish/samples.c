@@ -8,7 +8,6 @@
 
 #include "ecdaq.h"
 #include "image/image.h"
-#include "publish/mapped_time.h"
 #include "ros2.h"
 
 /* One slave's messages; their sequences point to memory of ours. */
@@ -27,16 +26,18 @@ struct slave_out {
 	int64_t *sample_time_ns;
 	double *block_values;
 	uint64_t *block_raw;
+	const struct channel *adc_channel; /* NULL: the slave has no such input */
+	const struct channel *counter_channel;
+	const struct channel *sample_time_channel;
 };
 
 struct samples {
-	struct ring_reader *ring;
+	struct reader *reader;
+	const struct channel_table *table; /* the reader's */
 	const struct topics *topics;
 	struct samples_counts *counts;
-	struct slave_table table;
-	struct mapped_time *time;
+	struct utc *utc;
 	uint32_t block_cycles;
-	uint8_t *payload;
 	uint64_t cycle;
 	int64_t utc_ns;
 	struct slave_out *out;
@@ -51,10 +52,17 @@ struct samples {
 		(sequence)._release = false;                                                       \
 	} while (0)
 
-static int make_out(struct slave_out *out, const struct slave_view *view, uint32_t cycles,
-		    uint64_t session)
+static const struct channel *input(const struct channel_table *t, uint32_t slave, const char *entry)
 {
-	size_t n = view->count > 0 ? view->count : 1;
+	int i = channel_table_find_entry(t, slave, entry, CHANNEL_INPUT);
+
+	return i < 0 ? NULL : &t->channels[i];
+}
+
+static int make_out(struct slave_out *out, const struct channel_table *t, uint32_t slave,
+		    uint32_t cycles)
+{
+	size_t n = t->count[slave] > 0 ? t->count[slave] : 1;
 	size_t k = cycles > 0 ? cycles : 1;
 
 	out->values = calloc(n, sizeof(double));
@@ -75,13 +83,16 @@ static int make_out(struct slave_out *out, const struct slave_view *view, uint32
 	    out->sample_time_ns == NULL || out->block_values == NULL || out->block_raw == NULL) {
 		return -ENOMEM;
 	}
-	out->sample.slave = view->info->slave_pos;
-	out->sample.session = session;
-	SEQUENCE_SET(out->sample.values, out->values, view->count);
-	SEQUENCE_SET(out->sample.raw, out->raw, view->count);
-	out->block.slave = view->info->slave_pos;
-	out->block.session = session;
-	out->block.channel_count = view->count;
+	out->adc_channel = input(t, slave, "adc");
+	out->counter_channel = input(t, slave, "counter");
+	out->sample_time_channel = input(t, slave, "sample_time");
+	out->sample.slave = (uint16_t)slave;
+	out->sample.session = t->meta.session;
+	SEQUENCE_SET(out->sample.values, out->values, t->count[slave]);
+	SEQUENCE_SET(out->sample.raw, out->raw, t->count[slave]);
+	out->block.slave = (uint16_t)slave;
+	out->block.session = t->meta.session;
+	out->block.channel_count = t->count[slave];
 	return 0;
 }
 
@@ -103,16 +114,15 @@ static void free_out(struct slave_out *out)
 
 static int make_all(struct samples *s)
 {
-	const struct sample_meta *meta = s->table.meta;
+	uint32_t slaves = s->table->meta.slave_count;
 
-	s->time = mapped_time_create(meta);
-	s->payload = malloc(ring_payload_bytes(s->ring));
-	s->out = calloc(meta->slave_count > 0 ? meta->slave_count : 1, sizeof(*s->out));
-	if (s->time == NULL || s->payload == NULL || s->out == NULL) {
+	s->utc = utc_create(&s->table->meta);
+	s->out = calloc(slaves > 0 ? slaves : 1, sizeof(*s->out));
+	if (s->utc == NULL || s->out == NULL) {
 		return -ENOMEM;
 	}
-	for (uint32_t i = 0; i < meta->slave_count; i++) {
-		int r = make_out(&s->out[i], &s->table.view[i], s->block_cycles, meta->session);
+	for (uint32_t i = 0; i < slaves; i++) {
+		int r = make_out(&s->out[i], s->table, i, s->block_cycles);
 
 		if (r < 0) {
 			return r;
@@ -121,28 +131,21 @@ static int make_all(struct samples *s)
 	return 0;
 }
 
-int samples_create(struct ring_reader *ring, const struct config *cfg, const struct topics *topics,
+int samples_create(struct reader *reader, const struct config *cfg, const struct topics *topics,
 		   struct samples_counts *counts, struct samples **ret_samples)
 {
 	struct samples *s = calloc(1, sizeof(*s));
-	size_t meta_bytes;
-	const void *meta = ring_meta(ring, &meta_bytes);
 	int r;
 
 	if (s == NULL) {
 		return -ENOMEM;
 	}
-	s->ring = ring;
+	s->reader = reader;
+	s->table = reader_table(reader);
 	s->topics = topics;
 	s->counts = counts;
 	s->block_cycles = cfg->dds_block_cycles;
-	r = strcmp(ring_kind(ring), "sample") == 0 ? slave_table_read(&s->table, meta, meta_bytes)
-						   : -EPROTO;
-	if (r == 0 &&
-	    ring_payload_bytes(ring) < sizeof(struct sample_header) + s->table.meta->image_bytes) {
-		r = -EPROTO;
-	}
-	r = r < 0 ? r : make_all(s);
+	r = make_all(s);
 	if (r < 0) {
 		samples_destroy(s);
 		return r;
@@ -205,13 +208,12 @@ void samples_destroy(struct samples *s)
 	if (s == NULL) {
 		return;
 	}
-	for (uint32_t i = 0; s->out != NULL && i < s->table.meta->slave_count; i++) {
+	for (uint32_t i = 0; s->out != NULL && i < s->table->meta.slave_count; i++) {
 		flush_block(s, &s->out[i]);
 		free_out(&s->out[i]);
 	}
 	free(s->out);
-	mapped_time_destroy(s->time);
-	free(s->payload);
+	utc_destroy(s->utc);
 	free(s);
 }
 
@@ -241,11 +243,15 @@ static void add_to_block(struct samples *s, struct slave_out *out)
 	}
 }
 
-static void put_slave(struct samples *s, const struct sample_header *h, const uint8_t *image,
-		      uint32_t slave)
+static uint64_t raw_of(const struct channel *ch, const uint8_t *image)
 {
-	const struct slave_view *view = &s->table.view[slave];
-	const struct channel *channels = s->table.channels;
+	return ch == NULL ? 0 : image_get_raw(image, ch);
+}
+
+static void put_slave(struct samples *s, uint32_t slave)
+{
+	const struct sample_header *h = reader_header(s->reader);
+	const uint8_t *image = reader_image(s->reader);
 	struct slave_out *out = &s->out[slave];
 	ecdaq_SampleV1 *m = &out->sample;
 
@@ -253,18 +259,16 @@ static void put_slave(struct samples *s, const struct sample_header *h, const ui
 	m->dc_time_ns = h->dc_time_ns;
 	m->utc_ns = s->utc_ns;
 	m->flags = h->flags;
-	m->is_good = slave_is_good(h, view) != 0;
-	for (uint32_t i = 0; i < view->count; i++) {
-		const struct channel *ch = &channels[s->table.order[view->first + i]];
+	m->is_good = sample_is_good(h, (uint16_t)slave) != 0;
+	for (uint32_t i = 0; i < s->table->count[slave]; i++) {
+		const struct channel *ch = channel_table_at(s->table, slave, i);
 
 		out->raw[i] = image_get_raw(image, ch);
 		out->values[i] = image_raw_to_physical(ch, out->raw[i]);
 	}
-	m->adc = view->adc < 0 ? NAN : image_get_physical(image, &channels[view->adc]);
-	m->counter = view->counter < 0 ? 0 : image_get_raw(image, &channels[view->counter]);
-	m->sample_time_ns = view->sample_time < 0
-				    ? 0
-				    : (int64_t)image_get_raw(image, &channels[view->sample_time]);
+	m->adc = out->adc_channel == NULL ? NAN : image_get_physical(image, out->adc_channel);
+	m->counter = raw_of(out->counter_channel, image);
+	m->sample_time_ns = (int64_t)raw_of(out->sample_time_channel, image);
 	put(s, s->topics->sample, m);
 	if (s->topics->ros2_sample > 0) {
 		mirror(s, out);
@@ -274,15 +278,12 @@ static void put_slave(struct samples *s, const struct sample_header *h, const ui
 
 static void put_cycle(struct samples *s)
 {
-	struct sample_header h;
-
-	memcpy(&h, s->payload, sizeof(h));
 	/* Without memory for a new map the old one goes on for this sample. */
-	(void)mapped_time_feed(s->time, &h, &s->utc_ns);
-	for (uint32_t i = 0; i < s->table.meta->slave_count; i++) {
-		put_slave(s, &h, s->payload + sizeof(h), i);
+	(void)utc_feed(s->utc, reader_header(s->reader), &s->utc_ns);
+	for (uint32_t i = 0; i < s->table->meta.slave_count; i++) {
+		put_slave(s, i);
 	}
-	s->cycle = h.cycle;
+	s->cycle = reader_header(s->reader)->cycle;
 	s->counts->published++;
 }
 
@@ -290,28 +291,28 @@ enum samples_result samples_step(struct samples *s, unsigned most)
 {
 	uint64_t lost = 0;
 
-	for (unsigned n = 0; n < most;) {
-		switch (ring_read(s->ring, s->payload, ring_payload_bytes(s->ring), &lost)) {
-		case RING_OK:
-			n++;
+	for (unsigned n = 0; n < most; n++) {
+		switch (reader_next(s->reader, &lost)) {
+		case READER_SAMPLE:
 			put_cycle(s);
 			break;
-		case RING_LOST:
+		case READER_LOST:
 			s->counts->missed += lost;
 			break;
-		case RING_EMPTY:
+		case READER_EMPTY:
 			return SAMPLES_EMPTY;
-		case RING_CLOSED:
-		case RING_DAMAGED:
+		case READER_BEGUN:
+		case READER_WAITING:
+		case READER_ENDED:
 			return SAMPLES_ENDED;
 		}
 	}
 	return SAMPLES_MORE;
 }
 
-const struct slave_table *samples_table(const struct samples *s)
+const struct channel_table *samples_table(const struct samples *s)
 {
-	return &s->table;
+	return s->table;
 }
 
 uint64_t samples_cycle(const struct samples *s)
@@ -321,15 +322,15 @@ uint64_t samples_cycle(const struct samples *s)
 
 int64_t samples_utc_of_tai(const struct samples *s, int64_t tai_ns)
 {
-	return mapped_time_of_tai(s->time, tai_ns);
+	return utc_of_tai(s->utc, tai_ns);
 }
 
 void samples_note_tai_offset(struct samples *s, int32_t tai_offset_s)
 {
-	mapped_time_note_tai_offset(s->time, tai_offset_s);
+	utc_note_tai_offset(s->utc, tai_offset_s);
 }
 
-int samples_timemap_news(struct samples *s, struct timemap_state *ret)
+enum utc_change samples_utc_changed(struct samples *s, struct timemap_state *ret)
 {
-	return mapped_time_news(s->time, ret);
+	return utc_changed(s->utc, ret);
 }

@@ -6,11 +6,10 @@
 #ifndef PUBLISH_SAMPLES_H
 #define PUBLISH_SAMPLES_H
 
-#include "base/ring.h"
-#include "base/timemap.h"
 #include "config/config.h"
-#include "publish/slave_view.h"
 #include "publish/topics.h"
+#include "reader/reader.h"
+#include "reader/utc.h"
 
 struct samples;
 
@@ -22,8 +21,8 @@ struct samples_counts {
 	uint64_t failed;    /* messages that DDS did not take */
 };
 
-/** @ring, @cfg, @topics, @counts are kept by the caller. 0; -EPROTO not a sample ring; -ENOMEM. */
-int samples_create(struct ring_reader *ring, const struct config *cfg, const struct topics *topics,
+/** The session that @reader has begun. The caller keeps all of them. 0, or -ENOMEM. */
+int samples_create(struct reader *reader, const struct config *cfg, const struct topics *topics,
 		   struct samples_counts *counts, struct samples **ret_samples);
 /** What is in unfinished blocks is published first. */
 void samples_destroy(struct samples *samples);
@@ -31,12 +30,12 @@ void samples_destroy(struct samples *samples);
 /** Publish @most cycles at most. */
 enum samples_result samples_step(struct samples *samples, unsigned most);
 
-const struct slave_table *samples_table(const struct samples *samples);
+const struct channel_table *samples_table(const struct samples *samples);
 /** The newest cycle published; 0: none yet. */
 uint64_t samples_cycle(const struct samples *samples);
 int64_t samples_utc_of_tai(const struct samples *samples, int64_t tai_ns);
 void samples_note_tai_offset(struct samples *samples, int32_t tai_offset_s);
-/** 1 and the time map, when it is worth telling. */
-int samples_timemap_news(struct samples *samples, struct timemap_state *ret);
+/** The map to UTC, when it has changed enough to be published. */
+enum utc_change samples_utc_changed(struct samples *samples, struct timemap_state *ret);
 
 #endif

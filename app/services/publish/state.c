@@ -9,7 +9,7 @@
 #include "ecdaq.h"
 #include "image/image.h"
 #include "publish/domain.h"
-#include "publish/mapped_time.h"
+#include "reader/utc.h"
 
 enum { TYPE_BYTES = 16, TEXT_BYTES = 256 };
 
@@ -34,9 +34,9 @@ void state_put_idl(const struct topics *topics)
 		(sequence)._release = true;                                                        \
 	} while (0)
 
-static void put_slaves(ecdaq_ChannelsV1 *m, const struct slave_table *t)
+static void put_slaves(ecdaq_ChannelsV1 *m, const struct channel_table *t)
 {
-	uint32_t n = t->meta->slave_count;
+	uint32_t n = t->meta.slave_count;
 
 	SEQUENCE(m->slave_name, n);
 	SEQUENCE(m->slave_device, n);
@@ -72,9 +72,10 @@ static void put_channel(ecdaq_ChannelsV1 *m, uint32_t i, const struct channel *c
 	m->timeout_ns._buffer[i] = rules != NULL ? rules->timeout_ns : 0;
 }
 
-static void put_channels(ecdaq_ChannelsV1 *m, const struct slave_table *t, const struct config *cfg)
+static void put_channels(ecdaq_ChannelsV1 *m, const struct channel_table *t,
+			 const struct config *cfg)
 {
-	uint32_t n = t->meta->channel_count;
+	uint32_t n = t->meta.channel_count;
 	uint32_t place = 0;
 
 	SEQUENCE(m->name, n);
@@ -90,31 +91,23 @@ static void put_channels(ecdaq_ChannelsV1 *m, const struct slave_table *t, const
 	SEQUENCE(m->fail_safe, n);
 	SEQUENCE(m->timeout_ns, n);
 	/* Slave by slave, each slave's in the order of its samples' values. */
-	for (uint32_t s = 0; s < t->meta->slave_count; s++) {
-		for (uint32_t i = 0; i < t->view[s].count; i++) {
-			put_channel(m, place++, &t->channels[t->order[t->view[s].first + i]], cfg);
+	for (uint32_t s = 0; s < t->meta.slave_count; s++) {
+		for (uint32_t i = 0; i < t->count[s]; i++) {
+			put_channel(m, place++, channel_table_at(t, s, i), cfg);
 		}
 	}
 }
 
 int state_put_channels(const struct topics *topics, const struct config *cfg,
-		       const struct slave_table *table)
+		       const struct channel_table *table)
 {
 	ecdaq_ChannelsV1 *m = ecdaq_ChannelsV1__alloc();
-	uint32_t placed = 0;
 
 	if (m == NULL) {
 		return -ENOMEM;
 	}
-	for (uint32_t s = 0; s < table->meta->slave_count; s++) {
-		placed += table->view[s].count;
-	}
-	if (placed != table->meta->channel_count) {
-		ecdaq_ChannelsV1_free(m, DDS_FREE_ALL);
-		return -EPROTO;
-	}
-	m->session = table->meta->session;
-	m->period_ns = table->meta->period_ns;
+	m->session = table->meta.session;
+	m->period_ns = table->meta.period_ns;
 	m->command_lease_ns = gate_lease_ns(cfg);
 	m->are_commands_on = domain_takes_commands(cfg);
 	put_slaves(m, table);
@@ -162,7 +155,7 @@ void state_put_status(const struct topics *topics, const struct state_view *view
 	char message[TEXT_BYTES] = "";
 	char version[sizeof(page->version)] = ECDAQ_VERSION;
 	ecdaq_StatusV1 m = {
-		.session = view->table == NULL ? 0 : view->table->meta->session,
+		.session = view->table == NULL ? 0 : view->table->meta.session,
 		.state = state,
 		.message = message,
 		.version = version,
@@ -201,6 +194,6 @@ void state_put_timemap(const struct topics *topics, uint64_t session,
 		.quality = quality,
 	};
 
-	snprintf(quality, sizeof(quality), "%s", mapped_time_quality(map));
+	snprintf(quality, sizeof(quality), "%s", utc_quality(map));
 	(void)topics_write(topics->timemap, &m, map->utc_ns);
 }

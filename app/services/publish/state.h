@@ -11,12 +11,12 @@
 #include "config/config.h"
 #include "publish/commands.h"
 #include "publish/samples.h"
-#include "publish/slave_view.h"
 #include "publish/topics.h"
+#include "reader/table.h"
 
 struct state_view {
-	const struct status_page *page;  /* NULL: none */
-	const struct slave_table *table; /* NULL: no master runs */
+	const struct status_page *page;    /* NULL: none */
+	const struct channel_table *table; /* NULL: no master runs */
 	struct samples_counts samples;
 	struct commands_counts commands;
 };
@@ -24,7 +24,7 @@ struct state_view {
 void state_put_idl(const struct topics *topics);
 /** 0 or -ENOMEM. */
 int state_put_channels(const struct topics *topics, const struct config *cfg,
-		       const struct slave_table *table);
+		       const struct channel_table *table);
 void state_put_status(const struct topics *topics, const struct state_view *view);
 void state_put_timemap(const struct topics *topics, uint64_t session,
 		       const struct timemap_state *map);

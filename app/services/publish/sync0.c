@@ -11,25 +11,6 @@
 
 enum { RESULTS_A_STEP = 64, TEXT_BYTES = 32 };
 
-void sync0_follow(struct sync0 *sync0)
-{
-	if (sync0->ring != NULL && ring_is_replaced(sync0->ring)) {
-		sync0_close(sync0);
-	}
-	if (sync0->ring != NULL || ring_reader_open(sync0->path, &sync0->ring) < 0) {
-		return;
-	}
-	if (strcmp(ring_kind(sync0->ring), "sync0") != 0 ||
-	    ring_payload_bytes(sync0->ring) != sizeof(struct sync0_result)) {
-		sync0_close(sync0);
-		return;
-	}
-	if (sync0->was_open) {
-		ring_seek(sync0->ring, ring_oldest(sync0->ring));
-	}
-	sync0->was_open = 1;
-}
-
 static void put(const struct topics *topics, const struct samples *samples,
 		const struct sync0_result *r)
 {
@@ -75,25 +56,15 @@ static void put(const struct topics *topics, const struct samples *samples,
 	(void)topics_write(topics->sync0, &m, m.utc_ns);
 }
 
-void sync0_step(struct sync0 *sync0, const struct topics *topics, const struct samples *samples)
+void sync0_step(struct feed *feed, const struct topics *topics, const struct samples *samples)
 {
 	struct sync0_result result;
-	uint64_t lost;
+	uint64_t lost = 0;
 
-	for (unsigned n = 0; sync0->ring != NULL && n < RESULTS_A_STEP; n++) {
-		enum ring_result got = ring_read(sync0->ring, &result, sizeof(result), &lost);
-
-		if (got != RING_OK && got != RING_LOST) {
-			return;
-		}
-		if (got == RING_OK) {
+	for (unsigned n = 0;
+	     n < RESULTS_A_STEP && feed_read(feed, &result, sizeof(result), NULL, &lost); n++) {
+		if (topics->sync0 > 0) {
 			put(topics, samples, &result);
 		}
 	}
-}
-
-void sync0_close(struct sync0 *sync0)
-{
-	ring_reader_destroy(sync0->ring);
-	sync0->ring = NULL;
 }

@@ -8,6 +8,7 @@
 
 #include "base/limits.h"
 #include "image/image.h"
+#include "reader/table.h"
 #include "record/cdr.h"
 #include "record/messages.h"
 #include "record/names.h"
@@ -294,14 +295,12 @@ static uint64_t field_value(const struct channel *ch, const uint8_t *image)
 size_t layout_encode(const struct layout_topic *topic, const struct sample_header *header,
 		     const uint8_t *image, uint8_t *buf, size_t buf_len)
 {
-	unsigned pos = topic->slave->slave_pos;
-	int is_bad = pos < 64 && (header->slaves_bad >> pos & 1) != 0;
 	struct cdr c = cdr_begin(buf, buf_len);
 
 	cdr_put(&c, header->cycle, 8);
 	cdr_put(&c, (uint64_t)header->dc_time_ns, 8);
 	cdr_put(&c, header->flags, 4);
-	cdr_put(&c, !is_bad, 1);
+	cdr_put(&c, sample_is_good(header, topic->slave->slave_pos) != 0, 1);
 	for (size_t i = 0; i < topic->field_count; i++) {
 		const struct layout_field *f = &topic->field[i];
 

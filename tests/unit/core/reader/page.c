@@ -6,7 +6,7 @@
 #include <unistd.h>
 
 #include "harness/test.h"
-#include "unit/core/reader/made_ring.h"
+#include "harness/made_ring.h"
 
 static struct status_page copy;
 

@@ -9,7 +9,7 @@
 
 #include "harness/test.h"
 #include "image/image.h"
-#include "unit/core/reader/made_ring.h"
+#include "harness/made_ring.h"
 
 struct bench {
 	char path[128];

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "harness/test.h"
-#include "unit/core/reader/made_ring.h"
+#include "harness/made_ring.h"
 
 TEST(channel_table, channels_are_grouped_by_slave_and_found_by_entry)
 {

@@ -14,7 +14,7 @@ enum { SLAVES = 1, CHANNELS = 3, SESSION = 77, NOW_CYCLE = 1000 };
 /* One slave: an input, a BOOL output of the remote owner, an INT16 output of the remote owner. */
 struct scene {
 	struct config cfg;
-	struct slave_table table;
+	struct channel_table *table;
 	struct gate *gate;
 	struct gate_view view;
 	struct gate_item item[GATE_ITEMS];
@@ -57,6 +57,7 @@ static struct scene *scene(void)
 	static struct scene s;
 
 	gate_destroy(s.gate);
+	channel_table_destroy(s.table);
 	memset(&s, 0, sizeof(s));
 	config_defaults(&s.cfg);
 	s.cfg.dds_allow_insecure_commands = 1;
@@ -69,9 +70,9 @@ static struct scene *scene(void)
 	s.cfg.output[1] = (struct config_output){
 		.channel = "s.volt", .owner = CONFIG_OWNER_REMOTE, .min = -5, .max = 5
 	};
-	CHECK_EQ(slave_table_read(&s.table, &ring_meta_area, sizeof(ring_meta_area)), 0);
+	CHECK_EQ(channel_table_create(&ring_meta_area, sizeof(ring_meta_area), &s.table), 0);
 	s.gate = gate_create(&s.cfg);
-	s.view = (struct gate_view){ .table = &s.table, .is_op = 1, .cycle = NOW_CYCLE };
+	s.view = (struct gate_view){ .table = s.table, .is_op = 1, .cycle = NOW_CYCLE };
 	return &s;
 }
 
@@ -222,7 +223,7 @@ TEST(publish_gate, nothing_passes_without_leave_without_a_master_or_out_of_op)
 	s->view.is_op = 1;
 	s->view.table = NULL;
 	CHECK_EQ(ask(s, 1, 2, "s.led", 1), -EAGAIN);
-	s->view.table = &s->table;
+	s->view.table = s->table;
 	s->cfg.dds_allow_insecure_commands = 0;
 	CHECK_EQ(ask(s, 1, 3, "s.led", 1), -EPERM);
 }
@@ -236,7 +237,7 @@ TEST(publish_gate, lease_is_half_the_shortest_time_out_within_bounds)
 	CHECK_EQ(gate_lease_ns(&s->cfg), 20 * NS_PER_MS);
 	s->cfg.output[0].timeout_ns = 0;
 	CHECK_EQ(gate_lease_ns(&s->cfg), NS_PER_S);
-	CHECK_EQ(gate_has_timeout(&s->table, &s->cfg, 0), 0);
+	CHECK_EQ(gate_has_timeout(s->table, &s->cfg, 0), 0);
 }
 
 TEST(publish_gate, lease_is_half_the_shortest_timeout_of_all_outputs)

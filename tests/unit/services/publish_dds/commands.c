@@ -55,7 +55,7 @@ static struct {
 struct bench {
 	char dir[64];
 	struct config cfg;
-	struct slave_table table;
+	struct channel_table *table;
 	struct gate_view view;
 	struct topics topics;
 	struct commands *commands;
@@ -125,8 +125,8 @@ static void bench_open(struct bench *b)
 	b->cfg.output[1] = (struct config_output){
 		.channel = "s.valve", .owner = CONFIG_OWNER_REMOTE, .min = 0, .max = 100
 	};
-	CHECK_EQ(slave_table_read(&b->table, &ring_meta, sizeof(ring_meta)), 0);
-	b->view = (struct gate_view){ .table = &b->table, .is_op = 1, .cycle = 1000 };
+	CHECK_EQ(channel_table_create(&ring_meta, sizeof(ring_meta), &b->table), 0);
+	b->view = (struct gate_view){ .table = b->table, .is_op = 1, .cycle = 1000 };
 	b->topics = fake_topics(on_write);
 	CHECK_EQ(commands_create(&b->cfg, &b->commands), 0);
 	give_board(b);
@@ -140,6 +140,7 @@ static void bench_close(struct bench *b)
 	char path[128];
 
 	commands_destroy(b->commands);
+	channel_table_destroy(b->table);
 	fake_topics(NULL);
 	board_unmap(b->board);
 	close(b->board_fd);
@@ -358,10 +359,9 @@ TEST(publish_commands, a_new_session_of_the_master_has_no_outputs_set)
 	bench_open(&b);
 	set_output(&b, ALICE, "s.led");
 	beat = b.board->beat;
-	ring_meta.meta.session++;
+	b.table->meta.session++;
 	step(&b);
 	CHECK_EQ(b.board->beat, beat);
-	ring_meta.meta.session--;
 	bench_close(&b);
 }
 

@@ -190,6 +190,27 @@ TEST(layout, a_bad_sample_is_said_in_the_message_of_its_slave_only)
 	layout_destroy(l);
 }
 
+/* bus.datagrams: per_slave with slave 2 lost: the flag is that of the cycle, not of each slave. */
+TEST(layout, a_low_working_counter_does_not_make_the_other_slaves_samples_bad)
+{
+	struct meta m;
+	struct layout *l;
+	size_t count;
+	const struct layout_topic *t;
+	struct sample_header header = { .flags = SAMPLE_WKC_LOW, .slaves_bad = 1u << 2 };
+	uint8_t image[IMAGE_BYTES] = { 0 };
+	uint8_t buf[256];
+
+	fill(&m);
+	CHECK_EQ(create(&m, &l), 0);
+	t = layout_topics(l, &count);
+	layout_encode(&t[0], &header, image, buf, sizeof(buf));
+	CHECK_EQ(buf[4 + 20], 1);
+	layout_encode(&t[1], &header, image, buf, sizeof(buf));
+	CHECK_EQ(buf[4 + 20], 0);
+	layout_destroy(l);
+}
+
 TEST(layout, a_meta_area_that_does_not_hold_together_is_refused)
 {
 	struct meta m;

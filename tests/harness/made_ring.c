@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "unit/core/reader/made_ring.h"
+#include "harness/made_ring.h"
 
 #include <fcntl.h>
 #include <stdio.h>

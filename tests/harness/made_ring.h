@@ -3,8 +3,8 @@
  * Sample rings of two slaves, made for tests, and ways to damage them. Slave 0 ("a") has an adc and
  * a counter, slave 1 ("b") an adc and an output "led".
  */
-#ifndef TESTS_UNIT_CORE_READER_MADE_RING_H
-#define TESTS_UNIT_CORE_READER_MADE_RING_H
+#ifndef HARNESS_MADE_RING_H
+#define HARNESS_MADE_RING_H
 
 #include <stddef.h>
 #include <stdint.h>
