@@ -98,6 +98,39 @@ def test_a_bare_machine_skips_and_never_crashes(tmp_path: Path) -> None:
     assert found["fail"] == 0 and result.returncode == OK
 
 
+# check, what is absent or off, a part of the reason
+SKIPPED: list[tuple[str, Files, str]] = [
+    ("kernel", {"/proc/sys/kernel/osrelease": None}, "osrelease: not found"),
+    ("isolation", {f"{CPU}/online": None}, "online: not found"),
+    ("rt_throttling", {"/proc/sys/kernel/sched_rt_runtime_us": "much\n"}, "unexpected content"),
+    ("timer_migration", {"/proc/sys/kernel/timer_migration": None}, "not found"),
+    ("smt", {f"{CORE}/topology/thread_siblings_list": None}, "not found"),
+    ("idle_states", {f"{CORE}/cpuidle/state0/latency": "low\n"}, "cpuidle: unexpected content"),
+    ("core_users", {"/proc/1": None}, "/proc/1: permission denied"),
+    ("memory_lock", {"/proc/self/limits": None}, "limits: not found"),
+    ("nic_users", {NET: None}, "ecat0: no such port"),
+    ("eee", {"/calls/eee.ecat0": None}, "eee enabled: not found"),
+    ("coalescing", {"/calls/coalesce.ecat0": "rx_us 1\n"}, "coalescing: unexpected content"),
+    ("nic_irqs", {"/proc/interrupts": ""}, "no interrupt of ecat0"),
+    ("irq_threads", {"/proc/90": None}, "no interrupt thread of ecat0"),
+    ("other_irqs", {"/proc/interrupts": None}, "/proc/interrupts: not found"),
+    ("ntp", {"/calls/clock": None}, "clock error_us: not found"),
+    ("tai", {"/calls/clock": "synchronised 1\nerror_us 1\n"}, "unexpected content"),
+    ("disk", {"/calls/disk": None}, "/var/lib/ecdaq: not found"),
+    ("inodes", {"ecdaq.yaml": "record:\n  enable: off\n"}, "record.enable"),
+    ("power", {"/proc/device-tree/model": None}, "not a Raspberry Pi"),
+]
+
+
+@pytest.mark.parametrize(("name", "other", "reason"), SKIPPED)
+def test_a_check_that_cannot_be_made_is_skipped_with_its_reason(
+    machine: Machine, name: str, other: Files, reason: str
+) -> None:
+    machine.change(other)
+    check = checks(machine)[name]
+    assert check["level"] == "SKIP" and reason in check["value"], check
+
+
 @pytest.mark.parametrize("garbage", ["", "\0\0\0", "-\n", "99999999999999999999999\n", "x" * 5000])
 def test_garbage_in_every_file_never_crashes(machine: Machine, garbage: str) -> None:
     for name, content in GOOD.items():

@@ -328,6 +328,13 @@ def test_top_ends_when_ecdaqd_ends(daemon: Fake) -> None:
     assert rest.splitlines()[-1].startswith("STOPPED")
 
 
+def test_a_summary_marks_no_program_as_not_running(daemon: Fake) -> None:
+    daemon.end()
+    assert "recorder" in works(daemon("status", "--summary"))
+    assert "not running" not in works(daemon("status", "--summary"))
+    assert "not running" in works(daemon("status"))
+
+
 def test_everything_is_read_and_mapped_read_only(daemon: Fake) -> None:
     process = daemon.start("watch", "piccolo0.adc", stdout=subprocess.DEVNULL)
     proc = Path(f"/proc/{process.pid}")

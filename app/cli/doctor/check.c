@@ -107,7 +107,7 @@ int target_has(const struct target *t, unsigned needs, struct finding *f)
 
 /* --- rules --- */
 
-/* What {@word} stands for; "?" for a file that cannot be read. */
+/* The value of {@word}; "?" for a file that cannot be read. */
 static const char *word_value(const struct target *t, const char *word, const char *row,
 			      char buf[PROBE_TEXT_BYTES])
 {

@@ -34,7 +34,7 @@ struct doctor {
 	unsigned count[FINDING_LEVELS];
 };
 
-/* An ecdaqd that runs; one that has ended is none. One of here has no part in another machine. */
+/* A running ecdaqd. One of this machine does not count for a copy of another machine. */
 static enum exit_code find_daemon(struct doctor *d)
 {
 	struct target *t = &d->target;
@@ -60,7 +60,7 @@ static enum exit_code find_daemon(struct doctor *d)
 	return EXIT_CODE_OK;
 }
 
-/* What --config names, else that of ecdaqd itself. */
+/* The file of --config, else the configuration of ecdaqd. */
 static enum exit_code load_config(struct doctor *d)
 {
 	const char *path = d->cli->config;
@@ -78,7 +78,7 @@ static enum exit_code load_config(struct doctor *d)
 	return EXIT_CODE_OK;
 }
 
-static void keep_cycle(void *ctx, const struct thread *thread)
+static void find_cycle(void *ctx, const struct thread *thread)
 {
 	struct target *t = ctx;
 
@@ -87,7 +87,7 @@ static void keep_cycle(void *ctx, const struct thread *thread)
 	}
 }
 
-/* Does ecdaqd see other ports than this program (`build.sh run` gives it a network of its own)? */
+/* Is ecdaqd in another network namespace (`build.sh run`) and sees other ports? */
 static int has_own_network(const struct doctor *d)
 {
 	char its[PROBE_TEXT_BYTES];
@@ -123,7 +123,7 @@ static void prepare(struct doctor *d)
 		adopt(d, t->page);
 	}
 	if (t->pid != 0) {
-		thread_each(&t->probe, t->pid, keep_cycle, t);
+		thread_each(&t->probe, t->pid, find_cycle, t);
 		t->is_nic_elsewhere = d->nic == NULL && has_own_network(d);
 	}
 	t->nic = d->nic != NULL ? d->nic : d->cfg.interface;
@@ -217,7 +217,7 @@ static void write_json(const struct doctor *d)
 	json_end_line(&js);
 }
 
-/* The names of the checks that make the exit code, in one line. */
+/* One line with the names of the checks that decide the exit code. */
 static enum exit_code verdict(const struct doctor *d)
 {
 	enum finding_level least = d->is_strict ? FINDING_WARN : FINDING_FAIL;

@@ -84,7 +84,7 @@ int irq_cores(const struct probe *p, int number, char ret_list[PROBE_TEXT_BYTES]
 {
 	int r = probe_text(p, ret_list, "/proc/irq/%d/effective_affinity_list", number);
 
-	/* Empty for one that each core has of its own (its timer), or that nobody uses. */
+	/* Empty for a per-core interrupt (timer) and for one that is not in use. */
 	if (r == 0) {
 		ret_list[0] = '\0';
 	} else if (r < 0) {
@@ -124,7 +124,7 @@ static int find(const struct target *t, struct irqs *irqs)
 		irqs->nic_count += irqs->is_nic[i];
 		is_idle &= !irqs->is_nic[i] || irq->count == 0;
 	}
-	/* Some fire on changes of the link only: once frames have come, they do not count. */
+	/* Some fire on link changes only: if others have fired, they do not count. */
 	for (int i = 0; i < irqs->count && !is_idle; i++) {
 		if (irqs->is_nic[i] && irqs->all[i].count == 0) {
 			irqs->is_nic[i] = 0;
@@ -144,7 +144,7 @@ static struct irqs *nic_irqs(const struct target *t, struct finding *f)
 		finding_set(f, FINDING_SKIP, "%s is a virtual port", t->nic);
 		return NULL;
 	}
-	irqs = malloc(sizeof(*irqs));
+	irqs = calloc(1, sizeof(*irqs));
 	r = irqs == NULL ? -ENOMEM : find(t, irqs);
 	if (r < 0) {
 		finding_unread(f, "/proc/interrupts", r);
@@ -210,7 +210,7 @@ static int priority_of(const struct thread *thread)
 }
 
 /* irq/45-ecat0 handles an interrupt, napi/ecat0-8 takes the frames where that is threaded, too. */
-static void look_at_handler(void *ctx, const struct thread *thread)
+static void add_handler(void *ctx, const struct thread *thread)
 {
 	struct handlers *handlers = ctx;
 	char head[32];
@@ -267,7 +267,7 @@ static void judge_irq_threads(const struct target *t, struct finding *f)
 	if (irqs == NULL) {
 		return;
 	}
-	if (thread_each(&t->probe, 0, look_at_handler, &handlers) < 0 || handlers.count == 0) {
+	if (thread_each(&t->probe, 0, add_handler, &handlers) < 0 || handlers.count == 0) {
 		finding_set(f, FINDING_SKIP, "no interrupt thread of %s found", t->nic);
 	} else {
 		judge_handlers(&handlers, f);
@@ -282,7 +282,7 @@ static int foreign(const struct target *t, const struct irqs *irqs, const struct
 	int count = 0;
 
 	for (int i = 0; i < irqs->count; i++) {
-		/* What never fired since boot will not do so now. */
+		/* One that never fired since boot is not in use. */
 		if (irqs->is_nic[i] || irqs->all[i].count == 0 ||
 		    irq_cores(&t->probe, irqs->all[i].number, cores) < 0 ||
 		    !cpu_list_has(cores, t->cpu)) {
@@ -301,7 +301,7 @@ static void judge_other_irqs(const struct target *t, struct finding *f)
 	struct irqs *irqs;
 	int r;
 
-	irqs = malloc(sizeof(*irqs));
+	irqs = calloc(1, sizeof(*irqs));
 	r = irqs == NULL ? -ENOMEM : find(t, irqs);
 	if (r < 0) {
 		finding_unread(f, "/proc/interrupts", r);

@@ -18,7 +18,7 @@
 	"latencies measured here say nothing about hardware" REMEDY "measure on the target "       \
 	"hardware"
 
-/* Waking from a state that takes less than this is no cause of a late cycle. */
+/* A shorter exit latency does not make a cycle late. */
 #define IDLE_TOLERABLE_US 10
 
 enum { CMDLINE_BYTES = 4096, CPUINFO_LINES = 64, IDLE_STATES_MAX = 16 };
@@ -32,7 +32,7 @@ static int is_container(const struct target *t)
 	       probe_exists(&t->probe, "/run/.containerenv");
 }
 
-/* The x86 way: a hypervisor shows itself in the flags of the core. */
+/* On x86 a hypervisor sets a CPU flag. */
 static int has_hypervisor_flag(const struct target *t)
 {
 	FILE *file = probe_open(&t->probe, "/proc/cpuinfo");
@@ -51,7 +51,7 @@ static int has_hypervisor_flag(const struct target *t)
 	return found;
 }
 
-/* The maker in the firmware's tables, or the device tree's first word. NULL: a real machine. */
+/* By vendor in the DMI tables or by device tree. NULL: a real machine. */
 static const char *hypervisor(const struct target *t)
 {
 	static const char *const makers[] = { "QEMU",       "VMware",    "innotek",
@@ -272,7 +272,7 @@ static void judge_idle_states(const struct target *t, struct finding *f)
 	struct idle idle;
 	int r;
 
-	/* Without an ecdaqd today's limit is not the one of a running cycle. */
+	/* Without ecdaqd the present limit is not that of a running cycle. */
 	if (read_limit(t, &limit_us) < 0 || (t->pid == 0 && daemon_us < limit_us)) {
 		limit_us = daemon_us;
 		when = t->pid == 0 && daemon_us < INT32_MAX ? ", while ecdaqd runs" : "";

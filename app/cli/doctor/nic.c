@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The EtherCAT port: link, sleep, waiting, and who else uses it. */
+/* The EtherCAT port: link, other users, energy-efficient Ethernet, interrupt coalescing. */
 #include <errno.h>
 #include <inttypes.h>
 #include <stdlib.h>
@@ -18,7 +18,7 @@ int target_is_nic_virtual(const struct target *t)
 {
 	char device[PROBE_TEXT_BYTES];
 
-	/* In a copy the link may point at nothing. */
+	/* In a copy the link may be dangling. */
 	return probe_link(&t->probe, device, NET_DIR "/%s/device", t->nic) < 0 &&
 	       !probe_exists(&t->probe, NET_DIR "/%s/device", t->nic);
 }
@@ -137,7 +137,7 @@ static void judge_coalescing(const struct target *t, struct finding *f)
 	}
 }
 
-/* Packet sockets on the port, or on all, that want something else than EtherCAT. */
+/* Packet sockets on the port, or on all ports, for other protocols than EtherCAT. */
 static unsigned listeners(const struct target *t, int64_t index)
 {
 	FILE *file = probe_open(&t->probe, "/proc/net/packet");

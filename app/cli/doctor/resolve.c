@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Where the appliance's boot leaves what its ecdaqd is started with. */
+/* Files in which the appliance's boot leaves the options of ecdaqd. */
 #define APPLIANCE_CONFIG "/run/ecdaq-boot/ecdaq.yaml"
 #define APPLIANCE_ENVIRONMENT "/run/ecdaq-boot/environment"
 #define APPLIANCE_OPTIONS "ECDAQ_OPTIONS="
@@ -78,7 +78,7 @@ struct search {
 	int64_t pid;
 };
 
-static void look_at_process(void *ctx, const char *name)
+static void match_process(void *ctx, const char *name)
 {
 	struct search *search = ctx;
 	char comm[PROBE_TEXT_BYTES];
@@ -94,7 +94,7 @@ int64_t resolve_find_daemon(const struct probe *p)
 {
 	struct search search = { .probe = p };
 
-	probe_each(p, "/proc", look_at_process, &search);
+	probe_each(p, "/proc", match_process, &search);
 	return search.pid;
 }
 
@@ -110,7 +110,7 @@ static size_t read_all(FILE *file, char text[RESOLVE_TEXT_BYTES])
 	return len;
 }
 
-/* The words that ecdaqd was started with, or would be. 0 if unknown. */
+/* The command line of ecdaqd, or that of its next start. 0 if unknown. */
 static int find_words(const struct probe *p, int64_t pid, char text[RESOLVE_TEXT_BYTES],
 		      struct resolve_words *words)
 {
@@ -133,7 +133,7 @@ static int find_words(const struct probe *p, int64_t pid, char text[RESOLVE_TEXT
 	return 1;
 }
 
-/* Where the file of a command line is, for us. */
+/* The path of a command line's file as seen from here. */
 static int config_path(const struct probe *p, int64_t pid, const char *config,
 		       char path[PROBE_PATH_BYTES])
 {

@@ -14,7 +14,7 @@
 
 enum { RESOLVE_TEXT_BYTES = 16384, RESOLVE_SETS = 256 };
 
-/* What of a command line of ecdaqd makes its configuration; strings point into the text. */
+/* The options of ecdaqd that make its configuration; strings point into the text. */
 struct resolve_words {
 	const char *config; /* NULL: none */
 	const char *interface;
@@ -22,7 +22,7 @@ struct resolve_words {
 	size_t set_count;
 };
 
-/** Cut @text at each @separator and find the options; what is unknown is passed over. */
+/** Cut @text at each @separator and find the options; unknown words are ignored. */
 void resolve_parse(char *text, size_t text_len, char separator, struct resolve_words *ret);
 
 /** The process ecdaqd; 0: none is seen. */

@@ -19,7 +19,7 @@ enum {
 
 /* --- watchdog --- */
 
-struct dog {
+struct watchdog {
 	const struct target *t;
 	int count;
 	int is_active;
@@ -27,12 +27,12 @@ struct dog {
 	char name[PROBE_TEXT_BYTES];
 };
 
-/* Keeps the best one: one that is fed before one that sleeps. */
-static void look_at_dog(void *ctx, const char *entry)
+/* Keep the best one: an active one if there is any. */
+static void choose_watchdog(void *ctx, const char *entry)
 {
-	struct dog *best = ctx;
+	struct watchdog *best = ctx;
 	const struct probe *p = &best->t->probe;
-	struct dog dog = { .t = best->t, .count = best->count + 1 };
+	struct watchdog dog = { .t = best->t, .count = best->count + 1 };
 	char state[PROBE_TEXT_BYTES] = "";
 
 	snprintf(dog.name, sizeof(dog.name), "%.60s", entry);
@@ -49,9 +49,9 @@ static void look_at_dog(void *ctx, const char *entry)
 
 static void judge_watchdog(const struct target *t, struct finding *f)
 {
-	struct dog dog = { .t = t };
+	struct watchdog dog = { .t = t };
 
-	probe_each(&t->probe, "/sys/class/watchdog", look_at_dog, &dog);
+	probe_each(&t->probe, "/sys/class/watchdog", choose_watchdog, &dog);
 	if (dog.count == 0) {
 		finding_set(f, FINDING_WARN,
 			    "none: a hung machine is not reset" REMEDY
@@ -152,7 +152,7 @@ struct volt {
 	int r;
 };
 
-static void look_at_hwmon(void *ctx, const char *entry)
+static void read_hwmon(void *ctx, const char *entry)
 {
 	struct volt *volt = ctx;
 	char name[PROBE_TEXT_BYTES];
@@ -164,7 +164,7 @@ static void look_at_hwmon(void *ctx, const char *entry)
 	}
 }
 
-/* The firmware's own flags, by mailbox or sysfs (Raspberry Pi's kernels); else mainline's alarm. */
+/* The firmware's flags, by mailbox or sysfs (Raspberry Pi kernels); else mainline's alarm. */
 static void judge_power(const struct target *t, struct finding *f)
 {
 	struct volt volt = { .t = t, .r = -ENOENT };
@@ -188,7 +188,7 @@ static void judge_power(const struct target *t, struct finding *f)
 		judge_throttled(strtoll(text, NULL, 16), f);
 		return;
 	}
-	probe_each(&t->probe, "/sys/class/hwmon", look_at_hwmon, &volt);
+	probe_each(&t->probe, "/sys/class/hwmon", read_hwmon, &volt);
 	if (volt.r < 0) {
 		finding_unread(f, "the firmware's flags", r == -EACCES ? r : volt.r);
 	} else if (volt.alarm != 0) {

@@ -23,7 +23,7 @@ int thread_parse_stat(const char *line, struct thread *ret)
 {
 	struct thread thread = { .pid = 0 };
 	const char *open = strchr(line, '(');
-	const char *close = strrchr(line, ')'); /* a name may hold brackets itself */
+	const char *close = strrchr(line, ')'); /* a name may contain brackets */
 	size_t len;
 	char *end;
 
@@ -116,7 +116,7 @@ static void walk_thread(void *ctx, const char *name)
 	const struct walk *walk = ctx;
 	struct thread thread;
 
-	/* One that has ended meanwhile is none. */
+	/* Ignore one that has ended meanwhile. */
 	if (isdigit((unsigned char)name[0]) &&
 	    thread_read(walk->probe, walk->pid, strtoll(name, NULL, 10), &thread) == 0) {
 		walk->each(walk->ctx, &thread);
@@ -223,14 +223,14 @@ struct users {
 	struct thread rival; /* not below the cycle in priority */
 };
 
-static void look_at_user(void *ctx, const struct thread *thread)
+static void add_user(void *ctx, const struct thread *thread)
 {
 	struct users *users = ctx;
 	const struct target *t = users->t;
 	size_t used = strlen(users->names);
 	int is_realtime = thread->policy == THREAD_FIFO || thread->policy == THREAD_RR;
 
-	/* The kernel's threads of a core belong to it; this program is gone in a moment. */
+	/* Not the kernel's own threads, and not this short-lived program. */
 	if (thread->is_kernel || thread->tid == t->cycle.tid ||
 	    (t->probe.root[0] == '\0' && thread->pid == getpid()) ||
 	    !cpu_list_has(thread->cores, t->cpu)) {
@@ -254,10 +254,10 @@ static void judge_core_users(const struct target *t, struct finding *f)
 	char policy[32];
 	int r;
 
-	/* With hidepid= the processes of others are not seen at all. */
+	/* With hidepid= the processes of other users are invisible. */
 	r = thread_read(&t->probe, 1, 1, &init);
 	if (r == 0) {
-		r = thread_each(&t->probe, 0, look_at_user, &users);
+		r = thread_each(&t->probe, 0, add_user, &users);
 	}
 	if (r < 0) {
 		finding_unread(f, "/proc/1", r == -ENOENT ? -EACCES : r);
