@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 #include "config/config.h"
-#include "sync0/stat.h"
+#include "sync0/statistics.h"
 
 enum { LINE_BYTES = 256 };
 
@@ -21,7 +21,7 @@ static int64_t median_step(const int64_t *at_ns, size_t count, int64_t *scratch)
 	for (size_t i = 1; i < count; i++) {
 		scratch[i - 1] = at_ns[i] - at_ns[i - 1];
 	}
-	return stat_median(scratch, count - 1);
+	return statistics_median(scratch, count - 1);
 }
 
 /* Second minus first, of the pulses that both have. */
@@ -69,22 +69,23 @@ static void spread(const int64_t *at_ns, size_t count, int64_t period_ns, int64_
 		squares += off * off;
 		scratch[i] = llabs(llround(off));
 	}
-	stat_sort(scratch, n);
+	statistics_sort(scratch, n);
 	noise->sd_ns = llround(fmax((double)noise->sd_ns, sqrt(squares / (double)(n - 1))));
-	noise->p99_ns =
-		llround(fmax((double)noise->p99_ns, (double)stat_percentile(scratch, n, 990000)));
+	noise->p99_ns = llround(
+		fmax((double)noise->p99_ns, (double)statistics_percentile(scratch, n, 990000)));
 	noise->max_ns = llround(fmax((double)noise->max_ns, (double)scratch[n - 1]));
 }
 
 static void bias(int64_t *off_ns, size_t count, struct judge_noise *noise)
 {
-	noise->bias_ns = stat_median(off_ns, count);
+	noise->bias_ns = statistics_median(off_ns, count);
 	for (size_t i = 0; i < count; i++) {
 		off_ns[i] = llabs(off_ns[i] - noise->bias_ns);
 	}
-	noise->bias_error_ns = llround(4 * 1.2533 * 1.4826 * (double)stat_median(off_ns, count) /
-				       sqrt((double)count)) +
-			       1;
+	noise->bias_error_ns =
+		llround(4 * 1.2533 * 1.4826 * (double)statistics_median(off_ns, count) /
+			sqrt((double)count)) +
+		1;
 }
 
 int calibration_compute(int64_t *first_ns, size_t first_count, int64_t *second_ns,

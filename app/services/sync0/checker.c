@@ -44,7 +44,7 @@ int checker_create(const struct checker_spec *spec, struct checker **ret_checker
 	ck->window_cycles = (uint32_t)(spec->window_ns / spec->period_ns);
 	ck->open_windows = open_windows(spec);
 	ck->grid = grid_create(spec->period_ns);
-	r = ck->grid == NULL ? -ENOMEM : figures_room_create(ck->window_cycles, &ck->room);
+	r = ck->grid == NULL ? -ENOMEM : measure_scratch_create(ck->window_cycles, &ck->scratch);
 	for (int i = 0; r == 0 && i < ck->open_windows; i++) {
 		r = window_create(ck->window_cycles, spec->line_count, &ck->window[i]);
 	}
@@ -64,7 +64,7 @@ void checker_destroy(struct checker *ck)
 	for (int i = 0; i < OPEN_WINDOWS; i++) {
 		window_destroy(ck->window[i]);
 	}
-	figures_room_destroy(&ck->room);
+	measure_scratch_destroy(&ck->scratch);
 	grid_destroy(ck->grid);
 	free(ck);
 }
@@ -111,7 +111,7 @@ struct window *checker_window(struct checker *ck, int64_t cycle)
 		return NULL;
 	}
 	number = (cycle - ck->base) / ck->window_cycles;
-	/* So far ahead that nothing can be known of what lies between: only the newest matter. */
+	/* Too far ahead to judge the cycles in between: only the newest count. */
 	if (number - ck->window_number > ck->open_windows + FAR_WINDOWS) {
 		checker_close_window(ck);
 		checker_close_window(ck);
@@ -124,11 +124,11 @@ struct window *checker_window(struct checker *ck, int64_t cycle)
 	return ck->window[number % ck->open_windows];
 }
 
-/* Nothing that is counted in the open windows can be held against anyone. */
+/* Discard what the open windows have counted. */
 static void disturb(struct checker *ck, int64_t cycle, int64_t step_ns)
 {
 	for (size_t i = 0; i < ck->spec.line_count; i++) {
-		track_reset(&ck->line[i].track);
+		tracker_reset(&ck->line[i].track);
 		ck->line[i].has_last = 0;
 		ck->line[i].last_cycle = cycle;
 	}
@@ -299,7 +299,7 @@ static int is_whole(const struct checker *ck)
 
 void checker_finish(struct checker *ck)
 {
-	struct track_out out;
+	struct tracker_out out;
 	int64_t newest_ns;
 
 	if (!grid_is_ready(ck->grid) || !ck->has_base) {
@@ -311,7 +311,7 @@ void checker_finish(struct checker *ck)
 			checker_look_at_shots(ck, i, newest_ns - FINISH_NS);
 			continue;
 		}
-		track_finish(&ck->line[i].track, ck->grid, &out);
+		tracker_finish(&ck->line[i].track, ck->grid, &out);
 		checker_take(ck, i, &out);
 	}
 	for (int n = 0; n < ck->open_windows && is_whole(ck); n++) {

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The check itself: edges and the master's cycles in, results and events out. It reads no clock
- * and no file, so what it says of a stream of edges can be tested against what the stream holds.
- * One checker is one session of the master. Context: any; not RT-safe (it sorts whole windows).
+ * and no file, so its results for a stream of edges can be tested against the contents of the
+ * stream. One checker is one session of the master. Context: any; not RT-safe (it sorts whole
+ * windows).
  */
 #ifndef SYNC0_CHECKER_H
 #define SYNC0_CHECKER_H
@@ -24,20 +25,20 @@ enum checker_grid {
 enum checker_mode {
 	CHECKER_PERIODIC = 0,
 	CHECKER_ONESHOT,
-	CHECKER_OFF, /* it cannot be heard: nothing is said of it */
+	CHECKER_OFF, /* no edges can be received: no results */
 };
 
 struct checker_line {
 	uint16_t slave_pos;
 	enum checker_mode mode;
-	int64_t shift_ns; /* asked of its SYNC0 */
+	int64_t shift_ns; /* configured shift of its SYNC0 */
 };
 
 struct checker_spec {
 	int64_t period_ns;
 	int64_t window_ns;
 	int64_t lost_ns;  /* without an edge for so long: SYNC0 lost */
-	int64_t since_ns; /* edges before this were not listened to; CLOCK_MONOTONIC */
+	int64_t since_ns; /* edges before this were not received; CLOCK_MONOTONIC */
 	enum checker_grid grid;
 	enum sync0_source source;
 	uint64_t session;
@@ -60,7 +61,7 @@ struct checker;
 int checker_create(const struct checker_spec *spec, struct checker **ret_checker);
 void checker_destroy(struct checker *ck);
 
-/* What the master says of one cycle. */
+/* The master's data of one cycle. */
 struct checker_cycle {
 	int64_t cycle;
 	int64_t due_dc_ns;        /* of its SYNC0 */

@@ -1,28 +1,28 @@
 /* SPDX-License-Identifier: MIT */
-/* What is said of a window when it is full, and of shots when they are due. */
+/* Results of a window when it is complete, and of shots when they are due. */
 #include <stdlib.h>
 
 #include "sync0/checker_internal.h"
 
-enum { MISSING_TOLD = 16, ALIKE_SHARE = 16 };
+enum { MISSING_REPORTED = 16, ALIKE_SHARE = 16 };
 
 static void emit_from_window(void *ctx, const struct event *ev)
 {
 	checker_emit(ctx, ev);
 }
 
-/* A run of missing edges that is told as "lost" is not told a second time. */
+/* A run of missing edges that is reported as "lost" is not reported again. */
 static int is_told(const struct line *ln, int64_t first, int64_t end)
 {
 	return first < ln->lost_to && end > ln->lost_from && ln->lost_to > ln->lost_from;
 }
 
-static void tell_missing(struct checker *ck, const struct window *w, size_t number)
+static void report_missing(struct checker *ck, const struct window *w, size_t number)
 {
 	const uint8_t *mark = w->line[number].mark;
-	int told = 0;
+	int reported = 0;
 
-	for (uint32_t i = 0; i < w->cycles && told < MISSING_TOLD; i++) {
+	for (uint32_t i = 0; i < w->cycles && reported < MISSING_REPORTED; i++) {
 		uint32_t end = i;
 		struct event ev;
 
@@ -36,18 +36,18 @@ static void tell_missing(struct checker *ck, const struct window *w, size_t numb
 			ev = checker_event(ck, number, EVENT_SYNC0_MISSING, w->first_cycle + i);
 			ev.arg[0] = (int32_t)(end - i);
 			checker_emit(ck, &ev);
-			told++;
+			reported++;
 		}
 		i = end;
 	}
 }
 
-static void tell_counts(struct checker *ck, const struct window *w, size_t number)
+static void report_counts(struct checker *ck, const struct window *w, size_t number)
 {
 	const struct window_line *wl = &w->line[number];
 	struct event ev;
 
-	tell_missing(ck, w, number);
+	report_missing(ck, w, number);
 	if (wl->extra > 0) {
 		ev = checker_event(ck, number, EVENT_SYNC0_EXTRA, wl->first_extra);
 		ev.arg[0] = alarm_clamp((double)wl->extra);
@@ -60,7 +60,7 @@ static void tell_counts(struct checker *ck, const struct window *w, size_t numbe
 	}
 }
 
-static void tell_overflow(struct checker *ck, const struct window *w, size_t number)
+static void report_overflow(struct checker *ck, const struct window *w, size_t number)
 {
 	struct event ev = checker_event(ck, number, EVENT_SYNC0_OVERFLOW, w->first_cycle);
 
@@ -128,7 +128,7 @@ static void close_line(struct checker *ck, const struct window *w, size_t number
 {
 	int64_t end_dc_ns = grid_due_dc_ns(ck->grid, w->first_cycle + (int64_t)w->cycles);
 	struct sync0_result r = begin_result(ck, number, grid_mono_ns(ck->grid, end_dc_ns));
-	const struct figures_spec spec = {
+	const struct measure_spec spec = {
 		.period_ns = ck->spec.period_ns,
 		.origin_dc_ns = ck->origin_dc_ns,
 		.shift_ns = ck->spec.line[number].shift_ns,
@@ -136,12 +136,12 @@ static void close_line(struct checker *ck, const struct window *w, size_t number
 	};
 
 	r.kind = SYNC0_WINDOW;
-	figures_compute(w, number, &spec, &ck->spec.noise, &ck->room, &r);
+	measure_window(w, number, &spec, &ck->spec.noise, &ck->scratch, &r);
 	judge(&ck->spec.limits, &ck->spec.noise, spec.shift_ns, &r);
 	if (!r.is_disturbed) {
-		tell_counts(ck, w, number);
+		report_counts(ck, w, number);
 	}
-	tell_overflow(ck, w, number);
+	report_overflow(ck, w, number);
 	ck->alarms += (uint64_t)alarm_window(&ck->line[number].alarm, &r, &ck->spec.limits,
 					     emit_from_window, ck);
 	if (ck->spec.result != NULL) {
@@ -175,7 +175,7 @@ static int64_t shot_bound_ns(const struct checker *ck, const struct sync0_result
 	return r->is_resolved & SYNC0_HAS_PHASE || late_ns < bound_ns ? bound_ns : late_ns;
 }
 
-static void tell_shot(struct checker *ck, size_t number, const struct shot_verdict *v)
+static void report_shot(struct checker *ck, size_t number, const struct shot_verdict *v)
 {
 	struct sync0_result r = begin_result(ck, number, v->mono_ns);
 	struct event ev;
@@ -184,7 +184,7 @@ static void tell_shot(struct checker *ck, size_t number, const struct shot_verdi
 	r.kind = SYNC0_SHOT;
 	r.first_cycle = (uint64_t)grid_cycle(ck->grid, v->mono_ns, 0, &late_ns);
 	r.cycles = 1;
-	r.has_come = v->news == SHOT_CAME;
+	r.has_come = v->outcome == SHOT_CAME;
 	r.edges = r.has_come;
 	r.missing = 1 - r.edges;
 	r.shot_dc_ns = v->due_dc_ns;
@@ -202,7 +202,7 @@ static void tell_shot(struct checker *ck, size_t number, const struct shot_verdi
 	}
 }
 
-static void tell_extra_shot(struct checker *ck, size_t number, int64_t mono_ns)
+static void report_extra_shot(struct checker *ck, size_t number, int64_t mono_ns)
 {
 	int64_t late_ns;
 	struct event ev = checker_event(ck, number, EVENT_SYNC0_EXTRA,
@@ -218,20 +218,20 @@ void checker_look_at_shots(struct checker *ck, size_t line, int64_t until_ns)
 	for (;;) {
 		struct shot_verdict v = shot_next(&ck->line[line].shot, ck->grid, until_ns);
 
-		switch (v.news) {
+		switch (v.outcome) {
 		case SHOT_NONE:
 			return;
 		case SHOT_LOST:
 			if (v.mono_ns < ck->spec.since_ns) {
-				break; /* nobody listened */
+				break; /* edges were not received */
 			}
-			tell_shot(ck, line, &v);
+			report_shot(ck, line, &v);
 			break;
 		case SHOT_CAME:
-			tell_shot(ck, line, &v);
+			report_shot(ck, line, &v);
 			break;
 		case SHOT_EXTRA:
-			tell_extra_shot(ck, line, v.mono_ns);
+			report_extra_shot(ck, line, v.mono_ns);
 			break;
 		}
 	}

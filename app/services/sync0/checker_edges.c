@@ -10,10 +10,10 @@ enum {
 /* Without a master, the first line's edges are the cycles. */
 static void cycle_by_edge(struct checker *ck, const struct edge *edge)
 {
-	struct self_cycle self;
+	struct edge_cycle self;
 	int64_t step_ns;
 
-	if (!self_grid_edge(&ck->self, ck->spec.period_ns, edge, &self)) {
+	if (!edge_grid_take(&ck->self, ck->spec.period_ns, edge, &self)) {
 		return;
 	}
 	if (!ck->has_origin) {
@@ -30,7 +30,7 @@ static void cycle_by_edge(struct checker *ck, const struct edge *edge)
 	}
 }
 
-static void tell_back(struct checker *ck, size_t number, int64_t cycle)
+static void report_back(struct checker *ck, size_t number, int64_t cycle)
 {
 	struct line *ln = &ck->line[number];
 	struct event ev;
@@ -68,7 +68,7 @@ static void mark_overflow(struct checker *ck, size_t number, int64_t cycle)
 	ln->dropped = 0;
 }
 
-static void take_cycle(struct checker *ck, size_t number, const struct track_item *item)
+static void take_cycle(struct checker *ck, size_t number, const struct tracker_item *item)
 {
 	struct line *ln = &ck->line[number];
 	struct window *w = checker_window(ck, item->cycle);
@@ -86,14 +86,14 @@ static void take_cycle(struct checker *ck, size_t number, const struct track_ite
 	ln->has_last = 1;
 	ln->last_cycle = item->cycle;
 	ln->last_mono_ns = item->mono_ns;
-	tell_back(ck, number, item->cycle);
+	report_back(ck, number, item->cycle);
 }
 
-static void take_item(struct checker *ck, size_t number, const struct track_item *item)
+static void take_item(struct checker *ck, size_t number, const struct tracker_item *item)
 {
 	struct window *w;
 
-	if (item->kind == TRACK_CYCLE) {
+	if (item->kind == TRACKER_CYCLE) {
 		take_cycle(ck, number, item);
 		return;
 	}
@@ -105,7 +105,7 @@ static void take_item(struct checker *ck, size_t number, const struct track_item
 	}
 }
 
-static void note_step(struct checker *ck, size_t number, const struct track_out *out)
+static void note_step(struct checker *ck, size_t number, const struct tracker_out *out)
 {
 	struct window *w = out->step_ns != 0 ? checker_window(ck, out->step_cycle) : NULL;
 
@@ -115,7 +115,7 @@ static void note_step(struct checker *ck, size_t number, const struct track_out 
 	}
 }
 
-void checker_take(struct checker *ck, size_t number, const struct track_out *out)
+void checker_take(struct checker *ck, size_t number, const struct tracker_out *out)
 {
 	for (int i = 0; i < out->count; i++) {
 		take_item(ck, number, &out->item[i]);
@@ -142,7 +142,7 @@ static void note_seqno(struct checker *ck, const struct edge *edge)
 
 void checker_edge(struct checker *ck, const struct edge *edge)
 {
-	struct track_out out;
+	struct tracker_out out;
 
 	if (edge->line >= ck->spec.line_count || ck->spec.line[edge->line].mode == CHECKER_OFF) {
 		return;
@@ -158,7 +158,7 @@ void checker_edge(struct checker *ck, const struct edge *edge)
 		return;
 	}
 	note_seqno(ck, edge);
-	track_edge(&ck->line[edge->line].track, ck->grid, edge, &out);
+	tracker_edge(&ck->line[edge->line].track, ck->grid, edge, &out);
 	checker_take(ck, edge->line, &out);
 }
 

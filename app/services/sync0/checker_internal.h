@@ -1,21 +1,21 @@
 /* SPDX-License-Identifier: MIT */
-/* Between the files of the checker; not for others. */
+/* Private to the files checker*.c. */
 #ifndef SYNC0_CHECKER_INTERNAL_H
 #define SYNC0_CHECKER_INTERNAL_H
 
 #include "sync0/alarm.h"
 #include "sync0/checker.h"
-#include "sync0/figures.h"
+#include "sync0/edge_grid.h"
 #include "sync0/grid.h"
-#include "sync0/self_grid.h"
+#include "sync0/measure.h"
 #include "sync0/shot.h"
-#include "sync0/track.h"
+#include "sync0/tracker.h"
 #include "sync0/window.h"
 
 enum { OPEN_WINDOWS = 32 };
 
 struct line {
-	struct track track;
+	struct tracker track;
 	struct alarm_line alarm;
 	struct shot_line shot;
 	uint32_t last_seqno;
@@ -32,8 +32,8 @@ struct line {
 struct checker {
 	struct checker_spec spec;
 	struct grid *grid;
-	struct self_grid self;
-	struct figures_room room;
+	struct edge_grid self;
+	struct measure_scratch scratch;
 	struct window *window[OPEN_WINDOWS]; /* the oldest open one is number % open_windows */
 	int open_windows;
 	int64_t window_number;
@@ -58,15 +58,15 @@ void checker_begin_at(struct checker *ck, int64_t cycle);
 /** The host's clock went ahead of DC time by @step_ns in about @cycle. */
 void checker_clock_stepped(struct checker *ck, int64_t cycle, int64_t step_ns);
 /** Take what has become clear of @line. */
-void checker_take(struct checker *ck, size_t number, const struct track_out *out);
+void checker_take(struct checker *ck, size_t number, const struct tracker_out *out);
 /** The open window that holds @cycle, closing older ones if it must; NULL if it is not judged. */
 struct window *checker_window(struct checker *ck, int64_t cycle);
-/** Compute, judge and tell the oldest open window, and open the next. */
+/** Measure, judge and report the oldest open window, and open the next. */
 void checker_close_window(struct checker *ck);
 void checker_emit(struct checker *ck, const struct event *ev);
 /** An event of @line in @cycle, its time filled in. */
 struct event checker_event(const struct checker *ck, size_t line, enum event_id id, int64_t cycle);
-/** What can be said of the shots of @line. */
+/** Report the shots of @line that can be judged. */
 void checker_look_at_shots(struct checker *ck, size_t line, int64_t until_ns);
 
 #endif

@@ -4,7 +4,7 @@
  *
  *   SLAVE MONO_NS [DC_NS [SEQNO]]    as ecdaq-sim --edges writes them, and ecdaq-sync0 --dump
  *   c CYCLE DUE_DC_NS FRAME_DC_NS FRAME_MONO_NS LATENCY_NS DC_DIFF_NS JUDGED
- *                                    what the master said of a cycle (--dump)
+ *                                    the master's data of a cycle (--dump)
  *   s SLAVE AT_DC_NS DUE_DC_NS       the time of its one-shot was set (--dump); checker_shot()
  *   # comment
  *
@@ -41,8 +41,8 @@ struct edge_file;
 enum edge_file_from { EDGE_FILE_START, EDGE_FILE_END };
 
 /**
- * Open @path, at its start or behind the last whole line. 0 or -errno; -ESPIPE: from its start, and
- * it is no regular file. Free with edge_file_close().
+ * Open @path, at its start or after the last complete line. 0 or -errno; -ESPIPE: from its start,
+ * and it is no regular file. Free with edge_file_close().
  */
 int edge_file_open(const char *path, enum edge_file_from from, struct edge_file **ret_file);
 void edge_file_close(struct edge_file *ef);
@@ -50,7 +50,7 @@ void edge_file_close(struct edge_file *ef);
 int edge_file_next(struct edge_file *ef, struct edge_item *ret);
 /** Number of the line that was read last, from 1. */
 uint64_t edge_file_line(const struct edge_file *ef);
-/** 1 if another file has taken its place, or it was cut short: open it anew. */
+/** 1 if another file has taken its place, or it was truncated: open it again. */
 int edge_file_is_replaced(const struct edge_file *ef);
 
 #endif

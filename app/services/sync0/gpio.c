@@ -145,7 +145,7 @@ static int explain_missing(const struct gpio_spec *spec, const struct place *pla
 	unsigned offset;
 
 	if (place->found > 1) {
-		snprintf(why, GPIO_WHY_BYTES, "the name stands for more than one line");
+		snprintf(why, GPIO_WHY_BYTES, "the name matches more than one line");
 		return -ENOTUNIQ;
 	}
 	if (place->denied > 0) {

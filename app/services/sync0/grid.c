@@ -49,7 +49,7 @@ void grid_set_origin(struct grid *grid, int64_t dc_ns)
 	grid->origin_dc_ns = dc_ns;
 }
 
-/* The pairs say that a clock stepped: the spread between them is small beside their distance. */
+/* The pairs show that a clock stepped: the spread between them is small beside their distance. */
 static int is_step(const struct grid *grid, int64_t *ret_step_ns)
 {
 	int64_t low = grid->off_ns[0];
@@ -82,10 +82,10 @@ static int looks_stepped(struct grid *grid, int64_t off_ns, int64_t latency_ns)
 	return grid->off_count == STEP_PAIRS;
 }
 
-enum grid_news grid_pair(struct grid *grid, int64_t dc_ns, int64_t mono_ns, int64_t latency_ns,
-			 int64_t *ret_step_ns)
+enum grid_change grid_pair(struct grid *grid, int64_t dc_ns, int64_t mono_ns, int64_t latency_ns,
+			   int64_t *ret_step_ns)
 {
-	enum grid_news news = GRID_QUIET;
+	enum grid_change change = GRID_QUIET;
 	int64_t step_ns;
 
 	if (timemap_is_ready(grid->map) &&
@@ -98,11 +98,11 @@ enum grid_news grid_pair(struct grid *grid, int64_t dc_ns, int64_t mono_ns, int6
 			grid->map = map;
 			grid->off_count = 0;
 			*ret_step_ns = step_ns;
-			news = GRID_STEPPED;
+			change = GRID_STEPPED;
 		}
 	}
 	timemap_feed(grid->map, dc_ns, mono_ns, latency_ns);
-	return news;
+	return change;
 }
 
 int grid_is_ready(const struct grid *grid)

@@ -2,7 +2,7 @@
 /*
  * The grid of cycles on the host's clock: base/timemap.h, fed with CLOCK_MONOTONIC beside DC time,
  * says when the SYNC0 edge of a cycle is due and which cycle an instant belongs to. A clock that
- * stepped (the host's or the reference's) starts the map anew and is reported. Context: blocking.
+ * stepped (the host's or the reference's) restarts the map and is reported. Context: blocking.
  */
 #ifndef SYNC0_GRID_H
 #define SYNC0_GRID_H
@@ -18,15 +18,15 @@ void grid_destroy(struct grid *grid);
 /** The SYNC0 of cycle 0 was at DC time @dc_ns. */
 void grid_set_origin(struct grid *grid, int64_t dc_ns);
 
-enum grid_news { GRID_QUIET, GRID_STEPPED };
+enum grid_change { GRID_QUIET, GRID_STEPPED };
 
 /**
  * At DC time @dc_ns the host's clock showed @mono_ns, give or take @latency_ns. GRID_STEPPED: so
- * do all of the last few pairs, and the map said something else; *ret_step_ns is by how much the
+ * do all of the last few pairs, and the map differs from them; *ret_step_ns is by how much the
  * host's clock is ahead of it now.
  */
-enum grid_news grid_pair(struct grid *grid, int64_t dc_ns, int64_t mono_ns, int64_t latency_ns,
-			 int64_t *ret_step_ns);
+enum grid_change grid_pair(struct grid *grid, int64_t dc_ns, int64_t mono_ns, int64_t latency_ns,
+			   int64_t *ret_step_ns);
 
 /** 1 as soon as one pair was given. */
 int grid_is_ready(const struct grid *grid);

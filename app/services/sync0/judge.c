@@ -52,7 +52,7 @@ static enum sync0_verdict judge_period(const struct judge_limits *limits,
 	return v;
 }
 
-/* Where the pulse is: the way from the pin to the time stamp has to be known. */
+/* Phase of the pulse: requires the calibrated delay from the pin to the timestamp. */
 static enum sync0_verdict grade_place(const struct judge_noise *noise, int64_t off_ns,
 				      int64_t error_ns, int64_t limit_ns)
 {
@@ -110,7 +110,7 @@ static enum sync0_verdict judge_skew(const struct judge_limits *limits,
 	return v;
 }
 
-/* Which figures stand above what the measurement adds of its own. */
+/* Which figures exceed the noise of the measurement itself. */
 static uint32_t resolved(const struct judge_noise *noise, int64_t shift_ns,
 			 const struct sync0_result *r)
 {

@@ -9,7 +9,7 @@
 #include "program/command_line.h"
 #include "program/error.h"
 #include "program/stop.h"
-#include "sync0/listen.h"
+#include "sync0/calibrate_live.h"
 #include "sync0/replay.h"
 #include "sync0/watch.h"
 
@@ -99,7 +99,7 @@ static enum exit_code run_replay(const struct arguments *a, const struct config 
 static enum exit_code run_calibration(const struct config *cfg, const char *dev_dir)
 {
 	char why[ERROR_BYTES] = "";
-	int r = listen_calibrate(cfg, dev_dir, stop_flag(), stdout, why);
+	int r = calibrate_live(cfg, dev_dir, stop_flag(), stdout, why);
 
 	if (r < 0) {
 		error_print(program, "%s", why);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The sample ring of ecdaqd, as the checker wants it: cycles, frames and commanded shots. */
+/* The sample ring of ecdaqd, as input of the checker: cycles, frames and commanded shots. */
 #ifndef SYNC0_MASTER_H
 #define SYNC0_MASTER_H
 

@@ -27,7 +27,7 @@ struct output {
 	char events_path[CONFIG_PATH_BYTES];
 	char page_path[CONFIG_PATH_BYTES];
 	char lock_path[CONFIG_PATH_BYTES];
-	char said[256];
+	char last_text[256];
 };
 
 struct output *output_create(const struct config *cfg, enum sync0_source source)
@@ -61,7 +61,7 @@ struct output *output_create(const struct config *cfg, enum sync0_source source)
 	return out;
 }
 
-/* What is said from here on goes to the page of our own. */
+/* From here on the private page is written. */
 static void close_all(struct output *out)
 {
 	ring_destroy(out->results);
@@ -193,12 +193,12 @@ struct sync0_status *output_page(struct output *out)
 	return out->page;
 }
 
-void output_say(struct output *out, const char *text)
+void output_message(struct output *out, const char *text)
 {
-	if (strncmp(out->said, text, sizeof(out->said) - 1) == 0) {
+	if (strncmp(out->last_text, text, sizeof(out->last_text) - 1) == 0) {
 		return;
 	}
-	snprintf(out->said, sizeof(out->said), "%s", text);
+	snprintf(out->last_text, sizeof(out->last_text), "%s", text);
 	status_text_set(&out->page->text_sequence, out->page->message, sizeof(out->page->message),
 			text);
 	if (text[0] != '\0') {

@@ -12,14 +12,14 @@
 
 struct output;
 
-/** NULL with errno. Nothing is in the run directory yet. Free with output_destroy(). */
+/** NULL with errno. Nothing is created in the run directory yet. Free with output_destroy(). */
 struct output *output_create(const struct config *cfg, enum sync0_source source);
 void output_destroy(struct output *out);
 
 enum { OUTPUT_WHY_BYTES = 256 };
 
 /**
- * Make rings and page if they are not there, or their directory was made anew. 0, or -errno with
+ * Create rings and page if they do not exist or their directory was replaced. 0, or -errno with
  * one line in @why (OUTPUT_WHY_BYTES): -ENOENT: the run directory is not there yet; -EBUSY: another
  * process has them.
  */
@@ -27,8 +27,8 @@ int output_open(struct output *out, char *why);
 
 /** The page, to be filled; never NULL (one of its own until output_open() has succeeded). */
 struct sync0_status *output_page(struct output *out);
-/** Say @text on the page, and on standard error if it is not what was said last. */
-void output_say(struct output *out, const char *text);
+/** Write @text to the page, and to standard error if it differs from the last text. */
+void output_message(struct output *out, const char *text);
 
 void output_result(struct output *out, const struct sync0_result *result);
 void output_event(struct output *out, const struct event *event);

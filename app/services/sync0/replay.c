@@ -225,7 +225,7 @@ int replay(const struct replay_spec *spec, enum replay_outcome *ret_outcome, cha
 struct collected {
 	int64_t *at_ns[2];
 	size_t count[2];
-	size_t room;
+	size_t capacity;
 	uint16_t slave[2];
 	unsigned lines;
 	int is_backwards; /* a time before that of the edge before */
@@ -246,7 +246,7 @@ static void collect(void *ctx, const struct edge_item *item)
 		c->slave[n] = item->edge.line;
 		c->lines = n + 1;
 	}
-	if (n < 2 && c->count[n] < c->room) {
+	if (n < 2 && c->count[n] < c->capacity) {
 		c->is_backwards |=
 			c->count[n] > 0 && item->edge.mono_ns < c->at_ns[n][c->count[n] - 1];
 		c->at_ns[n][c->count[n]++] = item->edge.mono_ns;
@@ -258,17 +258,17 @@ int replay_calibrate(const char *path, const char *save_to, FILE *out, char *why
 	struct contents contents = { .cycles = 0 };
 	struct collected c = { .lines = 0 };
 	struct calibration calibration;
-	char said[CALIBRATION_WHY_BYTES] = "";
+	char reason[CALIBRATION_WHY_BYTES] = "";
 	int r = each(path, look, &contents, why);
 
 	for (unsigned i = 0; i < LIMIT_SLAVES; i++) {
-		c.room += contents.edges[i];
+		c.capacity += contents.edges[i];
 	}
 	if (r < 0) {
 		return r;
 	}
-	c.at_ns[0] = calloc(c.room + 1, sizeof(int64_t));
-	c.at_ns[1] = calloc(c.room + 1, sizeof(int64_t));
+	c.at_ns[0] = calloc(c.capacity + 1, sizeof(int64_t));
+	c.at_ns[1] = calloc(c.capacity + 1, sizeof(int64_t));
 	r = c.at_ns[0] == NULL || c.at_ns[1] == NULL ? -ENOMEM : each(path, collect, &c, why);
 	if (r == 0 && c.is_backwards) {
 		snprintf(why, WHY_BYTES, "%.200s: the edges are not in order of time", path);
@@ -286,9 +286,9 @@ int replay_calibrate(const char *path, const char *save_to, FILE *out, char *why
 	snprintf(calibration.first, sizeof(calibration.first), "slave %u", c.slave[0]);
 	snprintf(calibration.second, sizeof(calibration.second), "slave %u", c.slave[1]);
 	print_calibration(&calibration, out);
-	r = calibration_save(save_to, &calibration, said);
+	r = calibration_save(save_to, &calibration, reason);
 	if (r < 0) {
-		snprintf(why, WHY_BYTES, "%.200s: %.200s", save_to, said);
+		snprintf(why, WHY_BYTES, "%.200s: %.200s", save_to, reason);
 	}
 	return r;
 }

@@ -30,7 +30,7 @@ void shot_command(struct shot_line *sl, int64_t at_dc_ns, int64_t due_dc_ns)
 {
 	for (int i = sl->waiting - 1; i >= 0; i--) {
 		if (sl->due[i].dc_ns == due_dc_ns) {
-			remove_due(sl, i); /* it is armed anew */
+			remove_due(sl, i); /* it is armed again */
 		} else if (sl->due[i].dc_ns > at_dc_ns) {
 			sl->due[i].is_withdrawn = 1;
 		}
@@ -78,14 +78,14 @@ static int find_edge(const struct shot_line *sl, const struct grid *grid, int nu
 /* SHOT_NONE: it was withdrawn, and did not come. */
 static struct shot_verdict close_shot(struct shot_line *sl, const struct grid *grid, int number)
 {
-	struct shot_verdict v = { .news = sl->due[number].is_withdrawn ? SHOT_NONE : SHOT_LOST,
+	struct shot_verdict v = { .outcome = sl->due[number].is_withdrawn ? SHOT_NONE : SHOT_LOST,
 				  .due_dc_ns = sl->due[number].dc_ns };
 	int64_t due_ns = grid_mono_ns(grid, v.due_dc_ns);
 	int edge = find_edge(sl, grid, number);
 
 	v.mono_ns = due_ns;
 	if (edge >= 0) {
-		v.news = SHOT_CAME;
+		v.outcome = SHOT_CAME;
 		v.mono_ns = sl->edge_mono_ns[edge];
 		v.late_ns = v.mono_ns - due_ns;
 		remove_edge(sl, edge);
@@ -106,20 +106,20 @@ static struct shot_verdict next_due(struct shot_line *sl, const struct grid *gri
 			continue;
 		}
 		v = close_shot(sl, grid, i);
-		if (v.news != SHOT_NONE) {
+		if (v.outcome != SHOT_NONE) {
 			return v;
 		}
 	}
-	return (struct shot_verdict){ .news = SHOT_NONE };
+	return (struct shot_verdict){ .outcome = SHOT_NONE };
 }
 
 struct shot_verdict shot_next(struct shot_line *sl, const struct grid *grid, int64_t until_ns)
 {
 	struct shot_verdict v = next_due(sl, grid, until_ns);
 
-	if (v.news == SHOT_NONE && sl->edges > 0 &&
+	if (v.outcome == SHOT_NONE && sl->edges > 0 &&
 	    sl->edge_mono_ns[0] + EXTRA_AFTER_NS < until_ns) {
-		v = (struct shot_verdict){ .news = SHOT_EXTRA, .mono_ns = sl->edge_mono_ns[0] };
+		v = (struct shot_verdict){ .outcome = SHOT_EXTRA, .mono_ns = sl->edge_mono_ns[0] };
 		remove_edge(sl, 0);
 	}
 	return v;

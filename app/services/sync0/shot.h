@@ -23,10 +23,10 @@ struct shot_line {
 	int edges;
 };
 
-enum shot_news { SHOT_NONE, SHOT_CAME, SHOT_LOST, SHOT_EXTRA };
+enum shot_outcome { SHOT_NONE, SHOT_CAME, SHOT_LOST, SHOT_EXTRA };
 
 struct shot_verdict {
-	enum shot_news news;
+	enum shot_outcome outcome;
 	int64_t due_dc_ns;
 	int64_t mono_ns; /* of the edge; of the due time if none came */
 	int64_t late_ns;
@@ -39,8 +39,8 @@ struct shot_verdict {
 void shot_command(struct shot_line *sl, int64_t at_dc_ns, int64_t due_dc_ns);
 void shot_edge(struct shot_line *sl, int64_t mono_ns);
 /**
- * All edges before @until_ns are known: what can be said? Ask again until SHOT_NONE. The grid is
- * ready.
+ * All edges before @until_ns are known: return the next shot that can be judged. Call until
+ * SHOT_NONE. The grid must be ready.
  */
 struct shot_verdict shot_next(struct shot_line *sl, const struct grid *grid, int64_t until_ns);
 

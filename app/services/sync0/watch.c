@@ -34,7 +34,7 @@ int watch_has_source(const struct watch *w)
 		return w->edges != NULL;
 	}
 	for (size_t i = 0; i < w->line_count; i++) {
-		if (lines_is_open(w->lines, i)) {
+		if (gpio_lines_is_open(w->lines, i)) {
 			return 1;
 		}
 	}
@@ -45,13 +45,13 @@ int watch_has_source(const struct watch *w)
 
 static const char *line_text(const struct watch *w, size_t line)
 {
-	return w->lines == NULL ? w->spec.cfg->sync0_edges : lines_text(w->lines, line);
+	return w->lines == NULL ? w->spec.cfg->sync0_edges : gpio_lines_text(w->lines, line);
 }
 
 static int are_all_open(const struct watch *w)
 {
-	for (size_t i = 0; i < lines_count(w->lines); i++) {
-		if (!lines_is_open(w->lines, i)) {
+	for (size_t i = 0; i < gpio_lines_count(w->lines); i++) {
+		if (!gpio_lines_is_open(w->lines, i)) {
 			return 0;
 		}
 	}
@@ -65,14 +65,14 @@ static void on_line(void *ctx, size_t line, const char *why)
 	char text[TEXT_BYTES];
 
 	ls->is_open = why == NULL;
-	w->has_news = 1;
-	ls->is_hte = (uint32_t)lines_is_hte(w->lines, line);
+	w->lines_changed = 1;
+	ls->is_hte = (uint32_t)gpio_lines_is_hte(w->lines, line);
 	if (why != NULL) {
 		snprintf(text, sizeof(text), "line '%.95s' of slave %u: %s", line_text(w, line),
 			 (unsigned)ls->slave_pos, why);
-		output_say(w->out, text);
+		output_message(w->out, text);
 	} else if (are_all_open(w)) {
-		output_say(w->out, "");
+		output_message(w->out, "");
 	}
 }
 
@@ -106,17 +106,17 @@ static int have_lines(struct watch *w, char *why)
 	if (cfg->sync0_edges[0] != '\0') {
 		return 0;
 	}
-	w->lines = lines_create(cfg, w->spec.dev_dir);
+	w->lines = gpio_lines_create(cfg, w->spec.dev_dir);
 	if (w->lines == NULL) {
 		snprintf(why, TEXT_BYTES, "%s",
 			 errno == ENOENT ? "no slave has a line: set slaves[].sync0_line"
 					 : strerror(errno));
 		return -errno;
 	}
-	for (size_t i = 0; i < lines_count(w->lines); i++) {
-		w->line_of_slave[lines_slave(w->lines, i)] = i + 1;
+	for (size_t i = 0; i < gpio_lines_count(w->lines); i++) {
+		w->line_of_slave[gpio_lines_slave(w->lines, i)] = i + 1;
 	}
-	w->line_count = lines_count(w->lines);
+	w->line_count = gpio_lines_count(w->lines);
 	return 0;
 }
 
@@ -193,7 +193,7 @@ void watch_destroy(struct watch *w)
 	}
 	checker_destroy(w->checker);
 	master_destroy(w->master);
-	lines_destroy(w->lines);
+	gpio_lines_destroy(w->lines);
 	edge_file_close(w->edges);
 	output_destroy(w->out);
 	free(w);
@@ -227,7 +227,7 @@ static void open_sources(struct watch *w)
 	}
 	w->tried_ns = watch_now_ns(w);
 	if (w->lines != NULL) {
-		open = lines_open(w->lines, on_line, w);
+		open = gpio_lines_open(w->lines, on_line, w);
 		if (open == 0) {
 			watch_set_state(w, SYNC0_NO_LINE);
 		}
@@ -236,7 +236,7 @@ static void open_sources(struct watch *w)
 	if (w->edges != NULL && edge_file_is_replaced(w->edges)) {
 		edge_file_close(w->edges);
 		w->edges = NULL;
-		w->has_news = 1;
+		w->lines_changed = 1;
 	}
 	if (w->edges == NULL) {
 		r = edge_file_open(w->spec.cfg->sync0_edges, EDGE_FILE_END, &w->edges);
@@ -244,12 +244,12 @@ static void open_sources(struct watch *w)
 			w->edges = NULL;
 			snprintf(text, sizeof(text), "%.200s: %s", w->spec.cfg->sync0_edges,
 				 strerror(-r));
-			output_say(w->out, text);
+			output_message(w->out, text);
 			watch_set_state(w, SYNC0_NO_LINE);
 		} else {
 			w->since_ns = watch_now_ns(w);
-			w->has_news = 1;
-			output_say(w->out, "");
+			w->lines_changed = 1;
+			output_message(w->out, "");
 		}
 	}
 }
@@ -263,7 +263,7 @@ static void read_file(struct watch *w)
 	while ((r = edge_file_next(w->edges, &item)) != 0) {
 		uint64_t line;
 
-		/* Half a line, of a file that was written anew, is none, or of some other time. */
+		/* Part of a line of a file that was replaced is no edge, or one of another time. */
 		if (r < 0 || item.kind != EDGE_ITEM_EDGE || item.edge.mono_ns > limit_ns) {
 			continue;
 		}
@@ -283,7 +283,7 @@ static int64_t read_edges(struct watch *w)
 	int64_t before_ns = watch_now_ns(w);
 
 	if (w->lines != NULL) {
-		lines_read(w->lines, take_edge, on_line, w);
+		gpio_lines_read(w->lines, take_edge, on_line, w);
 		return before_ns - QUEUED_NS;
 	}
 	if (w->edges != NULL) {
@@ -293,7 +293,7 @@ static int64_t read_edges(struct watch *w)
 							       : before_ns - SIMULATION_BEHIND_NS;
 }
 
-static void tell_counts(struct watch *w)
+static void report_counts(struct watch *w)
 {
 	struct sync0_status *page = output_page(w->out);
 	uint64_t windows = w->checker == NULL ? 0 : checker_windows(w->checker);
@@ -303,12 +303,12 @@ static void tell_counts(struct watch *w)
 	atomic_store_explicit(&page->alarms, w->alarms + alarms, memory_order_relaxed);
 }
 
-static void tell(struct watch *w)
+static void report_lines(struct watch *w)
 {
 	struct sync0_status *page = output_page(w->out);
 
 	atomic_fetch_add_explicit(&page->heartbeat, 1, memory_order_relaxed);
-	tell_counts(w);
+	report_counts(w);
 	if (w->checker == NULL) {
 		return;
 	}
@@ -324,14 +324,14 @@ static void tell(struct watch *w)
 	}
 }
 
-/* Where nobody sees what is on the page, standard error says so, once. */
+/* If the status page cannot be published, report the reason on standard error, once. */
 static void open_output(struct watch *w)
 {
 	char why[OUTPUT_WHY_BYTES] = "";
 
 	(void)output_open(w->out, why);
-	if (strcmp(w->said, why) != 0) {
-		memcpy(w->said, why, sizeof(w->said));
+	if (strcmp(w->page_error, why) != 0) {
+		memcpy(w->page_error, why, sizeof(w->page_error));
 		if (why[0] != '\0') {
 			fprintf(stderr, "ecdaq-sync0: waiting: %s\n", why);
 		}
@@ -348,7 +348,7 @@ static void look_for_stall(struct watch *w)
 			"ecdaq-sync0: did not run for %" PRId64
 			" ms: what came meanwhile is not judged\n",
 			(now_ns - w->stepped_ns) / NS_PER_MS);
-		w->has_news = 1;
+		w->lines_changed = 1;
 	}
 	w->stepped_ns = now_ns;
 }
@@ -362,7 +362,7 @@ void watch_step(struct watch *w)
 	open_output(w);
 	open_sources(w);
 	is_open = master_open(w->master);
-	if (is_open == 1 && w->has_session && w->has_news) {
+	if (is_open == 1 && w->has_session && w->lines_changed) {
 		watch_end_session(w);
 	}
 	if (is_open == 1 && !w->has_session) {
@@ -376,9 +376,9 @@ void watch_step(struct watch *w)
 	if (w->checker != NULL) {
 		checker_advance(w->checker, until_ns);
 	}
-	tell(w);
+	report_lines(w);
 	if (w->lines != NULL) {
-		lines_wait(w->lines, STEP_MS);
+		gpio_lines_wait(w->lines, STEP_MS);
 	}
 	/* Edges are taken in bunches: a thousand wake-ups a second would be of no use. */
 	poll(NULL, 0, STEP_MS);
@@ -387,6 +387,6 @@ void watch_step(struct watch *w)
 void watch_finish(struct watch *w)
 {
 	watch_end_session(w);
-	tell(w);
+	report_lines(w);
 	watch_set_state(w, SYNC0_ENDED);
 }

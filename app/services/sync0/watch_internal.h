@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Between the files of the watch; not for others. */
+/* Private to the files watch*.c. */
 #ifndef SYNC0_WATCH_INTERNAL_H
 #define SYNC0_WATCH_INTERNAL_H
 
@@ -7,7 +7,7 @@
 #include "sync0/calibration.h"
 #include "sync0/checker.h"
 #include "sync0/edge_file.h"
-#include "sync0/lines.h"
+#include "sync0/gpio_lines.h"
 #include "sync0/master.h"
 #include "sync0/output.h"
 #include "sync0/watch.h"
@@ -18,24 +18,24 @@ struct watch {
 	struct master *master;
 	struct checker *checker; /* of the session; NULL: none */
 	int has_session;
-	int has_news;            /* a line was opened, or is gone: begin anew */
-	struct lines *lines;     /* NULL: simulated */
-	struct edge_file *edges; /* the simulation's; NULL: not open */
+	int lines_changed;        /* a line was opened or closed: restart the check */
+	struct gpio_lines *lines; /* NULL: simulated */
+	struct edge_file *edges;  /* the simulation's; NULL: not open */
 	struct calibration calibration;
 	uint64_t line_of_slave[LIMIT_SLAVES]; /* plus one; 0: none */
 	size_t line_count;
-	int64_t since_ns;  /* edges are heard from here on */
+	int64_t since_ns;  /* edges are received from here on */
 	int64_t newest_ns; /* edge of the file */
 	int64_t tried_ns;
 	int64_t stepped_ns; /* 0: not yet */
 	uint64_t windows;   /* and alarms, of the sessions before this one */
 	uint64_t alarms;
-	char said[OUTPUT_WHY_BYTES]; /* why nobody sees the page */
+	char page_error[OUTPUT_WHY_BYTES]; /* why the page is not published */
 	char master_path[CONFIG_PATH_BYTES];
 };
 
 int64_t watch_now_ns(const struct watch *w);
-/** Are edges heard at all? */
+/** Whether edges are received at all. */
 int watch_has_source(const struct watch *w);
 void watch_set_state(struct watch *w, enum sync0_state state);
 /** The status page's lines: which they are, of which slaves. */

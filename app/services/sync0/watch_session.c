@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* One session of the master: its cycles to a checker, and what that says to the readers. */
+/* One session of the master: its cycles go to a checker, the results to the readers. */
 #include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
@@ -8,7 +8,7 @@
 #include "base/clock.h"
 #include "sync0/watch_internal.h"
 
-/* Behind the start: listening has begun for sure. */
+/* A margin after the start, when edges are certainly received. */
 #define SETTLE_NS (NS_PER_S / 10)
 
 /* As config_check() has them for the period of the configuration. */
@@ -27,7 +27,7 @@ static void on_event(void *ctx, const struct event *ev)
 {
 	struct watch *w = ctx;
 
-	/* No result tells of a pulse that is no shot's. */
+	/* A pulse that belongs to no shot has no result of its own. */
 	if (ev->id == EVENT_SYNC0_EXTRA && ev->line > 0 &&
 	    output_page(w->out)->line[ev->line - 1].is_oneshot) {
 		atomic_fetch_add_explicit(&output_page(w->out)->line[ev->line - 1].extra,
@@ -75,7 +75,7 @@ static void lines_of_session(struct watch *w)
 static enum checker_mode mode_of(const struct watch *w, uint16_t pos)
 {
 	if (!watch_has_source(w) ||
-	    (w->lines != NULL && !lines_is_open(w->lines, w->line_of_slave[pos] - 1))) {
+	    (w->lines != NULL && !gpio_lines_is_open(w->lines, w->line_of_slave[pos] - 1))) {
 		return CHECKER_OFF;
 	}
 	return config_is_oneshot(w->spec.cfg, pos) ? CHECKER_ONESHOT : CHECKER_PERIODIC;
@@ -112,7 +112,7 @@ static void fit_to_period(struct watch *w, struct checker_spec *spec)
 			 "sync0.window is less than %d cycles of the master: %" PRId64
 			 " ms are taken",
 			 WINDOW_CYCLES_MIN, least_ns / NS_PER_MS);
-		output_say(w->out, text);
+		output_message(w->out, text);
 	}
 	atomic_store_explicit(&output_page(w->out)->window_ns, spec->window_ns,
 			      memory_order_relaxed);
@@ -157,14 +157,15 @@ void watch_begin_session(struct watch *w)
 	int r;
 
 	w->has_session = 1;
-	w->has_news = 0;
+	w->lines_changed = 0;
 	lines_of_session(w);
 	spec = session_spec(w);
 	r = checker_create(&spec, &w->checker);
 	if (r < 0) {
 		w->checker = NULL;
-		output_say(w->out, r == -EINVAL ? "no slave of the segment has distributed clocks"
-						: strerror(-r));
+		output_message(w->out, r == -EINVAL
+					       ? "no slave of the segment has distributed clocks"
+					       : strerror(-r));
 		watch_set_state(w, SYNC0_NO_DC);
 		return;
 	}

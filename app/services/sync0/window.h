@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What was seen in one window of cycles: of each line its edges, of the master its frames. */
+/* One window of cycles: the edges of each line and the frames of the master. */
 #ifndef SYNC0_WINDOW_H
 #define SYNC0_WINDOW_H
 
@@ -35,7 +35,7 @@ struct window {
 /** 0 or -ENOMEM. Free with window_destroy(). */
 int window_create(uint32_t cycles, size_t line_count, struct window **ret_window);
 void window_destroy(struct window *w);
-/** Begin anew, at @first_cycle. */
+/** Clear all counts; the window starts at @first_cycle. */
 void window_clear(struct window *w, int64_t first_cycle);
 
 #endif

@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 #include "harness/test.h"
-#include "sync0/listen.h"
+#include "sync0/calibrate_live.h"
 #include "unit/services/sync0/fake_gpiod.h"
 
 static char why[GPIO_WHY_BYTES];
@@ -203,22 +203,22 @@ TEST(sync0_gpio, a_calibration_that_is_stopped_or_has_no_line_stores_nothing)
 	fake_gpiod_reset();
 	config_defaults(&cfg);
 	CHECK_EQ(config_set(&cfg, "sync0.calibration=/nonexistent/c", error, sizeof(error)), 0);
-	CHECK_EQ(listen_calibrate(&cfg, "/dev", &stopped, stdout, said), -ENOENT);
+	CHECK_EQ(calibrate_live(&cfg, "/dev", &stopped, stdout, said), -ENOENT);
 	CHECK_STR(said, "no slave has a line: set slaves[].sync0_line");
 	CHECK_EQ(config_set(&cfg, "slaves[0].sync0_line=pinctrl-test:1", error, sizeof(error)), 0);
-	CHECK_EQ(listen_calibrate(&cfg, "/dev", &stopped, stdout, said), -EINVAL);
+	CHECK_EQ(calibrate_live(&cfg, "/dev", &stopped, stdout, said), -EINVAL);
 	CHECK(strstr(said, "wants the same signal on two lines") != NULL);
 	CHECK_EQ(config_set(&cfg, "slaves[1].sync0_line=pinctrl-test:2", error, sizeof(error)), 0);
 	snprintf(dev, sizeof(dev), "%s", dev_with(1));
-	CHECK_EQ(listen_calibrate(&cfg, dev, &stopped, stdout, said), -EINTR);
+	CHECK_EQ(calibrate_live(&cfg, dev, &stopped, stdout, said), -EINTR);
 	CHECK_STR(said, "stopped after 0 and 0 of 10000 edges: nothing is stored");
 	fake_gpiod.request_error = EBUSY;
 	fake_gpiod.consumer = "w1-gpio";
-	CHECK_EQ(listen_calibrate(&cfg, dev, &stopped, stdout, said), -EBUSY);
+	CHECK_EQ(calibrate_live(&cfg, dev, &stopped, stdout, said), -EBUSY);
 	CHECK_STR(said, "line 'pinctrl-test:1' of slave 0: already used by w1-gpio");
 	fake_gpiod.request_error = EPERM;
-	CHECK_EQ(listen_calibrate(&cfg, dev, &stopped, stdout, said), -EACCES);
+	CHECK_EQ(calibrate_live(&cfg, dev, &stopped, stdout, said), -EACCES);
 	remove_dev(dev, 1);
-	CHECK_EQ(listen_calibrate(&cfg, dev, &stopped, stdout, said), -ENOENT);
+	CHECK_EQ(calibrate_live(&cfg, dev, &stopped, stdout, said), -ENOENT);
 	CHECK_EQ(fake_gpiod.live, 0);
 }

@@ -155,13 +155,13 @@ TEST(sync0, a_limit_of_zero_is_not_asked)
 	CHECK_EQ(r.verdict, SYNC0_OK);
 }
 
-static unsigned told;
+static unsigned reported;
 static struct event newest;
 
 static void keep(void *ctx, const struct event *ev)
 {
 	(void)ctx;
-	told++;
+	reported++;
 	newest = *ev;
 }
 
@@ -180,11 +180,11 @@ TEST(sync0, an_alarm_is_raised_once_and_cleared_only_by_three_clearly_good_windo
 {
 	struct alarm_line al = { .is_raised = { 0 } };
 
-	told = 0;
+	reported = 0;
 	window_with_skew(&al, 100);
-	CHECK_EQ(told, 0);
+	CHECK_EQ(reported, 0);
 	window_with_skew(&al, 6000);
-	CHECK_EQ(told, 1);
+	CHECK_EQ(reported, 1);
 	CHECK_EQ(newest.id, EVENT_SYNC0_SKEW);
 	CHECK_EQ(newest.slave_pos, 7);
 	CHECK_EQ(newest.line, 5);
@@ -193,12 +193,12 @@ TEST(sync0, an_alarm_is_raised_once_and_cleared_only_by_three_clearly_good_windo
 	for (int i = 0; i < 10; i++) {
 		window_with_skew(&al, i % 2 == 0 ? 4500 : 6000); /* about the limit */
 	}
-	CHECK_EQ(told, 1);
+	CHECK_EQ(reported, 1);
 	window_with_skew(&al, 100);
 	window_with_skew(&al, 100);
-	CHECK_EQ(told, 1);
+	CHECK_EQ(reported, 1);
 	window_with_skew(&al, 100);
-	CHECK_EQ(told, 2);
+	CHECK_EQ(reported, 2);
 	CHECK_EQ(newest.id, EVENT_SYNC0_CLEAR);
 	CHECK_EQ(newest.arg[0], SYNC0_CHECK_SKEW);
 }

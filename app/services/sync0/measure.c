@@ -1,36 +1,36 @@
 /* SPDX-License-Identifier: MIT */
-#include "sync0/figures.h"
+#include "sync0/measure.h"
 
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 
-#include "sync0/stat.h"
+#include "sync0/statistics.h"
 
 #define PPB 1e9
 
-int figures_room_create(uint32_t cycles, struct figures_room *ret_room)
+int measure_scratch_create(uint32_t cycles, struct measure_scratch *ret_scratch)
 {
-	struct figures_room room = {
+	struct measure_scratch scratch = {
 		.x = calloc(cycles, sizeof(uint32_t)),
 		.y = calloc(cycles, sizeof(int64_t)),
 		.scratch = calloc(cycles, sizeof(int64_t)),
 	};
 
-	if (room.x == NULL || room.y == NULL || room.scratch == NULL) {
-		figures_room_destroy(&room);
+	if (scratch.x == NULL || scratch.y == NULL || scratch.scratch == NULL) {
+		measure_scratch_destroy(&scratch);
 		return -ENOMEM;
 	}
-	*ret_room = room;
+	*ret_scratch = scratch;
 	return 0;
 }
 
-void figures_room_destroy(struct figures_room *room)
+void measure_scratch_destroy(struct measure_scratch *scratch)
 {
-	free(room->x);
-	free(room->y);
-	free(room->scratch);
-	*room = (struct figures_room){ .x = NULL };
+	free(scratch->x);
+	free(scratch->y);
+	free(scratch->scratch);
+	*scratch = (struct measure_scratch){ .x = NULL };
 }
 
 static void count(const struct window *w, const struct window_line *wl, struct sync0_result *ret)
@@ -52,7 +52,7 @@ static void count(const struct window *w, const struct window_line *wl, struct s
 
 /* Mean, spread and percentiles of the times between neighbouring cycles' edges. */
 static void period(const struct window *w, const struct window_line *wl,
-		   const struct figures_room *room, struct sync0_result *ret)
+		   const struct measure_scratch *scratch, struct sync0_result *ret)
 {
 	int64_t first = -1;
 	int64_t last = -1;
@@ -74,24 +74,24 @@ static void period(const struct window *w, const struct window_line *wl,
 			double off = (double)(wl->mono_ns[i] - wl->mono_ns[i - 1]) - ret->period_ns;
 
 			squares += off * off;
-			room->y[n++] = llabs(llround(off));
+			scratch->y[n++] = llabs(llround(off));
 		}
 	}
 	if (n < 2) {
 		return;
 	}
-	stat_sort(room->y, n);
+	statistics_sort(scratch->y, n);
 	ret->period_sd_ns = sqrt(squares / (double)(n - 1));
-	ret->jitter_p50_ns = stat_percentile(room->y, n, 500000);
-	ret->jitter_p99_ns = stat_percentile(room->y, n, 990000);
-	ret->jitter_max_ns = room->y[n - 1];
+	ret->jitter_p50_ns = statistics_percentile(scratch->y, n, 500000);
+	ret->jitter_p99_ns = statistics_percentile(scratch->y, n, 990000);
+	ret->jitter_max_ns = scratch->y[n - 1];
 	ret->has |= SYNC0_HAS_PERIOD;
 }
 
 /* The host's clock minus DC time, at every edge. */
 static int fit_edges(const struct window *w, const struct window_line *wl,
-		     const struct figures_spec *spec, int64_t base_ns,
-		     const struct figures_room *room, struct stat_fit *ret_fit)
+		     const struct measure_spec *spec, int64_t base_ns,
+		     const struct measure_scratch *scratch, struct statistics_fit *ret_fit)
 {
 	size_t n = 0;
 
@@ -100,42 +100,43 @@ static int fit_edges(const struct window *w, const struct window_line *wl,
 			int64_t due_dc_ns = spec->origin_dc_ns +
 					    (w->first_cycle + (int64_t)i) * spec->period_ns;
 
-			room->x[n] = i;
-			room->y[n++] = wl->mono_ns[i] - due_dc_ns - base_ns;
+			scratch->x[n] = i;
+			scratch->y[n++] = wl->mono_ns[i] - due_dc_ns - base_ns;
 		}
 	}
-	return stat_line(room->x, room->y, n, room->scratch, ret_fit);
+	return statistics_line(scratch->x, scratch->y, n, scratch->scratch, ret_fit);
 }
 
 /* The same at every frame; *ret_latency_ns is what a pair may be off by. */
-static int fit_frames(const struct window *w, int64_t base_ns, const struct figures_room *room,
-		      struct stat_fit *ret_fit, int64_t *ret_latency_ns)
+static int fit_frames(const struct window *w, int64_t base_ns,
+		      const struct measure_scratch *scratch, struct statistics_fit *ret_fit,
+		      int64_t *ret_latency_ns)
 {
 	size_t n = 0;
 	int r;
 
 	for (uint32_t i = 0; i < w->cycles; i++) {
 		if (w->has_frame[i]) {
-			room->x[n] = i;
-			room->y[n++] = w->frame_mono_ns[i] - w->frame_dc_ns[i] - base_ns;
+			scratch->x[n] = i;
+			scratch->y[n++] = w->frame_mono_ns[i] - w->frame_dc_ns[i] - base_ns;
 		}
 	}
-	r = stat_line(room->x, room->y, n, room->scratch, ret_fit);
+	r = statistics_line(scratch->x, scratch->y, n, scratch->scratch, ret_fit);
 	if (r < 0) {
 		return r;
 	}
 	n = 0;
 	for (uint32_t i = 0; i < w->cycles; i++) {
 		if (w->has_frame[i]) {
-			room->scratch[n++] = w->frame_latency_ns[i];
+			scratch->scratch[n++] = w->frame_latency_ns[i];
 		}
 	}
-	*ret_latency_ns = stat_median(room->scratch, n);
+	*ret_latency_ns = statistics_median(scratch->scratch, n);
 	return 0;
 }
 
 static int64_t base_of(const struct window *w, const struct window_line *wl,
-		       const struct figures_spec *spec)
+		       const struct measure_spec *spec)
 {
 	for (uint32_t i = 0; i < w->cycles; i++) {
 		if (w->has_frame[i]) {
@@ -151,15 +152,15 @@ static int64_t base_of(const struct window *w, const struct window_line *wl,
 	return 0;
 }
 
-static void against_frames(const struct window *w, const struct stat_fit *edges,
-			   const struct figures_spec *spec, int64_t base_ns,
-			   const struct figures_room *room, struct sync0_result *ret)
+static void against_frames(const struct window *w, const struct statistics_fit *edges,
+			   const struct measure_spec *spec, int64_t base_ns,
+			   const struct measure_scratch *scratch, struct sync0_result *ret)
 {
 	double to_ppb = PPB / (double)spec->period_ns;
-	struct stat_fit frames;
+	struct statistics_fit frames;
 	int64_t latency_ns;
 
-	if (fit_frames(w, base_ns, room, &frames, &latency_ns) < 0) {
+	if (fit_frames(w, base_ns, scratch, &frames, &latency_ns) < 0) {
 		return;
 	}
 	ret->has |= SYNC0_HAS_RATE | SYNC0_HAS_PHASE;
@@ -175,36 +176,36 @@ static void against_frames(const struct window *w, const struct stat_fit *edges,
 }
 
 static void frame_distance(const struct window *w, const struct window_line *wl,
-			   const struct figures_room *room, struct sync0_result *ret)
+			   const struct measure_scratch *scratch, struct sync0_result *ret)
 {
 	size_t n = 0;
 
 	for (uint32_t i = 0; i < w->cycles; i++) {
 		if (w->has_frame[i] && wl->mark[i] == WINDOW_SEEN) {
-			room->scratch[n++] = w->frame_mono_ns[i] - wl->mono_ns[i];
+			scratch->scratch[n++] = w->frame_mono_ns[i] - wl->mono_ns[i];
 		}
 	}
-	ret->frame_ns = stat_median(room->scratch, n);
+	ret->frame_ns = statistics_median(scratch->scratch, n);
 }
 
-static void skew(const struct window *w, size_t number, const struct figures_spec *spec,
-		 const struct judge_noise *noise, const struct figures_room *room,
+static void skew(const struct window *w, size_t number, const struct measure_spec *spec,
+		 const struct judge_noise *noise, const struct measure_scratch *scratch,
 		 struct sync0_result *ret)
 {
 	const struct window_line *wl = &w->line[number];
 	const struct window_line *first = &w->line[0];
 	int is_pair = number == 1 && noise->has_pair;
 	int64_t asked_ns = spec->shift_ns - spec->first_shift_ns + (is_pair ? noise->bias_ns : 0);
-	struct stat_fit fit;
+	struct statistics_fit fit;
 	size_t n = 0;
 
 	for (uint32_t i = 0; i < w->cycles; i++) {
 		if (wl->mark[i] == WINDOW_SEEN && first->mark[i] == WINDOW_SEEN) {
-			room->x[n] = i;
-			room->y[n++] = wl->mono_ns[i] - first->mono_ns[i] - asked_ns;
+			scratch->x[n] = i;
+			scratch->y[n++] = wl->mono_ns[i] - first->mono_ns[i] - asked_ns;
 		}
 	}
-	if (stat_line(room->x, room->y, n, room->scratch, &fit) < 0) {
+	if (statistics_line(scratch->x, scratch->y, n, scratch->scratch, &fit) < 0) {
 		return;
 	}
 	ret->has |= SYNC0_HAS_SKEW;
@@ -213,13 +214,13 @@ static void skew(const struct window *w, size_t number, const struct figures_spe
 			     (is_pair ? 0 : llabs(noise->bias_ns));
 }
 
-void figures_compute(const struct window *w, size_t number, const struct figures_spec *spec,
-		     const struct judge_noise *noise, const struct figures_room *room,
-		     struct sync0_result *ret)
+void measure_window(const struct window *w, size_t number, const struct measure_spec *spec,
+		    const struct judge_noise *noise, const struct measure_scratch *scratch,
+		    struct sync0_result *ret)
 {
 	const struct window_line *wl = &w->line[number];
 	int64_t base_ns = base_of(w, wl, spec);
-	struct stat_fit edges;
+	struct statistics_fit edges;
 
 	count(w, wl, ret);
 	ret->first_cycle = (uint64_t)w->first_cycle;
@@ -229,16 +230,16 @@ void figures_compute(const struct window *w, size_t number, const struct figures
 	if (ret->step_ns != 0) {
 		return; /* two halves that do not belong together */
 	}
-	period(w, wl, room, ret);
-	if (fit_edges(w, wl, spec, base_ns, room, &edges) < 0) {
+	period(w, wl, scratch, ret);
+	if (fit_edges(w, wl, spec, base_ns, scratch, &edges) < 0) {
 		return;
 	}
 	ret->has |= SYNC0_HAS_DRIFT;
 	ret->drift_ppb = -edges.slope * PPB / (double)spec->period_ns;
 	ret->drift_error_ppb = edges.slope_error * PPB / (double)spec->period_ns;
-	against_frames(w, &edges, spec, base_ns, room, ret);
-	frame_distance(w, wl, room, ret);
+	against_frames(w, &edges, spec, base_ns, scratch, ret);
+	frame_distance(w, wl, scratch, ret);
 	if (number > 0) {
-		skew(w, number, spec, noise, room, ret);
+		skew(w, number, spec, noise, scratch, ret);
 	}
 }

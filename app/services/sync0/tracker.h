@@ -6,51 +6,51 @@
  * has stepped. A smaller step shows as one odd interval with all edges behind it on one side.
  * Context: any.
  */
-#ifndef SYNC0_TRACK_H
-#define SYNC0_TRACK_H
+#ifndef SYNC0_TRACKER_H
+#define SYNC0_TRACKER_H
 
 #include <stdint.h>
 
 #include "sync0/edge.h"
 #include "sync0/grid.h"
 
-enum { TRACK_HELD = 8 };
+enum { TRACKER_HELD = 8 };
 
-struct track {
+struct tracker {
 	int is_locked;
 	double phase_ns; /* behind the due time */
 	int has_last;
 	int64_t last_cycle;
-	int64_t last_mono_ns;          /* of the newest edge of a cycle */
-	double run_off_ns[TRACK_HELD]; /* edges in a row on one side of the phase */
+	int64_t last_mono_ns;            /* of the newest edge of a cycle */
+	double run_off_ns[TRACKER_HELD]; /* edges in a row on one side of the phase */
 	double run_jump_ns; /* by how much the interval before the first of them was off */
 	unsigned run_count;
-	struct edge held[TRACK_HELD];
-	int64_t held_late_ns[TRACK_HELD];
+	struct edge held[TRACKER_HELD];
+	int64_t held_late_ns[TRACKER_HELD];
 	int held_count;
 };
 
-enum track_kind { TRACK_CYCLE, TRACK_EXTRA };
+enum tracker_kind { TRACKER_CYCLE, TRACKER_EXTRA };
 
-struct track_item {
-	enum track_kind kind;
-	int64_t cycle; /* for TRACK_EXTRA, the cycle in which it came */
+struct tracker_item {
+	enum tracker_kind kind;
+	int64_t cycle; /* for TRACKER_EXTRA, the cycle in which it came */
 	int64_t mono_ns;
 };
 
-struct track_out {
+struct tracker_out {
 	int count;
-	struct track_item item[TRACK_HELD + 1];
+	struct tracker_item item[TRACKER_HELD + 1];
 	int64_t step_ns;    /* the line's phase stepped by so much; 0: not */
 	int64_t step_cycle; /* the first cycle after it */
 };
 
 /** Forget everything: the grid has changed. */
-void track_reset(struct track *track);
+void tracker_reset(struct tracker *track);
 /** Take @edge; what has become clear by it is in @ret_out, oldest first. */
-void track_edge(struct track *track, const struct grid *grid, const struct edge *edge,
-		struct track_out *ret_out);
+void tracker_edge(struct tracker *track, const struct grid *grid, const struct edge *edge,
+		  struct tracker_out *ret_out);
 /** What is still held is extra. */
-void track_finish(struct track *track, const struct grid *grid, struct track_out *ret_out);
+void tracker_finish(struct tracker *track, const struct grid *grid, struct tracker_out *ret_out);
 
 #endif

@@ -1,39 +1,39 @@
 /* SPDX-License-Identifier: MIT */
-#include "sync0/track.h"
+#include "sync0/tracker.h"
 
 #include <math.h>
 
 #include "base/clock.h"
-#include "sync0/stat.h"
+#include "sync0/statistics.h"
 
 enum {
 	ASTRAY_SHARE = 4, /* of the period, either way: farther off is not the cycle's edge */
 	ALIKE_SHARE = 8,  /* held edges within this are a phase */
-	STEP_SHARE = 50,  /* a phase that is off by this for TRACK_HELD edges has changed */
+	STEP_SHARE = 50,  /* a phase that is off by this for TRACKER_HELD edges has changed */
 	FOLLOW_SHARE = 64,
 };
 
-void track_reset(struct track *track)
+void tracker_reset(struct tracker *track)
 {
-	*track = (struct track){ .is_locked = 0 };
+	*track = (struct tracker){ .is_locked = 0 };
 }
 
-static void emit(struct track_out *out, enum track_kind kind, int64_t cycle, int64_t mono_ns)
+static void emit(struct tracker_out *out, enum tracker_kind kind, int64_t cycle, int64_t mono_ns)
 {
 	out->item[out->count++] =
-		(struct track_item){ .kind = kind, .cycle = cycle, .mono_ns = mono_ns };
+		(struct tracker_item){ .kind = kind, .cycle = cycle, .mono_ns = mono_ns };
 }
 
-static void emit_extra(const struct track *track, const struct grid *grid, const struct edge *edge,
-		       struct track_out *out)
+static void emit_extra(const struct tracker *track, const struct grid *grid,
+		       const struct edge *edge, struct tracker_out *out)
 {
 	int64_t late_ns;
 
-	emit(out, TRACK_EXTRA, grid_cycle(grid, edge->mono_ns, (int64_t)track->phase_ns, &late_ns),
-	     edge->mono_ns);
+	emit(out, TRACKER_EXTRA,
+	     grid_cycle(grid, edge->mono_ns, (int64_t)track->phase_ns, &late_ns), edge->mono_ns);
 }
 
-static void held_are_extra(struct track *track, const struct grid *grid, struct track_out *out)
+static void held_are_extra(struct tracker *track, const struct grid *grid, struct tracker_out *out)
 {
 	for (int i = 0; i < track->held_count; i++) {
 		emit_extra(track, grid, &track->held[i], out);
@@ -41,7 +41,7 @@ static void held_are_extra(struct track *track, const struct grid *grid, struct 
 	track->held_count = 0;
 }
 
-static void drop_oldest(struct track *track, const struct grid *grid, struct track_out *out)
+static void drop_oldest(struct tracker *track, const struct grid *grid, struct tracker_out *out)
 {
 	emit_extra(track, grid, &track->held[0], out);
 	track->held_count--;
@@ -52,35 +52,35 @@ static void drop_oldest(struct track *track, const struct grid *grid, struct tra
 }
 
 /* Are the held edges a cycle apart, at one place of it? Then that place is *ret_phase_ns. */
-static int held_are_alike(const struct track *track, int64_t period_ns, int64_t *ret_phase_ns)
+static int held_are_alike(const struct tracker *track, int64_t period_ns, int64_t *ret_phase_ns)
 {
-	int64_t off[TRACK_HELD];
+	int64_t off[TRACKER_HELD];
 
-	for (int i = 0; i < TRACK_HELD; i++) {
+	for (int i = 0; i < TRACKER_HELD; i++) {
 		off[i] = fold_ns(track->held_late_ns[i] - track->held_late_ns[0], period_ns);
 		if (i > 0 && track->held[i].mono_ns - track->held[i - 1].mono_ns < period_ns / 2) {
 			return 0;
 		}
 	}
-	stat_sort(off, TRACK_HELD);
-	*ret_phase_ns = track->held_late_ns[0] + off[TRACK_HELD / 2];
-	return off[TRACK_HELD - 1] - off[0] < period_ns / ALIKE_SHARE;
+	statistics_sort(off, TRACKER_HELD);
+	*ret_phase_ns = track->held_late_ns[0] + off[TRACKER_HELD / 2];
+	return off[TRACKER_HELD - 1] - off[0] < period_ns / ALIKE_SHARE;
 }
 
-static void take(struct track *track, int64_t cycle, int64_t mono_ns, struct track_out *out)
+static void take(struct tracker *track, int64_t cycle, int64_t mono_ns, struct tracker_out *out)
 {
 	if (track->has_last && cycle <= track->last_cycle) {
-		emit(out, TRACK_EXTRA, cycle, mono_ns);
+		emit(out, TRACKER_EXTRA, cycle, mono_ns);
 		return;
 	}
-	emit(out, TRACK_CYCLE, cycle, mono_ns);
+	emit(out, TRACKER_CYCLE, cycle, mono_ns);
 	track->has_last = 1;
 	track->last_cycle = cycle;
 	track->last_mono_ns = mono_ns;
 }
 
-static void lock_to(struct track *track, const struct grid *grid, int64_t phase_ns,
-		    struct track_out *out)
+static void lock_to(struct tracker *track, const struct grid *grid, int64_t phase_ns,
+		    struct tracker_out *out)
 {
 	int64_t period_ns = grid_period_ns(grid);
 
@@ -101,14 +101,14 @@ static void lock_to(struct track *track, const struct grid *grid, int64_t phase_
 	track->held_count = 0;
 }
 
-static void hold(struct track *track, const struct grid *grid, const struct edge *edge,
-		 int64_t late_ns, struct track_out *out)
+static void hold(struct tracker *track, const struct grid *grid, const struct edge *edge,
+		 int64_t late_ns, struct tracker_out *out)
 {
 	int64_t phase_ns;
 
 	track->held[track->held_count] = *edge;
 	track->held_late_ns[track->held_count++] = late_ns;
-	if (track->held_count < TRACK_HELD) {
+	if (track->held_count < TRACKER_HELD) {
 		return;
 	}
 	if (held_are_alike(track, grid_period_ns(grid), &phase_ns)) {
@@ -119,26 +119,26 @@ static void hold(struct track *track, const struct grid *grid, const struct edge
 }
 
 /* Is the run one step? All of it lies together, and one interval before it was as much off. */
-static int run_is_step(const struct track *track, double *ret_middle_ns)
+static int run_is_step(const struct tracker *track, double *ret_middle_ns)
 {
-	int64_t off[TRACK_HELD];
+	int64_t off[TRACKER_HELD];
 	int64_t median;
 	double middle;
 
-	for (int i = 0; i < TRACK_HELD; i++) {
+	for (int i = 0; i < TRACKER_HELD; i++) {
 		off[i] = (int64_t)track->run_off_ns[i];
 	}
-	stat_sort(off, TRACK_HELD);
-	median = off[TRACK_HELD / 2];
+	statistics_sort(off, TRACKER_HELD);
+	median = off[TRACKER_HELD / 2];
 	middle = (double)median;
 	*ret_middle_ns = middle;
-	return (double)off[TRACK_HELD - 1] - (double)off[0] < fabs(middle) / 2 &&
+	return (double)off[TRACKER_HELD - 1] - (double)off[0] < fabs(middle) / 2 &&
 	       fabs(track->run_jump_ns - middle) < fabs(middle) / 2;
 }
 
-/* Follow the phase: slowly, or at once when TRACK_HELD edges in a row say that it is another. */
-static void follow(struct track *track, double off_ns, double jump_ns, int64_t period_ns,
-		   struct track_out *out)
+/* Follow the phase: slowly, or at once when TRACKER_HELD edges in a row show another one. */
+static void follow(struct tracker *track, double off_ns, double jump_ns, int64_t period_ns,
+		   struct tracker_out *out)
 {
 	double middle_ns;
 
@@ -152,19 +152,19 @@ static void follow(struct track *track, double off_ns, double jump_ns, int64_t p
 		track->run_jump_ns = jump_ns;
 	}
 	track->run_off_ns[track->run_count++] = off_ns;
-	if (track->run_count < TRACK_HELD) {
+	if (track->run_count < TRACKER_HELD) {
 		return;
 	}
 	if (run_is_step(track, &middle_ns)) {
 		out->step_ns = (int64_t)track->run_jump_ns;
-		out->step_cycle = track->last_cycle - TRACK_HELD + 1;
+		out->step_cycle = track->last_cycle - TRACKER_HELD + 1;
 	}
 	track->phase_ns += middle_ns;
 	track->run_count = 0;
 }
 
 /* A phase that has wandered past half a period belongs to the neighbouring cycle. */
-static void keep_near(struct track *track, int64_t period_ns)
+static void keep_near(struct tracker *track, int64_t period_ns)
 {
 	double limit_ns = (double)period_ns * 5 / 8;
 
@@ -175,8 +175,8 @@ static void keep_near(struct track *track, int64_t period_ns)
 	}
 }
 
-void track_edge(struct track *track, const struct grid *grid, const struct edge *edge,
-		struct track_out *ret_out)
+void tracker_edge(struct tracker *track, const struct grid *grid, const struct edge *edge,
+		  struct tracker_out *ret_out)
 {
 	int64_t period_ns = grid_period_ns(grid);
 	int64_t late_ns;
@@ -198,14 +198,14 @@ void track_edge(struct track *track, const struct grid *grid, const struct edge 
 					     (cycle - track->last_cycle) * period_ns)
 				  : 0;
 	if (track->has_last && cycle <= track->last_cycle) {
-		emit(ret_out, TRACK_EXTRA, cycle, edge->mono_ns);
+		emit(ret_out, TRACKER_EXTRA, cycle, edge->mono_ns);
 		return;
 	}
 	take(track, cycle, edge->mono_ns, ret_out);
 	follow(track, off_ns, jump_ns, period_ns, ret_out);
 }
 
-void track_finish(struct track *track, const struct grid *grid, struct track_out *ret_out)
+void tracker_finish(struct tracker *track, const struct grid *grid, struct tracker_out *ret_out)
 {
 	ret_out->count = 0;
 	ret_out->step_ns = 0;

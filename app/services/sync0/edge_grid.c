@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "sync0/self_grid.h"
+#include "sync0/edge_grid.h"
 
 #include "base/clock.h"
 
@@ -8,7 +8,7 @@ enum { NEAR_SHARE = 8 }; /* of the period: an edge within it of a whole number o
 /* DC time as if cycle 0 were at this one: any will do, and no sum of it overflows. */
 #define ORIGIN_DC_NS NS_PER_S
 
-static int begin(struct self_grid *sg, const struct edge *edge, struct self_cycle *ret)
+static int begin(struct edge_grid *sg, const struct edge *edge, struct edge_cycle *ret)
 {
 	sg->has_begun = 1;
 	sg->first_dc_ns = edge->dc_ns != 0 ? edge->dc_ns : ORIGIN_DC_NS;
@@ -19,10 +19,10 @@ static int begin(struct self_grid *sg, const struct edge *edge, struct self_cycl
 }
 
 /*
- * After some odd edges in a row the clock has stepped, not they: each of them was a cycle. What
- * was lost in the step itself cannot be known from edges alone.
+ * After several edges in a row that do not fit, the clock has stepped: each edge was a cycle.
+ * Cycles lost in the step itself cannot be found from edges alone.
  */
-static int count(struct self_grid *sg, int64_t period_ns, int64_t mono_ns)
+static int count(struct edge_grid *sg, int64_t period_ns, int64_t mono_ns)
 {
 	int64_t since_ns = mono_ns - sg->mono_ns;
 	int64_t off_ns = fold_ns(since_ns, period_ns);
@@ -30,19 +30,19 @@ static int count(struct self_grid *sg, int64_t period_ns, int64_t mono_ns)
 
 	if (periods >= 1 && off_ns > -period_ns / NEAR_SHARE && off_ns < period_ns / NEAR_SHARE) {
 		sg->cycle += periods;
-		sg->astray = 0;
+		sg->misses = 0;
 		return 1;
 	}
-	if (++sg->astray < SELF_GRID_ASTRAY) {
+	if (++sg->misses < EDGE_GRID_MISSES) {
 		return 0;
 	}
-	sg->cycle += sg->astray;
-	sg->astray = 0;
+	sg->cycle += sg->misses;
+	sg->misses = 0;
 	return 1;
 }
 
-int self_grid_edge(struct self_grid *sg, int64_t period_ns, const struct edge *edge,
-		   struct self_cycle *ret)
+int edge_grid_take(struct edge_grid *sg, int64_t period_ns, const struct edge *edge,
+		   struct edge_cycle *ret)
 {
 	if (!sg->has_begun) {
 		return begin(sg, edge, ret);

@@ -1,21 +1,21 @@
 /* SPDX-License-Identifier: MIT */
 /* Estimates that a few late interrupts do not bend. Context: any; they reorder what they are given.
  */
-#ifndef SYNC0_STAT_H
-#define SYNC0_STAT_H
+#ifndef SYNC0_STATISTICS_H
+#define SYNC0_STATISTICS_H
 
 #include <stddef.h>
 #include <stdint.h>
 
 /** Sorts @v. */
-void stat_sort(int64_t *v, size_t count);
+void statistics_sort(int64_t *v, size_t count);
 /** The smallest of sorted @v that @per_million millionths do not exceed; 0 when empty. */
-int64_t stat_percentile(const int64_t *v, size_t count, uint32_t per_million);
+int64_t statistics_percentile(const int64_t *v, size_t count, uint32_t per_million);
 /** The median of @v, sorting it; 0 when empty. */
-int64_t stat_median(int64_t *v, size_t count);
+int64_t statistics_median(int64_t *v, size_t count);
 
 /* y = offset + slope * (x - centre) */
-struct stat_fit {
+struct statistics_fit {
 	size_t count;
 	double centre;
 	double offset; /* median of the residuals */
@@ -29,7 +29,7 @@ struct stat_fit {
  * Fit @count points: slope by Theil and Sen over the medians of blocks, offset by the median.
  * @x ascends; @scratch holds @count values. 0, or -ENODATA with fewer than 8 points.
  */
-int stat_line(const uint32_t *x, const int64_t *y, size_t count, int64_t *scratch,
-	      struct stat_fit *ret_fit);
+int statistics_line(const uint32_t *x, const int64_t *y, size_t count, int64_t *scratch,
+		    struct statistics_fit *ret_fit);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "sync0/listen.h"
+#include "sync0/calibrate_live.h"
 
 #include <errno.h>
 #include <stdlib.h>
@@ -8,7 +8,7 @@
 
 #include "base/clock.h"
 #include "sync0/calibration.h"
-#include "sync0/lines.h"
+#include "sync0/gpio_lines.h"
 #include "sync0/print.h"
 
 enum { EDGES = 10000, WAIT_MS = 100, WHY_BYTES = 512 };
@@ -17,19 +17,19 @@ enum { EDGES = 10000, WAIT_MS = 100, WHY_BYTES = 512 };
 #define SILENCE_NS (5 * NS_PER_S)
 
 struct listening {
-	struct lines *lines;
+	struct gpio_lines *lines;
 	int64_t *at_ns[2];
 	size_t count[2];
-	char said[256]; /* why a line cannot be had */
+	char reason[256]; /* why a line cannot be opened */
 };
 
 static void on_line(void *ctx, size_t line, const char *why)
 {
 	struct listening *ls = ctx;
 
-	if (why != NULL && line < 2 && ls->said[0] == '\0') {
-		snprintf(ls->said, sizeof(ls->said), "line '%.90s' of slave %u: %.120s",
-			 lines_text(ls->lines, line), lines_slave(ls->lines, line), why);
+	if (why != NULL && line < 2 && ls->reason[0] == '\0') {
+		snprintf(ls->reason, sizeof(ls->reason), "line '%.90s' of slave %u: %.120s",
+			 gpio_lines_text(ls->lines, line), gpio_lines_slave(ls->lines, line), why);
 	}
 }
 
@@ -58,8 +58,8 @@ static void collect(struct listening *ls, const volatile sig_atomic_t *has_stopp
 	       now_ns() - heard_ns < SILENCE_NS) {
 		size_t before = ls->count[0] + ls->count[1];
 
-		lines_wait(ls->lines, WAIT_MS);
-		lines_read(ls->lines, take_edge, on_line, ls);
+		gpio_lines_wait(ls->lines, WAIT_MS);
+		gpio_lines_read(ls->lines, take_edge, on_line, ls);
 		if (ls->count[0] + ls->count[1] > before) {
 			heard_ns = now_ns();
 		}
@@ -75,12 +75,12 @@ static int compute(struct listening *ls, const struct config *cfg, FILE *out, ch
 	if (r < 0) {
 		return r;
 	}
-	snprintf(c.first, sizeof(c.first), "%.95s", lines_text(ls->lines, 0));
-	snprintf(c.second, sizeof(c.second), "%.95s", lines_text(ls->lines, 1));
+	snprintf(c.first, sizeof(c.first), "%.95s", gpio_lines_text(ls->lines, 0));
+	snprintf(c.second, sizeof(c.second), "%.95s", gpio_lines_text(ls->lines, 1));
 	print_calibration(&c, out);
-	r = calibration_save(cfg->sync0_calibration, &c, ls->said);
+	r = calibration_save(cfg->sync0_calibration, &c, ls->reason);
 	if (r < 0) {
-		snprintf(why, WHY_BYTES, "%.200s: %.200s", cfg->sync0_calibration, ls->said);
+		snprintf(why, WHY_BYTES, "%.200s: %.200s", cfg->sync0_calibration, ls->reason);
 	}
 	return r;
 }
@@ -88,16 +88,16 @@ static int compute(struct listening *ls, const struct config *cfg, FILE *out, ch
 static int listen_to(struct listening *ls, const struct config *cfg,
 		     const volatile sig_atomic_t *has_stopped, FILE *out, char *why)
 {
-	if (lines_count(ls->lines) < 2) {
+	if (gpio_lines_count(ls->lines) < 2) {
 		snprintf(why, WHY_BYTES,
-			 "a calibration wants the same signal on two lines: set "
+			 "calibration requires the same signal on two lines: set "
 			 "slaves[].sync0_line of two slaves");
 		return -EINVAL;
 	}
-	lines_open(ls->lines, on_line, ls);
-	if (!lines_is_open(ls->lines, 0) || !lines_is_open(ls->lines, 1)) {
-		snprintf(why, WHY_BYTES, "%s", ls->said);
-		return lines_error(ls->lines, lines_is_open(ls->lines, 0) ? 1 : 0);
+	gpio_lines_open(ls->lines, on_line, ls);
+	if (!gpio_lines_is_open(ls->lines, 0) || !gpio_lines_is_open(ls->lines, 1)) {
+		snprintf(why, WHY_BYTES, "%s", ls->reason);
+		return gpio_lines_error(ls->lines, gpio_lines_is_open(ls->lines, 0) ? 1 : 0);
 	}
 	collect(ls, has_stopped);
 	if (*has_stopped) {
@@ -108,10 +108,10 @@ static int listen_to(struct listening *ls, const struct config *cfg,
 	return compute(ls, cfg, out, why);
 }
 
-int listen_calibrate(const struct config *cfg, const char *dev_dir,
-		     const volatile sig_atomic_t *has_stopped, FILE *out, char *why)
+int calibrate_live(const struct config *cfg, const char *dev_dir,
+		   const volatile sig_atomic_t *has_stopped, FILE *out, char *why)
 {
-	struct listening ls = { .lines = lines_create(cfg, dev_dir) };
+	struct listening ls = { .lines = gpio_lines_create(cfg, dev_dir) };
 	int r;
 
 	ls.at_ns[0] = calloc(EDGES, sizeof(int64_t));
@@ -127,6 +127,6 @@ int listen_calibrate(const struct config *cfg, const char *dev_dir,
 	}
 	free(ls.at_ns[0]);
 	free(ls.at_ns[1]);
-	lines_destroy(ls.lines);
+	gpio_lines_destroy(ls.lines);
 	return r;
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "sync0/lines.h"
+#include "sync0/gpio_lines.h"
 
 #include <errno.h>
 #include <poll.h>
@@ -16,19 +16,19 @@ struct one_line {
 	uint16_t slave_pos;
 	const char *text;
 	int error;
-	char said[GPIO_WHY_BYTES];
+	char reason[GPIO_WHY_BYTES];
 };
 
-struct lines {
+struct gpio_lines {
 	const struct config *cfg;
 	const char *dev_dir;
 	struct one_line line[LIMIT_SLAVES];
 	size_t count;
 };
 
-struct lines *lines_create(const struct config *cfg, const char *dev_dir)
+struct gpio_lines *gpio_lines_create(const struct config *cfg, const char *dev_dir)
 {
-	struct lines *l = calloc(1, sizeof(*l));
+	struct gpio_lines *l = calloc(1, sizeof(*l));
 
 	if (l == NULL) {
 		return NULL;
@@ -49,7 +49,7 @@ struct lines *lines_create(const struct config *cfg, const char *dev_dir)
 	return l;
 }
 
-void lines_destroy(struct lines *l)
+void gpio_lines_destroy(struct gpio_lines *l)
 {
 	if (l == NULL) {
 		return;
@@ -60,48 +60,49 @@ void lines_destroy(struct lines *l)
 	free(l);
 }
 
-size_t lines_count(const struct lines *l)
+size_t gpio_lines_count(const struct gpio_lines *l)
 {
 	return l->count;
 }
 
-uint16_t lines_slave(const struct lines *l, size_t line)
+uint16_t gpio_lines_slave(const struct gpio_lines *l, size_t line)
 {
 	return l->line[line].slave_pos;
 }
 
-const char *lines_text(const struct lines *l, size_t line)
+const char *gpio_lines_text(const struct gpio_lines *l, size_t line)
 {
 	return l->line[line].text;
 }
 
-int lines_is_open(const struct lines *l, size_t line)
+int gpio_lines_is_open(const struct gpio_lines *l, size_t line)
 {
 	return l->line[line].gpio != NULL;
 }
 
-int lines_error(const struct lines *l, size_t line)
+int gpio_lines_error(const struct gpio_lines *l, size_t line)
 {
 	return l->line[line].error;
 }
 
-int lines_is_hte(const struct lines *l, size_t line)
+int gpio_lines_is_hte(const struct gpio_lines *l, size_t line)
 {
 	return l->line[line].gpio != NULL && gpio_is_hte(l->line[line].gpio);
 }
 
-/* The same reason is not told a second time. */
-static void complain(struct lines *l, size_t number, const char *why, lines_tell tell, void *ctx)
+/* The same reason is reported once. */
+static void report_once(struct gpio_lines *l, size_t number, const char *why,
+			gpio_lines_report report, void *ctx)
 {
 	struct one_line *ol = &l->line[number];
 
-	if (strcmp(ol->said, why) != 0) {
-		memcpy(ol->said, why, strlen(why) + 1);
-		tell(ctx, number, why);
+	if (strcmp(ol->reason, why) != 0) {
+		memcpy(ol->reason, why, strlen(why) + 1);
+		report(ctx, number, why);
 	}
 }
 
-size_t lines_open(struct lines *l, lines_tell tell, void *ctx)
+size_t gpio_lines_open(struct gpio_lines *l, gpio_lines_report report, void *ctx)
 {
 	size_t open = 0;
 
@@ -122,17 +123,17 @@ size_t lines_open(struct lines *l, lines_tell tell, void *ctx)
 		ol->error = gpio_open(&spec, &ol->gpio, why);
 		if (ol->error < 0) {
 			ol->gpio = NULL;
-			complain(l, i, why, tell, ctx);
+			report_once(l, i, why, report, ctx);
 			continue;
 		}
-		ol->said[0] = '\0';
+		ol->reason[0] = '\0';
 		open++;
-		tell(ctx, i, NULL);
+		report(ctx, i, NULL);
 	}
 	return open;
 }
 
-void lines_wait(const struct lines *l, int ms)
+void gpio_lines_wait(const struct gpio_lines *l, int ms)
 {
 	struct pollfd fds[LIMIT_SLAVES];
 	nfds_t n = 0;
@@ -146,7 +147,7 @@ void lines_wait(const struct lines *l, int ms)
 	poll(fds, n, ms);
 }
 
-static int read_line(struct lines *l, size_t number,
+static int read_line(struct gpio_lines *l, size_t number,
 		     void (*take)(void *ctx, const struct edge *edge), void *ctx)
 {
 	struct edge edges[EDGES];
@@ -162,15 +163,15 @@ static int read_line(struct lines *l, size_t number,
 	return n;
 }
 
-void lines_read(struct lines *l, void (*take)(void *ctx, const struct edge *edge), lines_tell tell,
-		void *ctx)
+void gpio_lines_read(struct gpio_lines *l, void (*take)(void *ctx, const struct edge *edge),
+		     gpio_lines_report report, void *ctx)
 {
 	for (size_t i = 0; i < l->count; i++) {
 		if (l->line[i].gpio != NULL && read_line(l, i, take, ctx) < 0) {
 			gpio_close(l->line[i].gpio);
 			l->line[i].gpio = NULL;
 			l->line[i].error = -ENODEV;
-			complain(l, i, "its chip is gone", tell, ctx);
+			report_once(l, i, "its chip is gone", report, ctx);
 		}
 	}
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "sync0/stat.h"
+#include "sync0/statistics.h"
 
 #include <errno.h>
 #include <math.h>
@@ -28,22 +28,22 @@ static int by_real(const void *a, const void *b)
 	return (x > y) - (x < y);
 }
 
-void stat_sort(int64_t *v, size_t count)
+void statistics_sort(int64_t *v, size_t count)
 {
 	qsort(v, count, sizeof(v[0]), by_number);
 }
 
-int64_t stat_percentile(const int64_t *v, size_t count, uint32_t per_million)
+int64_t statistics_percentile(const int64_t *v, size_t count, uint32_t per_million)
 {
 	size_t n = (size_t)((uint64_t)count * per_million / 1000000);
 
 	return count == 0 ? 0 : v[n < count ? n : count - 1];
 }
 
-int64_t stat_median(int64_t *v, size_t count)
+int64_t statistics_median(int64_t *v, size_t count)
 {
-	stat_sort(v, count);
-	return stat_percentile(v, count, 500000);
+	statistics_sort(v, count);
+	return statistics_percentile(v, count, 500000);
 }
 
 static double magnitude(double v)
@@ -80,7 +80,7 @@ static size_t make_blocks(const struct points *p, int64_t *scratch, struct block
 			sum += p->x[i];
 		}
 		block[b].x = sum / (double)(to - from);
-		block[b].y = (double)stat_median(scratch, to - from);
+		block[b].y = (double)statistics_median(scratch, to - from);
 	}
 	return blocks;
 }
@@ -101,12 +101,12 @@ static double slope_of(const struct block *block, size_t blocks)
 	return n == 0 ? 0 : slope[n / 2];
 }
 
-int stat_line(const uint32_t *x, const int64_t *y, size_t count, int64_t *scratch,
-	      struct stat_fit *ret_fit)
+int statistics_line(const uint32_t *x, const int64_t *y, size_t count, int64_t *scratch,
+		    struct statistics_fit *ret_fit)
 {
 	struct block block[BLOCKS_MAX];
 	struct points p = { .x = x, .y = y, .count = count };
-	struct stat_fit fit = { .count = count };
+	struct statistics_fit fit = { .count = count };
 	int64_t middle;
 
 	if (count < POINTS_MIN) {
@@ -120,13 +120,13 @@ int stat_line(const uint32_t *x, const int64_t *y, size_t count, int64_t *scratc
 	for (size_t i = 0; i < count; i++) {
 		scratch[i] = y[i] - llround(fit.slope * ((double)x[i] - fit.centre));
 	}
-	middle = stat_median(scratch, count);
+	middle = statistics_median(scratch, count);
 	fit.offset = (double)middle;
 	for (size_t i = 0; i < count; i++) {
 		scratch[i] = llabs(scratch[i] - middle);
 	}
 	/* Half a nanosecond: what rounding leaves when all are alike. */
-	fit.sigma = MAD_TO_SIGMA * (double)stat_median(scratch, count) + 0.5;
+	fit.sigma = MAD_TO_SIGMA * (double)statistics_median(scratch, count) + 0.5;
 	fit.offset_error = BOUND * MEDIAN_EFFICIENCY * fit.sigma / sqrt((double)count);
 	fit.slope_error =
 		fit.offset_error * sqrt(12.0) / magnitude((double)x[count - 1] - (double)x[0] + 1);
