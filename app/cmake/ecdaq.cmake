@@ -90,11 +90,12 @@ function(ecdaq_targets_below directory variable)
 	set(${variable} ${targets} PARENT_SCOPE)
 endfunction()
 
-# ecdaq_test(GROUP NAME SOURCES a.c [DEPENDS module...] [LIBRARIES lib...] [TIMEOUT s] [LABELS long])
+# ecdaq_test(GROUP NAME SOURCES a.c [DEPENDS module...] [LIBRARIES lib...] [TIMEOUT s] [LABELS long] [WHOLE])
 # An executable GROUP_NAME on tests/harness; every TEST(module, sentence) in its sources becomes
-# one ctest test "module.sentence" with label GROUP. LABELS long: not under the sanitizers.
+# one ctest test "module.sentence" with label GROUP. LABELS long: not under the sanitizers. WHOLE: one
+# more test, whole.GROUP_NAME, runs all of them in one process: none may leave state to the next.
 function(ecdaq_test group name)
-	cmake_parse_arguments(T "" "TIMEOUT" "SOURCES;DEPENDS;LIBRARIES;LABELS" ${ARGN})
+	cmake_parse_arguments(T "WHOLE" "TIMEOUT" "SOURCES;DEPENDS;LIBRARIES;LABELS" ${ARGN})
 	set(exe ${group}_${name})
 	add_executable(${exe} ${T_SOURCES})
 	target_link_libraries(${exe} PRIVATE ecdaq_all_wings ecdaq_harness)
@@ -104,6 +105,11 @@ function(ecdaq_test group name)
 	target_link_libraries(${exe} PRIVATE ${T_LIBRARIES})
 	if(NOT T_TIMEOUT)
 		set(T_TIMEOUT 120)
+	endif()
+	if(T_WHOLE)
+		add_test(NAME whole.${exe} COMMAND ${exe})
+		set_tests_properties(whole.${exe} PROPERTIES LABELS "${group};${T_LABELS}" TIMEOUT ${T_TIMEOUT}
+			SKIP_RETURN_CODE 77)
 	endif()
 	foreach(source ${T_SOURCES})
 		set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${source})

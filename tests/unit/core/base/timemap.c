@@ -116,6 +116,27 @@ TEST(timemap, late_wakes_neither_bend_the_map_nor_make_it_step)
 	timemap_destroy(f.map);
 }
 
+/* Below the limit of a step the map is slewed: at most 2 ms a second, on top of the clocks' rate.
+ */
+TEST(timemap, a_small_error_is_worn_off_no_faster_than_the_slew_limit)
+{
+	for (int sign = -1; sign <= 1; sign += 2) {
+		struct feeder f = feeder_make(TAI_START, 0);
+		struct timemap_state state;
+
+		feed_ms(&f, 12000);
+		f.host_ns += sign * (TIMEMAP_STEP_LIMIT_NS * 9 / 10);
+		for (int i = 0; i < 20; i++) {
+			feed_ms(&f, 250);
+			timemap_get(f.map, &state);
+			CHECK(llabs(state.rate_ppb) <= 3000000);
+		}
+		CHECK_EQ(state.steps, 0);
+		CHECK_EQ(f.back_steps, 0);
+		timemap_destroy(f.map);
+	}
+}
+
 static void step_is_marked(int64_t step_ns)
 {
 	struct feeder f = feeder_make(TAI_START, 0);

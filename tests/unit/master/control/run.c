@@ -2,6 +2,7 @@
 /* The program in its cycles: what it sees, what becomes of what it sets, and of its time. */
 #include <errno.h>
 #include <math.h>
+#include <signal.h>
 
 #include "bench.h"
 
@@ -352,5 +353,35 @@ TEST(control, how_long_it_has_been_inside_can_be_asked_from_outside)
 	bench_run();
 	CHECK_EQ(busy_ns, 77);
 	CHECK_EQ(control_busy_ns(bench.control, (mono_t){ 5000 }), 0);
+	bench_done();
+}
+
+/* The stack of the fault handler is memory of the control program: it goes with it. */
+TEST(control, leaving_gives_the_thread_its_signal_stack_and_mask_back)
+{
+	stack_t before;
+	stack_t inside;
+	stack_t after;
+	sigset_t mask;
+
+	bench_configure();
+	CHECK_EQ(bench_begin(), 0);
+	sigemptyset(&mask);
+	sigaddset(&mask, SIGFPE);
+	CHECK_EQ(pthread_sigmask(SIG_BLOCK, &mask, NULL), 0);
+	CHECK_EQ(sigaltstack(NULL, &before), 0);
+	control_enter(bench.control);
+	CHECK_EQ(sigaltstack(NULL, &inside), 0);
+	CHECK(inside.ss_sp != before.ss_sp && (inside.ss_flags & SS_DISABLE) == 0);
+	CHECK_EQ(pthread_sigmask(SIG_BLOCK, NULL, &mask), 0);
+	CHECK_EQ(sigismember(&mask, SIGFPE), 0);
+	control_leave(bench.control);
+	CHECK_EQ(sigaltstack(NULL, &after), 0);
+	CHECK(after.ss_sp == before.ss_sp && after.ss_flags == before.ss_flags);
+	CHECK_EQ(pthread_sigmask(SIG_BLOCK, NULL, &mask), 0);
+	CHECK_EQ(sigismember(&mask, SIGFPE), 1);
+	sigemptyset(&mask);
+	sigaddset(&mask, SIGFPE);
+	CHECK_EQ(pthread_sigmask(SIG_UNBLOCK, &mask, NULL), 0);
 	bench_done();
 }

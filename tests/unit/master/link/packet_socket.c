@@ -7,6 +7,8 @@
 #include "link/packet_socket.h"
 
 #include <errno.h>
+#include <fcntl.h>
+#include <linux/if_tun.h>
 #include <net/if.h>
 #include <sched.h>
 #include <string.h>
@@ -165,5 +167,61 @@ TEST(packet_socket, frame_longer_than_the_buffer_is_passed_over)
 	CHECK_EQ(transport.receive(transport.ctx, got, sizeof(got),
 				   mono_add(platform.now(NULL), (span_t){ 5 * NS_PER_MS }), NULL),
 		 -EAGAIN);
+	transport.destroy(transport.ctx);
+}
+
+/* A network interface that lives as long as the descriptor. */
+static int make_interface(const char *name)
+{
+	struct ifreq ifr = { .ifr_flags = IFF_TAP | IFF_NO_PI };
+	int tap = open("/dev/net/tun", O_RDWR | O_CLOEXEC);
+	int fd = socket(AF_INET, SOCK_DGRAM, 0);
+
+	snprintf(ifr.ifr_name, sizeof(ifr.ifr_name), "%s", name);
+	if (tap < 0 || ioctl(tap, TUNSETIFF, &ifr) < 0) {
+		SKIP("no TAP interfaces here");
+	}
+	ifr.ifr_flags = IFF_UP;
+	CHECK(fd >= 0);
+	CHECK_EQ(ioctl(fd, SIOCSIFFLAGS, &ifr), 0);
+	close(fd);
+	return tap;
+}
+
+TEST(packet_socket, an_interface_that_is_deleted_and_made_anew_is_used_again)
+{
+	static const char name[] = "ecdaqtest0";
+	struct transport transport;
+	char error[PACKET_ERROR_BYTES];
+	uint8_t frame[ECAT_FRAME_MAX_BYTES];
+	uint8_t got[ECAT_FRAME_MAX_BYTES];
+	size_t len = make_frame(frame, 1);
+	unsigned first;
+	int tap;
+	int r;
+
+	move_to_own_network();
+	tap = make_interface(name);
+	first = if_nametoindex(name);
+	if (packet_socket_open(name, PACKET_WAIT_AUTO, &transport, error, sizeof(error)) ==
+	    -EPERM) {
+		SKIP("raw sockets are not allowed");
+	}
+	CHECK_EQ(transport.is_up(transport.ctx), 1);
+	close(tap);
+	CHECK_EQ(transport.is_up(transport.ctx), 0);
+	tap = make_interface(name);
+	CHECK(if_nametoindex(name) != first);
+	CHECK_EQ(transport.is_up(transport.ctx), 1);
+	CHECK_EQ(transport.is_up(transport.ctx), 1);
+	/* The socket may still hold the error of the deletion; it is reported once. */
+	r = transport.send(transport.ctx, frame, len);
+	CHECK(r == 0 || r == -ENETDOWN);
+	CHECK_EQ(transport.send(transport.ctx, frame, len), 0);
+	/* The kernel's own frames (IPv6) may be first. */
+	do {
+		CHECK(read(tap, got, sizeof(got)) > 0);
+	} while (memcmp(got, frame, len) != 0);
+	close(tap);
 	transport.destroy(transport.ctx);
 }
