@@ -49,3 +49,16 @@ def test_every_page_is_reached_from_the_index() -> None:
             waiting.append((page.parent / link).resolve())
     results = set((DOC / "results").glob("*.md"))  # written by the command that measures
     assert set(DOC.rglob("*.md")) - reached - results == set()
+
+
+def test_tests_named_by_the_pitfalls_page_exist() -> None:
+    page = (DOC / "reference/pitfalls.md").read_text()
+    sources = (ROOT / "tests").rglob("*.c")
+    defined = {
+        f"{suite}.{name}"
+        for path in sources
+        for suite, name in re.findall(r"^TEST\((\w+), (\w+)\)", path.read_text(), re.MULTILINE)
+    }
+    named = [name for name in re.findall(r"`(\w+\.\w+)`", page) if not name.startswith("bus.")]
+    assert len(named) > 30
+    assert [name for name in named if name not in defined and name != "cycle.period"] == []

@@ -4,7 +4,7 @@
  * time received and regulates the local clock. From the data sheet: the registers, their resets,
  * and the rate that a speed counter difference D stands for, D / (5 (S + D + 2) (S - D + 2)) with S
  * = 0x0930. How D follows the difference is not published; ours is a second order loop, critically
- * damped, whose bandwidth goes with the rate of the frames (SPECNOTES, "Time loop control").
+ * damped, whose bandwidth goes with the rate of the frames (simulated-esc.md, "Time loop control").
  */
 #include <math.h>
 
