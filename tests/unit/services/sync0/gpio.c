@@ -207,7 +207,7 @@ TEST(sync0_gpio, a_calibration_that_is_stopped_or_has_no_line_stores_nothing)
 	CHECK_STR(said, "no slave has a line: set slaves[].sync0_line");
 	CHECK_EQ(config_set(&cfg, "slaves[0].sync0_line=pinctrl-test:1", error, sizeof(error)), 0);
 	CHECK_EQ(calibrate_live(&cfg, "/dev", &stopped, stdout, said), -EINVAL);
-	CHECK(strstr(said, "wants the same signal on two lines") != NULL);
+	CHECK(strstr(said, "requires the same signal on two lines") != NULL);
 	CHECK_EQ(config_set(&cfg, "slaves[1].sync0_line=pinctrl-test:2", error, sizeof(error)), 0);
 	snprintf(dev, sizeof(dev), "%s", dev_with(1));
 	CHECK_EQ(calibrate_live(&cfg, dev, &stopped, stdout, said), -EINTR);
