@@ -40,8 +40,8 @@ def test_a_store_is_made_filled_and_looked_at(tmp_path: Path) -> None:
         (["open"], 2, "open: unknown command"),
         (["init", "twice"], 2, "init: takes no argument"),
         (["add-commander"], 2, "add-commander: missing argument"),
-        (["add-commander", "../x"], 2, "../x: a name is 1 to 40 letters"),
-        (["add-subscriber", "alice"], 1, "ecdaq security init makes one"),
+        (["add-commander", "../x"], 2, "../x: invalid name: use 1 to 40 letters"),
+        (["add-subscriber", "alice"], 1, "create one with ecdaq security init"),
         (["init", "--days", "40000"], 2, "--days: at most 36500"),
         (["init", "--dir", "no/where"], 1, "no/where: No such file or directory"),
         (["check", "nobody"], 1, "nobody/key.pem: No such file or directory"),
@@ -62,7 +62,7 @@ def test_the_appliance_s_keys_are_renewed_alone(tmp_path: Path) -> None:
     folder = tmp_path / "security" / "appliance"
     again = security(tmp_path, "add-appliance")
     assert again.returncode == 1
-    assert "security/appliance: is there already; remove it first to renew it" in again.stderr
+    assert "security/appliance: already exists: remove it first to renew it" in again.stderr
     before = (folder / "cert.pem").read_text()
     shutil.rmtree(folder)
     made = security(tmp_path, "add-appliance", "--days", "5")
@@ -79,7 +79,7 @@ def test_a_store_stays_as_it_is(tmp_path: Path) -> None:
     before = (tmp_path / "security/ca/identity_ca.key.pem").read_text()
     again = security(tmp_path, "init")
     assert again.returncode == 1
-    assert "security: holds a store already" in again.stderr
+    assert "security: already contains a key store" in again.stderr
     assert (tmp_path / "security/ca/identity_ca.key.pem").read_text() == before
 
 

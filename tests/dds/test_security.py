@@ -128,14 +128,14 @@ def test_a_subscribers_key_with_a_commanders_claims_is_not_believed(
     (folder / "permissions.p7s").write_bytes((store / "bob" / "permissions.p7s").read_bytes())
     said = security("check", str(folder), check=False)
     assert said.returncode == 1
-    assert "is for CN=bob, the certificate for CN=alice" in said.stderr
+    assert "is for CN=bob, but the certificate is for CN=alice" in said.stderr
 
 
 @pytest.mark.parametrize(
     ("spoil", "reason"),
     [
         (lambda folder: (folder / "key.pem").unlink(), "key.pem: No such file"),
-        (lambda folder: (folder / "key.pem").chmod(0o644), "key.pem: others may use it"),
+        (lambda folder: (folder / "key.pem").chmod(0o644), "key.pem: accessible to others"),
         (
             lambda folder: (folder / "identity_ca.cert.pem").write_bytes(
                 (folder / "permissions_ca.cert.pem").read_bytes()

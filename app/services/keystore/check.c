@@ -15,7 +15,7 @@
 
 enum { VALUE_BYTES = 128 };
 
-/* What was read of a participant's folder. */
+/* The contents of a participant's directory. */
 struct folder {
 	const char *dir;
 	int64_t now_s;
@@ -39,7 +39,7 @@ static int check_mode(const struct folder *f, char *error)
 		return files_fail(error, -errno, "%s: %s", path, strerror(errno));
 	}
 	if ((st.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
-		return files_fail(error, -EPERM, "%s: others may use it (mode %04o): chmod 600",
+		return files_fail(error, -EPERM, "%s: accessible to others (mode %04o): chmod 600",
 				  path, st.st_mode & 07777u);
 	}
 	return 0;
@@ -67,10 +67,10 @@ static int fail_chain(const struct folder *f, int code, char *error)
 
 	switch (code) {
 	case X509_V_ERR_CERT_HAS_EXPIRED:
-		return files_fail(error, -EKEYEXPIRED, "%s/" KEYSTORE_CERT ": has expired; %s",
-				  f->dir, clock);
+		return files_fail(error, -EKEYEXPIRED, "%s/" KEYSTORE_CERT ": expired: %s", f->dir,
+				  clock);
 	case X509_V_ERR_CERT_NOT_YET_VALID:
-		return files_fail(error, -EKEYEXPIRED, "%s/" KEYSTORE_CERT ": is not valid yet; %s",
+		return files_fail(error, -EKEYEXPIRED, "%s/" KEYSTORE_CERT ": not valid yet: %s",
 				  f->dir, clock);
 	case X509_V_ERR_UNABLE_TO_GET_ISSUER_CERT_LOCALLY:
 	case X509_V_ERR_UNABLE_TO_VERIFY_LEAF_SIGNATURE:
@@ -117,23 +117,24 @@ static int check_permissions(const struct folder *f, struct keystore_identity *i
 	int64_t until_s;
 
 	if (strstr(f->governance, "<domain_rule>") == NULL) {
-		return reject(f, KEYSTORE_GOVERNANCE, "has no rule in it", error);
+		return reject(f, KEYSTORE_GOVERNANCE, "contains no domain rule", error);
 	}
 	if (policy_find(f->permissions, "subject_name", subject, sizeof(subject)) < 0 ||
 	    policy_find(f->permissions, "not_before", from, sizeof(from)) < 0 ||
 	    policy_find(f->permissions, "not_after", until, sizeof(until)) < 0 ||
 	    policy_time(from, &from_s) < 0 || policy_time(until, &until_s) < 0) {
-		return reject(f, KEYSTORE_PERMISSIONS, "has no whole grant in it", error);
+		return reject(f, KEYSTORE_PERMISSIONS, "contains no complete grant", error);
 	}
 	if (strcmp(subject, identity->name) != 0) {
 		return files_fail(error, -EKEYREJECTED,
-				  "%s/" KEYSTORE_PERMISSIONS ": is for %s, the certificate for %s",
+				  "%s/" KEYSTORE_PERMISSIONS
+				  ": is for %s, but the certificate is for %s",
 				  f->dir, subject, identity->name);
 	}
 	if (f->now_s < from_s || f->now_s > until_s) {
 		return files_fail(error, -EKEYEXPIRED,
 				  "%s/" KEYSTORE_PERMISSIONS
-				  ": holds from %s to %s; is the clock right?",
+				  ": valid from %s to %s: is the clock right?",
 				  f->dir, from, until);
 	}
 	identity->expires_s = until_s < identity->expires_s ? until_s : identity->expires_s;
@@ -149,7 +150,7 @@ static int check_all(struct folder *f, struct keystore_identity *identity, char 
 	}
 	if (X509_check_private_key(f->own.cert, f->own.key) != 1) {
 		ERR_clear_error();
-		return reject(f, KEYSTORE_KEY, "is not the key of " KEYSTORE_CERT, error);
+		return reject(f, KEYSTORE_KEY, "does not belong to " KEYSTORE_CERT, error);
 	}
 	r = check_chain(f, error);
 	if (r < 0) {

@@ -29,7 +29,7 @@ int files_path(const char *dir, const char *name, char *ret_path, char *error)
 	int len = snprintf(ret_path, FILES_PATH_BYTES, "%s/%s", dir, name);
 
 	return len < 0 || len >= FILES_PATH_BYTES
-		       ? files_fail(error, -ENAMETOOLONG, "%.100s...: the path is too long", dir)
+		       ? files_fail(error, -ENAMETOOLONG, "%.100s...: path too long", dir)
 		       : 0;
 }
 
@@ -38,7 +38,7 @@ int files_make_dir(const char *path, char *error)
 	if (mkdir(path, DIR_MODE) < 0) {
 		return files_fail(error, -errno, "%s: %s", path, strerror(errno));
 	}
-	/* Not what the umask leaves of it. */
+	/* Whatever the umask is. */
 	if (chmod(path, DIR_MODE) < 0) {
 		return files_fail(error, -errno, "%s: %s", path, strerror(errno));
 	}
@@ -78,7 +78,7 @@ int files_write(const char *dir, const char *name, const void *data, size_t byte
 	return r < 0 ? files_fail(error, r, "%s: %s", path, strerror(-r)) : 0;
 }
 
-/* The first @bytes of the file at @path at most. Bytes read, or -errno. */
+/* Read at most @bytes of the file at @path. Returns the bytes read, or -errno. */
 static ssize_t read_start(const char *path, char *data, size_t bytes)
 {
 	int fd = open(path, O_RDONLY | O_CLOEXEC);

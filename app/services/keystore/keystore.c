@@ -13,7 +13,7 @@
 #include "keystore/signed_text.h"
 
 #define DAY_S INT64_C(86400)
-#define CA_DAYS INT64_C(10950) /* 30 years: who loses it has to visit every participant */
+#define CA_DAYS INT64_C(10950) /* 30 years: a new CA means new keys for every participant */
 #define CA_DIR "ca"
 #define APPLIANCE "appliance"
 #define IDENTITY_KEY "identity_ca.key.pem"
@@ -27,7 +27,7 @@ struct store {
 	struct pki_pair permissions;
 };
 
-/* From a day ago: the clocks of those who look at it differ. */
+/* Valid since yesterday: the clocks of the participants differ. */
 static struct pki_validity validity_of(int64_t days)
 {
 	int64_t now_s = (int64_t)time(NULL);
@@ -50,11 +50,12 @@ static int check_name(const char *name, enum keystore_role role, char *error)
 	if (name[0] == '\0' || name[0] == '-' || strlen(name) >= KEYSTORE_NAME_BYTES ||
 	    name[strspn(name, NAME_CHARS)] != '\0') {
 		return files_fail(error, -EINVAL,
-				  "%s: a name is 1 to %d letters, digits, _ and -, no - first",
+				  "%s: invalid name: use 1 to %d letters, digits, _ and -, not "
+				  "starting with -",
 				  name, KEYSTORE_NAME_BYTES - 1);
 	}
 	if (strcmp(name, CA_DIR) == 0 || strcmp(name, APPLIANCE) == 0) {
-		return files_fail(error, -EINVAL, "%s: the name is taken", name);
+		return files_fail(error, -EINVAL, "%s: reserved name", name);
 	}
 	return 0;
 }
@@ -155,9 +156,10 @@ static int open_ca(struct store *store, char *error)
 
 	r = r < 0 ? r : files_path(store->ca_dir, IDENTITY_KEY, key, error);
 	if (r == 0 && access(key, F_OK) < 0 && errno == ENOENT) {
-		return files_fail(error, -ENOENT,
-				  "%s: no store with the CAs' keys (ecdaq security init makes one)",
-				  store->dir);
+		return files_fail(
+			error, -ENOENT,
+			"%s: no key store with its CA keys: create one with ecdaq security init",
+			store->dir);
 	}
 	r = r < 0 ? r : pki_read_key(store->ca_dir, IDENTITY_KEY, &store->identity.key, error);
 	r = r < 0 ? r
@@ -180,7 +182,7 @@ int keystore_init(const char *dir, unsigned days, char *error)
 	}
 	r = make_ca(&store, error);
 	if (r == -EEXIST) {
-		files_fail(error, r, "%s: holds a store already", dir);
+		files_fail(error, r, "%s: already contains a key store", dir);
 	}
 	r = r < 0 ? r : add(&store, APPLIANCE, KEYSTORE_APPLIANCE, days, error);
 	store_close(&store);
@@ -196,7 +198,7 @@ int keystore_add(const char *dir, const char *name, enum keystore_role role, uns
 	r = r < 0 ? r : open_ca(&store, error);
 	r = r < 0 ? r : add(&store, name, role, days, error);
 	if (r == -EEXIST) {
-		files_fail(error, r, "%s/%s: is there already; remove it first to renew it", dir,
+		files_fail(error, r, "%s/%s: already exists: remove it first to renew it", dir,
 			   name);
 	}
 	store_close(&store);

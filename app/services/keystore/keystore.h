@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The keys of DDS Security: a folder with two certificate authorities and one folder for each
- * participant, which holds all that the participant needs and nothing else. File names are those of
+ * The keys of DDS Security: a directory with two certificate authorities and one directory per
+ * participant, which contains what the participant needs and nothing else. File names are those of
  * SROS 2. Context: blocking; start-up and command line only.
  *
- *   ca/            identity_ca.key.pem, permissions_ca.key.pem: whoever has these lets people in
+ *   ca/            identity_ca.key.pem, permissions_ca.key.pem: these admit participants
  *   appliance/     for ecdaq-dds (dds.security)
  *   NAME/          for one subscriber or commander
  *     identity_ca.cert.pem  permissions_ca.cert.pem  governance.p7s
@@ -17,14 +17,14 @@
 #include <stdint.h>
 
 enum keystore_role {
-	KEYSTORE_APPLIANCE,  /* publishes all, takes commands */
+	KEYSTORE_APPLIANCE,  /* publishes, accepts commands */
 	KEYSTORE_SUBSCRIBER, /* reads what is published, writes nothing */
-	KEYSTORE_COMMANDER,  /* and writes commands */
+	KEYSTORE_COMMANDER,  /* a subscriber that writes commands */
 };
 
 enum { KEYSTORE_NAME_BYTES = 41, KEYSTORE_ERROR_BYTES = 512 };
 
-/* Of each participant's folder. */
+/* In each participant's directory. */
 #define KEYSTORE_IDENTITY_CA "identity_ca.cert.pem"
 #define KEYSTORE_PERMISSIONS_CA "permissions_ca.cert.pem"
 #define KEYSTORE_GOVERNANCE "governance.p7s"
@@ -33,29 +33,29 @@ enum { KEYSTORE_NAME_BYTES = 41, KEYSTORE_ERROR_BYTES = 512 };
 #define KEYSTORE_PERMISSIONS "permissions.p7s"
 
 /**
- * Make the store @dir, which must not be there or be empty, with the appliance's folder in it. Keys
- * and certificates of participants hold for @days. 0, or -errno with one line in @error
- * (KEYSTORE_ERROR_BYTES); -EEXIST: there is a store.
+ * Create the store @dir, which must not exist or be empty, with the appliance's directory in it.
+ * Keys and certificates of participants are valid for @days. 0, or -errno with one line in @error
+ * (KEYSTORE_ERROR_BYTES); -EEXIST: a store exists.
  */
 int keystore_init(const char *dir, unsigned days, char *error);
 
 /**
- * Add the participant @name with a folder of its own, which must not be there: to renew one, remove
- * it first. The appliance's name is "appliance". Same errors; -EINVAL: the name is none; -ENOENT:
- * no store in @dir.
+ * Add the participant @name with its directory, which must not exist: to renew a participant,
+ * remove it first. The appliance's name is "appliance". Same errors; -EINVAL: invalid name;
+ * -ENOENT: no store in @dir.
  */
 int keystore_add(const char *dir, const char *name, enum keystore_role role, unsigned days,
 		 char *error);
 
 struct keystore_identity {
 	char name[KEYSTORE_NAME_BYTES + 24]; /* subject of the certificate, "CN=appliance" */
-	int64_t expires_s;                   /* Unix; certificate or permissions, what ends first */
+	int64_t expires_s;                   /* Unix; of certificate and permissions, the earlier */
 };
 
 /**
- * Is the participant's folder @dir whole, does everything in it belong together, is it for our eyes
- * only, and valid at @now_s (Unix)? 0 and @ret_identity; -errno with one line in @error that names
- * the file: -ENOENT, -EACCES, -EPERM others may read the key, -EKEYEXPIRED, -EKEYREJECTED.
+ * Check that the participant's directory @dir is complete and consistent, not accessible to others,
+ * and valid at @now_s (Unix). 0 and @ret_identity; -errno with one line in @error that names the
+ * file: -ENOENT, -EACCES, -EPERM accessible to others, -EKEYEXPIRED, -EKEYREJECTED.
  */
 int keystore_check(const char *dir, int64_t now_s, struct keystore_identity *ret_identity,
 		   char *error);

@@ -19,7 +19,7 @@ struct extension {
 	const char *value;
 };
 
-/* The permissions CA signs documents, too, hence digitalSignature. */
+/* digitalSignature: the permissions CA signs documents as well. */
 static const struct extension of_ca[] = {
 	{ NID_basic_constraints, "critical,CA:TRUE" },
 	{ NID_key_usage, "critical,keyCertSign,cRLSign,digitalSignature" },
@@ -91,7 +91,7 @@ static int add_extensions(X509 *cert, X509 *issuer, const struct extension *all,
 	return 1;
 }
 
-/* @ca NULL: by itself. */
+/* @ca NULL: self-signed. */
 static int issue(struct pki_pair *pair, const char *name, const struct pki_pair *ca,
 		 struct pki_validity validity)
 {
@@ -168,7 +168,7 @@ int pki_write_key(EVP_PKEY *key, const char *dir, const char *name, char *error)
 			 dir, name, error);
 }
 
-/* Nobody is asked for a pass phrase: a key that wants one is refused. */
+/* Keys with a passphrase are rejected: there is nobody to ask for it. */
 /* NOLINTNEXTLINE(readability-non-const-parameter): libcrypto's type of it */
 static int no_passphrase(char *buf, int size, int is_writing, void *arg)
 {
@@ -223,7 +223,7 @@ int pki_read_key(const char *dir, const char *name, EVP_PKEY **ret_key, char *er
 	ERR_clear_error();
 	if (r == 0 && key == NULL) {
 		r = files_fail(error, -EKEYREJECTED,
-			       "%s/%s: not a private key, or one with a pass phrase", dir, name);
+			       "%s/%s: not a private key, or protected by a passphrase", dir, name);
 	}
 	if (r == 0) {
 		*ret_key = key;

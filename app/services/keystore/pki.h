@@ -12,7 +12,7 @@ struct pki_validity {
 	int64_t not_after_s;
 };
 
-/* A certificate with its private key; @key NULL where that is not known. */
+/* A certificate with its private key; @key NULL if it is not known. */
 struct pki_pair {
 	EVP_PKEY *key;
 	X509 *cert;
@@ -20,9 +20,9 @@ struct pki_pair {
 
 void pki_free(struct pki_pair *pair);
 
-/** A new key (EC, P-256) with a certificate of its own for CN=@name, that may sign others. */
+/** Generate a key (EC, P-256) with a self-signed CA certificate for CN=@name. */
 int pki_make_ca(const char *name, struct pki_validity validity, struct pki_pair *ret, char *error);
-/** A new key with a certificate for CN=@name, issued by @ca. */
+/** Generate a key with a certificate for CN=@name, issued by @ca. */
 int pki_make(const char *name, const struct pki_pair *ca, struct pki_validity validity,
 	     struct pki_pair *ret, char *error);
 

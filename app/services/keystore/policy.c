@@ -12,7 +12,7 @@
 
 enum { TIME_BYTES = 32 };
 
-/* Highest domain of Cyclone DDS with its standard ports. */
+/* Highest domain of Cyclone DDS with the default ports. */
 #define DOMAINS "<domains><id_range><min>0</min><max>230</max></id_range></domains>"
 #define SCHEMA                                                                                     \
 	"xmlns:xsi=\"http://www.w3.org/2001/XMLSchema-instance\" "                                 \

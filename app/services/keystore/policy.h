@@ -17,9 +17,9 @@ struct policy_grant {
 	int64_t not_after_s;
 };
 
-/** Rules for everybody: known participants only, everything encrypted. Returns its length. */
+/** The governance: authenticated participants only, everything encrypted. Returns its length. */
 size_t policy_governance(char *ret_text);
-/** What one participant may do; all else is denied. Returns its length. */
+/** The permissions of one participant; default deny. Returns their length. */
 size_t policy_permissions(const struct policy_grant *grant, char *ret_text);
 
 /** The text between <@tag> and </@tag>, first one. 0, or -ENOENT. */

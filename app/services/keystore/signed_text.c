@@ -24,7 +24,7 @@ int signed_text_write(const char *text, size_t text_len, const struct pki_pair *
 
 	if (out == NULL || signature == NULL || SMIME_write_PKCS7(out, signature, in, flags) != 1) {
 		ERR_clear_error();
-		r = files_fail(error, -EIO, "%s: cannot be signed", name);
+		r = files_fail(error, -EIO, "%s: cannot sign", name);
 	} else {
 		long bytes = BIO_get_mem_data(out, &data);
 
@@ -36,7 +36,7 @@ int signed_text_write(const char *text, size_t text_len, const struct pki_pair *
 	return r;
 }
 
-/* @data has no zero behind it, which strndup() wants under a strict sanitizer. NULL: no memory. */
+/* Not strndup(): @data is not terminated, which strict sanitizers report. NULL: no memory. */
 static char *copy_text(const char *data, size_t bytes)
 {
 	char *text = malloc(bytes + 1);
@@ -48,7 +48,7 @@ static char *copy_text(const char *data, size_t bytes)
 	return text;
 }
 
-/* The text, if @ca signed it; NULL. The CA's own validity is not looked at here. */
+/* The text if @ca signed it, else NULL. The CA's own period of validity is not checked. */
 static char *verify(PKCS7 *signature, BIO *content, X509 *ca)
 {
 	X509_STORE *store = X509_STORE_new();
@@ -91,7 +91,7 @@ int signed_text_read(const char *dir, const char *name, X509 *ca, char **ret_tex
 		r = files_fail(error, -EKEYREJECTED, "%s/%s: not a signed document", dir, name);
 	} else if (text == NULL) {
 		r = files_fail(error, -EKEYREJECTED,
-			       "%s/%s: was changed, or not signed by " KEYSTORE_PERMISSIONS_CA, dir,
+			       "%s/%s: modified, or not signed by " KEYSTORE_PERMISSIONS_CA, dir,
 			       name);
 	} else {
 		*ret_text = text;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Documents signed by S/MIME, as DDS Security 1.1, clause 9.4.1 wants them. Context: blocking. */
+/* Documents signed with S/MIME as DDS Security 1.1, clause 9.4.1 requires. Context: blocking. */
 #ifndef KEYSTORE_SIGNED_TEXT_H
 #define KEYSTORE_SIGNED_TEXT_H
 
@@ -11,8 +11,8 @@
 int signed_text_write(const char *text, size_t text_len, const struct pki_pair *ca, const char *dir,
 		      const char *name, char *error);
 /**
- * The text of @dir/@name if @ca signed it. 0; -EKEYREJECTED it did not, or -errno, with @error.
- * Free *@ret_text.
+ * The text of @dir/@name if @ca signed it. 0; -EKEYREJECTED: not signed by @ca; -errno; with
+ * @error. Free *@ret_text.
  */
 int signed_text_read(const char *dir, const char *name, X509 *ca, char **ret_text, char *error);
 

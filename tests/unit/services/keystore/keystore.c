@@ -84,7 +84,7 @@ static void mix(const struct bench *b, const char *from, const char *to)
 	CHECK_EQ(fclose(out), 0);
 }
 
-TEST(keystore, every_participant_has_a_whole_folder_that_is_for_its_eyes_only)
+TEST(keystore, every_participant_gets_a_complete_directory_that_only_its_owner_can_access)
 {
 	static const char *const names[] = { "appliance", "alice", "bob" };
 	static const char *const files[] = { KEYSTORE_IDENTITY_CA, KEYSTORE_PERMISSIONS_CA,
@@ -118,22 +118,22 @@ TEST(keystore, every_participant_has_a_whole_folder_that_is_for_its_eyes_only)
 	bench_close(&b);
 }
 
-TEST(keystore, a_store_or_a_participant_is_made_once)
+TEST(keystore, an_existing_store_or_participant_is_not_overwritten)
 {
 	struct bench b;
 
 	bench_open(&b);
 	CHECK_EQ(keystore_init(b.store, 100, b.error), -EEXIST);
-	CHECK(strstr(b.error, "holds a store already") != NULL);
+	CHECK(strstr(b.error, "already contains a key store") != NULL);
 	CHECK_EQ(keystore_add(b.store, "alice", KEYSTORE_SUBSCRIBER, 10, b.error), 0);
 	CHECK_EQ(keystore_add(b.store, "alice", KEYSTORE_COMMANDER, 10, b.error), -EEXIST);
-	CHECK(strstr(b.error, "is there already") != NULL);
+	CHECK(strstr(b.error, "already exists") != NULL);
 	CHECK_EQ(keystore_add(b.top, "alice", KEYSTORE_COMMANDER, 10, b.error), -ENOENT);
-	CHECK(strstr(b.error, "ecdaq security init makes one") != NULL);
+	CHECK(strstr(b.error, "create one with ecdaq security init") != NULL);
 	bench_close(&b);
 }
 
-TEST(keystore, a_name_is_a_word_and_not_taken)
+TEST(keystore, names_that_are_invalid_or_reserved_are_rejected)
 {
 	static const char *const wrong[] = {
 		"",
@@ -158,7 +158,7 @@ TEST(keystore, a_name_is_a_word_and_not_taken)
 	bench_close(&b);
 }
 
-TEST(keystore, what_has_expired_or_is_not_yet_valid_is_said_and_the_clock_doubted)
+TEST(keystore, expired_and_not_yet_valid_certificates_are_rejected_with_a_hint_at_the_clock)
 {
 	int64_t now_s = (int64_t)time(NULL);
 	struct bench b;
@@ -166,13 +166,13 @@ TEST(keystore, what_has_expired_or_is_not_yet_valid_is_said_and_the_clock_doubte
 	bench_open(&b);
 	CHECK_EQ(check_at(&b, "appliance", now_s + 99 * DAY_S), 0);
 	CHECK_EQ(check_at(&b, "appliance", now_s + 101 * DAY_S), -EKEYEXPIRED);
-	CHECK(strstr(b.error, "cert.pem: has expired; is the clock right?") != NULL);
+	CHECK(strstr(b.error, "cert.pem: expired: is the clock right?") != NULL);
 	CHECK_EQ(check_at(&b, "appliance", 0), -EKEYEXPIRED); /* a clock that was never set */
-	CHECK(strstr(b.error, "cert.pem: is not valid yet; is the clock right?") != NULL);
+	CHECK(strstr(b.error, "cert.pem: not valid yet: is the clock right?") != NULL);
 	bench_close(&b);
 }
 
-TEST(keystore, what_does_not_belong_together_is_found_by_its_file)
+TEST(keystore, files_that_do_not_belong_together_are_rejected_by_name)
 {
 	static const struct {
 		const char *from;
@@ -181,13 +181,13 @@ TEST(keystore, what_does_not_belong_together_is_found_by_its_file)
 		const char *said;
 	} cases[] = {
 		{ "bob/key.pem", "alice/key.pem", -EKEYREJECTED,
-		  "key.pem: is not the key of cert.pem" },
+		  "key.pem: does not belong to cert.pem" },
 		{ "bob/permissions.p7s", "alice/permissions.p7s", -EKEYREJECTED,
-		  "permissions.p7s: is for CN=bob, the certificate for CN=alice" },
+		  "permissions.p7s: is for CN=bob, but the certificate is for CN=alice" },
 		{ "ca/permissions_ca.cert.pem", "alice/identity_ca.cert.pem", -EKEYREJECTED,
 		  "cert.pem: not issued by identity_ca.cert.pem" },
 		{ "ca/identity_ca.cert.pem", "alice/permissions_ca.cert.pem", -EKEYREJECTED,
-		  "governance.p7s: was changed, or not signed by permissions_ca.cert.pem" },
+		  "governance.p7s: modified, or not signed by permissions_ca.cert.pem" },
 		{ "alice/cert.pem", "alice/governance.p7s", -EKEYREJECTED,
 		  "governance.p7s: not a signed document" },
 		{ "alice/governance.p7s", "alice/cert.pem", -EKEYREJECTED,
@@ -210,7 +210,7 @@ TEST(keystore, what_does_not_belong_together_is_found_by_its_file)
 	}
 }
 
-TEST(keystore, a_changed_permission_is_not_taken)
+TEST(keystore, modified_permissions_are_rejected)
 {
 	struct bench b;
 	char data[8192] = "";
@@ -230,18 +230,18 @@ TEST(keystore, a_changed_permission_is_not_taken)
 	CHECK_EQ(fwrite(data, 1, bytes, file), bytes);
 	fclose(file);
 	CHECK_EQ(check(&b, "alice"), -EKEYREJECTED);
-	CHECK(strstr(b.error, "permissions.p7s: was changed") != NULL);
+	CHECK(strstr(b.error, "permissions.p7s: modified") != NULL);
 	bench_close(&b);
 }
 
-TEST(keystore, a_key_that_others_may_use_or_that_is_missing_is_refused)
+TEST(keystore, a_missing_key_or_one_accessible_to_others_is_rejected)
 {
 	struct bench b;
 
 	bench_open(&b);
 	CHECK_EQ(chmod(path_of(&b, "appliance/key.pem"), 0640), 0);
 	CHECK_EQ(check(&b, "appliance"), -EPERM);
-	CHECK(strstr(b.error, "others may use it (mode 0640): chmod 600") != NULL);
+	CHECK(strstr(b.error, "accessible to others (mode 0640): chmod 600") != NULL);
 	CHECK_EQ(unlink(path_of(&b, "appliance/key.pem")), 0);
 	CHECK_EQ(check(&b, "appliance"), -ENOENT);
 	CHECK(strstr(b.error, "appliance/key.pem: No such file") != NULL);
@@ -249,7 +249,7 @@ TEST(keystore, a_key_that_others_may_use_or_that_is_missing_is_refused)
 	bench_close(&b);
 }
 
-TEST(policy, only_a_commander_may_write_commands_and_read_answers)
+TEST(policy, only_a_commander_may_write_commands_and_read_replies)
 {
 	struct policy_grant grant = { .name = "x", .not_before_s = 0, .not_after_s = 86400 };
 	char text[POLICY_TEXT_BYTES];
@@ -268,7 +268,7 @@ TEST(policy, only_a_commander_may_write_commands_and_read_answers)
 	CHECK(strstr(text, "ecdaq/reply") > strstr(text, "<subscribe>"));
 }
 
-TEST(policy, times_are_read_as_they_are_written)
+TEST(policy, times_are_parsed_in_the_format_they_are_written_in)
 {
 	int64_t s = 5;
 
