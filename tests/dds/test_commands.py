@@ -150,7 +150,7 @@ def test_commands_are_off_unless_allowed(make_bench: Callable[..., Bench]) -> No
     bench.start_all()
     answer = bench.commander().command({LED: 1})
     assert not answer["accepted"]
-    assert "commands are off" in answer["reason"]
+    assert "commands are disabled" in answer["reason"]
 
 
 @pytest.mark.parametrize(
@@ -184,4 +184,4 @@ def test_publisher_refuses_the_nic_that_the_running_master_has(
         "--set", "dds.enable=on", "--set", "dds.interface=ecat0", check=False,
     )  # fmt: skip
     assert ended.returncode == 3
-    assert "ecat0 is the EtherCAT segment's" in ended.stderr
+    assert "ecat0: in use for the EtherCAT segment" in ended.stderr

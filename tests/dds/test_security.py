@@ -77,7 +77,7 @@ def test_only_who_has_a_key_hears_and_only_a_commanders_key_commands(
 ) -> None:
     bench = make_bench(**SECURED, **{"dds.security": str(store / "appliance")})
     check_sync0(bench)
-    assert "DDS Security as CN=appliance, until 20" in bench.segment.log("dds")
+    assert "DDS Security: CN=appliance, valid until 20" in bench.segment.log("dds")
     assert "do not allow" not in bench.segment.log("dds")
 
     friends = {

@@ -96,33 +96,35 @@ int domain_find_plugins(const char *library, char *ret_dir, size_t dir_bytes)
 	return r;
 }
 
-int domain_check_security(const struct config *cfg, char *said, char *error, size_t error_bytes)
+int domain_check_security(const struct config *cfg, char *ret_identity, char *error,
+			  size_t error_bytes)
 {
 	struct keystore_identity identity;
-	char why[KEYSTORE_ERROR_BYTES];
+	char reason[KEYSTORE_ERROR_BYTES];
 	char until[16];
 	struct tm parts;
 	time_t expires;
 
-	said[0] = '\0';
+	ret_identity[0] = '\0';
 	if (!domain_is_secure(cfg)) {
 		return 0;
 	}
-	if (keystore_check(cfg->dds_security, (int64_t)time(NULL), &identity, why) < 0) {
-		snprintf(error, error_bytes, "dds.security: %s", why);
+	if (keystore_check(cfg->dds_security, (int64_t)time(NULL), &identity, reason) < 0) {
+		snprintf(error, error_bytes, "dds.security: %s", reason);
 		return -EKEYREJECTED;
 	}
 	expires = (time_t)identity.expires_s;
 	gmtime_r(&expires, &parts);
 	strftime(until, sizeof(until), "%Y-%m-%d", &parts);
-	snprintf(said, DOMAIN_SAID_BYTES, "DDS Security as %s, until %s", identity.name, until);
+	snprintf(ret_identity, DOMAIN_IDENTITY_BYTES, "DDS Security: %s, valid until %s",
+		 identity.name, until);
 	return 0;
 }
 
 int domain_xml(const struct config *cfg, const char *plugins, char *ret_xml, size_t xml_bytes)
 {
 	struct text text = { .at = ret_xml, .left = xml_bytes };
-	/* Linux' lo does not multicast: participants there find each other by address. */
+	/* No multicast on Linux' lo: participants there discover each other by address. */
 	int is_loopback = strcmp(cfg->dds_interface, "lo") == 0;
 	int has_multicast = cfg->dds_multicast && !is_loopback;
 
@@ -131,7 +133,7 @@ int domain_xml(const struct config *cfg, const char *plugins, char *ret_xml, siz
 	    cfg->dds_interface);
 	add(&text, "</Interfaces><AllowMulticast>%s</AllowMulticast></General><Discovery>",
 	    has_multicast ? "true" : "false");
-	/* With the default index (none) nobody could be found by address alone. */
+	/* With the default index (none) unicast discovery does not work. */
 	add(&text, "<ParticipantIndex>auto</ParticipantIndex>");
 	add(&text, "<MaxAutoParticipantIndex>99</MaxAutoParticipantIndex>");
 	if (cfg->dds_tag[0] != '\0') {
@@ -155,7 +157,7 @@ int domain_check_interface(const struct config *cfg, const char *ethercat, char 
 {
 	if (strcmp(cfg->dds_interface, ethercat) == 0 ||
 	    strcmp(cfg->dds_interface, cfg->interface) == 0) {
-		snprintf(error, error_bytes, "dds.interface: %s is the EtherCAT segment's",
+		snprintf(error, error_bytes, "dds.interface: %s: in use for the EtherCAT segment",
 			 cfg->dds_interface);
 		return -EINVAL;
 	}

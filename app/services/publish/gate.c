@@ -17,8 +17,8 @@ struct commander {
 	uint64_t sender; /* 0: free */
 	uint64_t last_id;
 	int has_id;
-	int is_gone;   /* its place may be given to another */
-	double tokens; /* commands it may send now */
+	int is_gone;   /* its entry may be reused */
+	double tokens; /* token bucket: commands allowed now */
 	int64_t refilled_ns;
 };
 
@@ -131,8 +131,8 @@ uint64_t gate_setter(const struct gate *gate, unsigned output)
 	return gate->setter[output];
 }
 
-/* A bucket of one second's worth. */
-static int is_too_often(struct commander *c, uint32_t rate, int64_t now_ns)
+/* Token bucket of one second of @rate. */
+static int exceeds_rate(struct commander *c, uint32_t rate, int64_t now_ns)
 {
 	c->tokens += (double)(now_ns - c->refilled_ns) * rate / 1e9;
 	c->refilled_ns = now_ns;
@@ -150,7 +150,8 @@ static int check_order(struct commander *c, const struct gate_command *cmd,
 		       const struct gate_view *view, char *reason)
 {
 	if (c->has_id && cmd->id == c->last_id) {
-		return refuse(reason, -EALREADY, "id %" PRIu64 " came before: doubled", cmd->id);
+		return refuse(reason, -EALREADY, "id %" PRIu64 " was used before: duplicate",
+			      cmd->id);
 	}
 	if (c->has_id && cmd->id < c->last_id) {
 		return refuse(reason, -ESTALE, "id %" PRIu64 " is older than %" PRIu64 ": stale",
@@ -159,12 +160,12 @@ static int check_order(struct commander *c, const struct gate_command *cmd,
 	c->has_id = 1;
 	c->last_id = cmd->id;
 	if (cmd->session != 0 && cmd->session != view->table->meta.session) {
-		return refuse(reason, -ESTALE, "meant for session %" PRIu64 ", not for this: stale",
-			      cmd->session);
+		return refuse(reason, -ESTALE,
+			      "for session %" PRIu64 ", not the current one: stale", cmd->session);
 	}
 	if (cmd->not_after_cycle != 0 && view->cycle >= cmd->not_after_cycle) {
 		return refuse(reason, -ESTALE,
-			      "not after cycle %" PRIu64 ", it is %" PRIu64 ": stale",
+			      "not after cycle %" PRIu64 ", now %" PRIu64 ": stale",
 			      cmd->not_after_cycle, view->cycle);
 	}
 	return 0;
@@ -204,7 +205,7 @@ static int check_item(const struct gate *gate, const struct gate_command *cmd, u
 static int check_shape(const struct gate_command *cmd, char *reason)
 {
 	if (cmd->count == 0 || cmd->count > GATE_ITEMS) {
-		return refuse(reason, -EINVAL, "%u channels in one command: 1 to %d are taken",
+		return refuse(reason, -EINVAL, "%u channels in one command: expected 1 to %d",
 			      cmd->count, GATE_ITEMS);
 	}
 	if ((cmd->is_raw ? cmd->raw_count : cmd->value_count) != cmd->count) {
@@ -214,11 +215,11 @@ static int check_shape(const struct gate_command *cmd, char *reason)
 	}
 	for (uint32_t i = 0; i < cmd->count; i++) {
 		if (cmd->channel[i] == NULL) {
-			return refuse(reason, -EINVAL, "a channel without a name");
+			return refuse(reason, -EINVAL, "channel without a name");
 		}
 		for (uint32_t j = 0; j < i; j++) {
 			if (strcmp(cmd->channel[i], cmd->channel[j]) == 0) {
-				return refuse(reason, -EINVAL, "%.*s: twice in one command",
+				return refuse(reason, -EINVAL, "%.*s: listed twice",
 					      GATE_NAME_BYTES, cmd->channel[i]);
 			}
 		}
@@ -235,14 +236,15 @@ int gate_check(struct gate *gate, const struct gate_command *cmd, const struct g
 	if (!domain_takes_commands(gate->cfg)) {
 		return refuse(
 			reason, -EPERM,
-			"commands are off without DDS Security (dds.allow_insecure_commands)");
+			"commands are disabled without DDS Security (dds.allow_insecure_commands)");
 	}
 	commander = admit(gate, cmd->sender, view->now_ns);
 	if (commander == NULL) {
 		return refuse(reason, -EUSERS, "more than %d commanders", GATE_COMMANDERS);
 	}
-	if (is_too_often(commander, gate->cfg->dds_command_rate, view->now_ns)) {
-		return refuse(reason, -EAGAIN, "more than %u commands a second (dds.command_rate)",
+	if (exceeds_rate(commander, gate->cfg->dds_command_rate, view->now_ns)) {
+		return refuse(reason, -EAGAIN,
+			      "more than %u commands per second (dds.command_rate)",
 			      gate->cfg->dds_command_rate);
 	}
 	r = check_shape(cmd, reason);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Which commands may pass to the board. Knows nothing of DDS: who sent a command is a number that
- * the transport vouches for. Context: any but the cycle.
+ * Checks which commands may go to the board. Independent of DDS: the sender of a command is a
+ * number that the transport guarantees. Context: any but the cycle.
  */
 #ifndef PUBLISH_GATE_H
 #define PUBLISH_GATE_H
@@ -16,7 +16,7 @@
 enum { GATE_COMMANDERS = 32, GATE_ITEMS = 64, GATE_NAME_BYTES = 64, GATE_REASON_BYTES = 200 };
 
 struct gate_command {
-	uint64_t sender; /* of the transport, not of the command's text */
+	uint64_t sender; /* from the transport, not from the command's text */
 	uint64_t id;
 	uint64_t session;
 	uint64_t not_after_cycle;
@@ -29,7 +29,7 @@ struct gate_command {
 	const uint64_t *raw;
 };
 
-/* How the master is at this moment. */
+/* State of the master now. */
 struct gate_view {
 	const struct channel_table *table; /* NULL: no master */
 	int is_op;
@@ -37,7 +37,7 @@ struct gate_view {
 	int64_t now_ns; /* CLOCK_MONOTONIC */
 };
 
-/* A value on its way: the n-th output channel (base/board.h) and what goes into the image. */
+/* A checked value: index of the output channel (base/board.h) and its bits in the image. */
 struct gate_item {
 	unsigned output;
 	uint64_t raw;
@@ -50,27 +50,27 @@ struct gate *gate_create(const struct config *cfg);
 void gate_destroy(struct gate *gate);
 
 /**
- * May @cmd pass? 0 and @ret_items (GATE_ITEMS, @cmd->count of them); or -errno with the reason in
- * one line, @ret_items then being of no use: -EPERM not allowed or not owner, -EINVAL malformed,
- * -ENOENT no such output, -ERANGE value, -EALREADY doubled, -ESTALE stale, -EAGAIN too often or bus
- * not in OP, -EUSERS too many commanders.
+ * Check @cmd. 0 and @ret_items (GATE_ITEMS, @cmd->count of them); or -errno with the reason in one
+ * line in @reason (GATE_REASON_BYTES), @ret_items undefined: -EPERM not allowed, an input or not
+ * owner, -EINVAL malformed, -ENOENT no such channel, -ERANGE value, -EALREADY duplicate, -ESTALE
+ * stale, -EAGAIN rate exceeded or bus not in OP, -EUSERS too many commanders.
  */
 int gate_check(struct gate *gate, const struct gate_command *cmd, const struct gate_view *view,
 	       struct gate_item *ret_items, char *reason);
 
 /**
- * @sender is not heard of: it owns nothing any more. Its ids are remembered (it may be heard of
- * again, and an old command must not pass then) until its place is needed for another.
+ * @sender is lost: it owns no outputs any more. Its ids are remembered (it may come back, and an
+ * old command must not pass then) until its entry is needed for another commander.
  */
 void gate_remove(struct gate *gate, uint64_t sender);
 
-/** Who last set @output (0: nobody), and whether a lost owner leaves it fail-safe (has a time-out).
- */
+/** Who last set @output (0: nobody), and whether it goes fail-safe when that commander is lost. */
 void gate_note_set(struct gate *gate, unsigned output, uint64_t sender);
 uint64_t gate_setter(const struct gate *gate, unsigned output);
 int gate_has_timeout(const struct channel_table *table, const struct config *cfg, unsigned output);
 
-/** Longest liveliness lease a commander may have: half the shortest time-out, 20 ms to 1 s. */
+/** Longest liveliness lease a commander may have: half the shortest timeout of an output, 20 ms to
+ * 1 s. */
 int64_t gate_lease_ns(const struct config *cfg);
 
 #endif

@@ -122,7 +122,7 @@ int publisher_create(const struct config *cfg, struct publisher **ret_publisher,
 		     size_t error_bytes)
 {
 	struct publisher *p = calloc(1, sizeof(*p));
-	char said[DOMAIN_SAID_BYTES];
+	char identity[DOMAIN_IDENTITY_BYTES];
 	int r;
 
 	snprintf(error, error_bytes, "%s", strerror(ENOMEM));
@@ -138,15 +138,15 @@ int publisher_create(const struct config *cfg, struct publisher **ret_publisher,
 		look_at_page(p);
 		r = check_interface(p, error, error_bytes);
 	}
-	r = r < 0 ? r : domain_check_security(cfg, said, error, error_bytes);
+	r = r < 0 ? r : domain_check_security(cfg, identity, error, error_bytes);
 	r = r < 0 ? r : commands_create(cfg, &p->commands);
 	r = r < 0 ? r : open_topics(p, error, error_bytes);
 	if (r < 0) {
 		publisher_destroy(p);
 		return r;
 	}
-	if (said[0] != '\0') {
-		fprintf(stderr, "ecdaq-dds: %s\n", said);
+	if (identity[0] != '\0') {
+		fprintf(stderr, "ecdaq-dds: %s\n", identity);
 	}
 	*ret_publisher = p;
 	return 0;

@@ -14,7 +14,7 @@ void remote_board_init(struct remote_board *rb)
 	*rb = (struct remote_board){ .socket = -1 };
 }
 
-static int ask(struct remote_board *rb)
+static int request(struct remote_board *rb)
 {
 	struct sockaddr_un address = { .sun_family = AF_UNIX };
 
@@ -35,7 +35,7 @@ static int ask(struct remote_board *rb)
 	return 0;
 }
 
-/* The descriptor that came with @message; -1: none. */
+/* The descriptor received with @message; -1: none. */
 static int descriptor_of(struct msghdr *message)
 {
 	int fd = -1;
@@ -92,7 +92,7 @@ int remote_board_follow(struct remote_board *rb)
 	if (stat(rb->path, &st) < 0) {
 		return -errno;
 	}
-	/* An inode's number may be used again at once. */
+	/* Inode numbers may be reused at once. */
 	if (rb->inode != st.st_ino || rb->made.tv_sec != st.st_ctim.tv_sec ||
 	    rb->made.tv_nsec != st.st_ctim.tv_nsec) {
 		remote_board_close(rb);
@@ -100,7 +100,7 @@ int remote_board_follow(struct remote_board *rb)
 	if (rb->board != NULL) {
 		return 0;
 	}
-	r = rb->socket < 0 ? ask(rb) : 0;
+	r = rb->socket < 0 ? request(rb) : 0;
 	rb->inode = st.st_ino;
 	rb->made = st.st_ctim;
 	return r < 0 ? r : receive(rb);

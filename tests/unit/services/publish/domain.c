@@ -48,7 +48,7 @@ TEST(publish_domain, nic_of_the_segment_and_unknown_ones_are_refused)
 	char error[128];
 
 	CHECK_EQ(domain_check_interface(with("lo", ""), "lo", error, sizeof(error)), -EINVAL);
-	CHECK_STR(error, "dds.interface: lo is the EtherCAT segment's");
+	CHECK_STR(error, "dds.interface: lo: in use for the EtherCAT segment");
 	CHECK_EQ(domain_check_interface(with("nowhere0", ""), "", error, sizeof(error)), -ENODEV);
 	CHECK_EQ(domain_check_interface(with("lo", ""), "eth7", error, sizeof(error)), 0);
 }
@@ -97,7 +97,7 @@ TEST(publish_domain, the_plug_ins_are_found_beside_the_library_or_in_their_own_f
 TEST(publish_domain, keys_that_are_not_there_are_one_line_and_none_are_no_trouble)
 {
 	struct config *cfg = with("eth1", "");
-	char said[DOMAIN_SAID_BYTES] = "x";
+	char said[DOMAIN_IDENTITY_BYTES] = "x";
 	char error[256] = "";
 
 	CHECK_EQ(domain_check_security(cfg, said, error, sizeof(error)), 0);

@@ -196,7 +196,7 @@ TEST(publish_gate, malformed_commands_are_refused)
 	cmd.count = 2;
 	cmd.value_count = 2;
 	CHECK_EQ(gate_check(s->gate, &cmd, &s->view, s->item, s->reason), -EINVAL);
-	CHECK_STR(s->reason, "s.led: twice in one command");
+	CHECK_STR(s->reason, "s.led: listed twice");
 }
 
 TEST(publish_gate, rate_of_commands_is_limited)
