@@ -14,9 +14,7 @@
 #include "record/names.h"
 
 struct layout {
-	struct sample_meta meta;
-	struct slave_info *slave;
-	struct channel *channel;
+	const struct channel_table *table;
 	struct layout_topic topic[LIMIT_SLAVES];
 	size_t topic_count;
 	struct layout_field *field; /* one a channel, grouped by topic */
@@ -32,42 +30,6 @@ static const struct {
   int_types[] = {
 	  { "int8", "int8" }, { "int16", "short" }, { "int32", "long" }, { "int64", "long long" }
   };
-
-static int is_sound(const struct sample_meta *meta, size_t meta_bytes)
-{
-	return meta->version == SAMPLE_VERSION && meta->slave_count <= LIMIT_SLAVES &&
-	       meta->channel_count <= LIMIT_CHANNELS && meta->image_bytes <= LIMIT_IMAGE_BYTES &&
-	       meta->output_bytes <= meta->image_bytes && meta->period_ns > 0 &&
-	       sizeof(*meta) + meta->slave_count * sizeof(struct slave_info) +
-			       meta->channel_count * sizeof(struct channel) <=
-		       meta_bytes;
-}
-
-static int copy_tables(struct layout *l, const uint8_t *tables)
-{
-	size_t slaves_len = l->meta.slave_count * sizeof(struct slave_info);
-
-	l->slave = calloc(l->meta.slave_count + 1u, sizeof(l->slave[0]));
-	l->channel = calloc(l->meta.channel_count + 1u, sizeof(l->channel[0]));
-	l->field = calloc(l->meta.channel_count + 1u, sizeof(l->field[0]));
-	if (l->slave == NULL || l->channel == NULL || l->field == NULL) {
-		return -ENOMEM;
-	}
-	memcpy(l->slave, tables, slaves_len);
-	memcpy(l->channel, tables + slaves_len, l->meta.channel_count * sizeof(struct channel));
-	for (uint32_t i = 0; i < l->meta.slave_count; i++) {
-		l->slave[i].name[sizeof(l->slave[i].name) - 1] = '\0';
-		l->slave[i].device[sizeof(l->slave[i].device) - 1] = '\0';
-	}
-	for (uint32_t i = 0; i < l->meta.channel_count; i++) {
-		l->channel[i].name[sizeof(l->channel[i].name) - 1] = '\0';
-		l->channel[i].unit[sizeof(l->channel[i].unit) - 1] = '\0';
-		if (!image_channel_fits(&l->channel[i], l->meta.image_bytes)) {
-			return -EPROTO;
-		}
-	}
-	return 0;
-}
 
 static void set_type(struct layout_field *f)
 {
@@ -162,10 +124,8 @@ static size_t add_topic(struct layout *l, const struct slave_info *slave,
 	*t = (struct layout_topic){ .slave = slave, .field = field };
 	/* cycle, dc_time_ns, flags, good */
 	t->message_bytes = CDR_HEADER_BYTES + 8 + 8 + 4 + 1;
-	for (uint32_t i = 0; i < l->meta.channel_count; i++) {
-		if (l->channel[i].slave_pos == slave->slave_pos) {
-			add_field(t, &field[t->field_count], &l->channel[i]);
-		}
+	for (uint32_t i = 0; i < l->table->count[slave->slave_pos]; i++) {
+		add_field(t, &field[i], channel_table_at(l->table, slave->slave_pos, i));
 	}
 	if (t->field_count == 0) {
 		return 0;
@@ -182,50 +142,22 @@ static size_t add_topic(struct layout *l, const struct slave_info *slave,
 	return t->field_count;
 }
 
-static int positions_are_unique(const struct layout *l)
+int layout_create(const struct channel_table *table, struct layout **ret_layout)
 {
-	uint8_t seen[UINT16_MAX / 8 + 1] = { 0 };
-
-	for (uint32_t i = 0; i < l->meta.slave_count; i++) {
-		unsigned pos = l->slave[i].slave_pos;
-
-		if (seen[pos / 8] & 1u << pos % 8) {
-			return 0;
-		}
-		seen[pos / 8] |= (uint8_t)(1u << pos % 8);
-	}
-	return 1;
-}
-
-int layout_create(const void *meta, size_t meta_bytes, struct layout **ret_layout)
-{
-	struct layout *l;
+	struct layout *l = calloc(1, sizeof(*l));
 	size_t used = 0;
-	int r;
 
-	if (meta_bytes < sizeof(l->meta)) {
-		return -EPROTO;
-	}
-	l = calloc(1, sizeof(*l));
 	if (l == NULL) {
 		return -ENOMEM;
 	}
-	memcpy(&l->meta, meta, sizeof(l->meta));
-	r = is_sound(&l->meta, meta_bytes) ? copy_tables(l, (const uint8_t *)meta + sizeof(l->meta))
-					   : -EPROTO;
-	if (r == 0 && !positions_are_unique(l)) {
-		r = -EPROTO;
-	}
-	if (r < 0) {
+	l->table = table;
+	l->field = calloc(table->meta.channel_count + 1u, sizeof(l->field[0]));
+	if (l->field == NULL) {
 		layout_destroy(l);
-		return r;
+		return -ENOMEM;
 	}
-	for (uint32_t i = 0; i < l->meta.slave_count; i++) {
-		used += add_topic(l, &l->slave[i], l->field + used);
-	}
-	if (used != l->meta.channel_count) { /* a channel of no slave would go unrecorded */
-		layout_destroy(l);
-		return -EPROTO;
+	for (uint32_t i = 0; i < table->meta.slave_count; i++) {
+		used += add_topic(l, &table->slaves[i], l->field + used);
 	}
 	*ret_layout = l;
 	return 0;
@@ -236,20 +168,18 @@ void layout_destroy(struct layout *l)
 	if (l == NULL) {
 		return;
 	}
-	free(l->slave);
-	free(l->channel);
 	free(l->field);
 	free(l);
 }
 
 const struct sample_meta *layout_meta(const struct layout *l)
 {
-	return &l->meta;
+	return &l->table->meta;
 }
 
 const struct slave_info *layout_slaves(const struct layout *l)
 {
-	return l->slave;
+	return l->table->slaves;
 }
 
 const struct layout_topic *layout_topics(const struct layout *l, size_t *ret_count)

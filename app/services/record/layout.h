@@ -10,6 +10,7 @@
 #include <stdint.h>
 
 #include "base/sample.h"
+#include "reader/table.h"
 
 struct layout;
 
@@ -37,11 +38,8 @@ struct layout_topic {
 	size_t message_bytes; /* of its CDR */
 };
 
-/**
- * From the ring's meta area. 0; -EPROTO: not a meta area of this version, or one that does not hold
- * together; -ENOMEM. Everything is copied. Free with layout_destroy(). Context: blocking.
- */
-int layout_create(const void *meta, size_t meta_bytes, struct layout **ret_layout);
+/** @table is kept by the caller. 0, or -ENOMEM. Free with layout_destroy(). Context: blocking. */
+int layout_create(const struct channel_table *table, struct layout **ret_layout);
 void layout_destroy(struct layout *l);
 
 const struct sample_meta *layout_meta(const struct layout *l);

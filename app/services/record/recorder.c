@@ -10,8 +10,8 @@
 #include <sys/timex.h>
 
 #include "base/clock.h"
-#include "base/ring.h"
-#include "record/feed.h"
+#include "reader/feed.h"
+#include "reader/reader.h"
 #include "record/sample_feed.h"
 #include "record/sink.h"
 
@@ -22,8 +22,8 @@ struct recorder {
 	struct recorder_options opt;
 	struct sink *sink;
 	struct feed *feed[SINK_RINGS];
-	struct ring_reader *ring;    /* NULL: waiting for one */
-	struct sample_feed *samples; /* NULL: the ring is done with (or waiting) */
+	struct reader *reader;
+	struct sample_feed *samples; /* NULL: no session */
 	struct record_status *page;  /* shared, or own while there is no run directory */
 	struct record_status own;
 	int64_t looked_ns;
@@ -57,15 +57,21 @@ int recorder_create(const struct recorder_options *opt, struct recorder **ret_re
 	rec->page = &rec->own;
 	rec->looked_ns = INT64_MIN / 2;
 	rec->told_ns = INT64_MIN / 2;
-	rec->feed[SINK_EVENTS] = feed_create(FEED_EVENTS, opt->events_path);
-	rec->feed[SINK_SYNC0_EVENTS] = feed_create(FEED_EVENTS, opt->sync0_events_path);
-	rec->feed[SINK_SYNC0] = feed_create(FEED_SYNC0, opt->sync0_path);
+	rec->feed[SINK_EVENTS] = feed_create(FEED_EVENTS, opt->events_path, FEED_AT_OLDEST);
+	rec->feed[SINK_SYNC0_EVENTS] =
+		feed_create(FEED_EVENTS, opt->sync0_events_path, FEED_AT_OLDEST);
+	rec->feed[SINK_SYNC0] = feed_create(FEED_SYNC0, opt->sync0_path, FEED_AT_OLDEST);
 	for (int i = 0; i < SINK_RINGS; i++) {
 		if (rec->feed[i] == NULL) {
 			recorder_destroy(rec);
 			snprintf(error, error_bytes, "%s", strerror(ENOMEM));
 			return -ENOMEM;
 		}
+	}
+	if (reader_create(opt->ring_path, READER_AT_OLDEST, &rec->reader) < 0) {
+		recorder_destroy(rec);
+		snprintf(error, error_bytes, "%s", strerror(ENOMEM));
+		return -ENOMEM;
 	}
 	r = sink_create(opt, &rec->sink, error, error_bytes);
 	if (r < 0) {
@@ -82,7 +88,7 @@ void recorder_destroy(struct recorder *rec)
 		return;
 	}
 	sample_feed_destroy(rec->samples);
-	ring_reader_destroy(rec->ring);
+	reader_destroy(rec->reader);
 	for (int i = 0; i < SINK_RINGS; i++) {
 		feed_destroy(rec->feed[i]);
 	}
@@ -138,7 +144,7 @@ static void tell(struct recorder *rec, uint32_t state)
 	have_page(rec);
 	rec->page->pid = rec->opt.pid;
 	if (rec->samples != NULL) {
-		lag = ring_newest(rec->ring) - ring_cursor(rec->ring);
+		lag = reader_newest(rec->reader) - reader_cursor(rec->reader);
 	}
 	sink_get_status(rec->sink, rec->page);
 	set_u64(&rec->page->lag_cycles, lag);
@@ -155,7 +161,7 @@ static struct feed *open_feed(struct recorder *rec, enum sink_ring which)
 {
 	struct feed_mark mark = sink_mark(rec->sink, which);
 
-	feed_open(rec->feed[which], &mark);
+	(void)feed_open(rec->feed[which], &mark);
 	return rec->feed[which];
 }
 
@@ -167,41 +173,37 @@ static void note_ring_error(struct recorder *rec, int error)
 	rec->ring_error = error;
 	if (error == -ENOENT) {
 		say(rec, "waiting for %s", rec->opt.ring_path);
-	} else if (error < 0) {
-		say(rec, "%s: %s", rec->opt.ring_path,
-		    error == -EPROTO ? "not a sample ring of this version" : strerror(-error));
+	} else if (error < 0 && error != -EPIPE) {
+		say(rec, "%s: %s", rec->opt.ring_path, reader_error_to_str(error));
 	}
 }
 
-/* No ring is open: look for one, ten times a second. */
-static void look_for_ring(struct recorder *rec)
+/* Look for a session, ten times a second. */
+static void look_for_session(struct recorder *rec)
 {
+	uint64_t lost;
 	int r;
 
 	if (now_ns(rec) - rec->looked_ns < LOOK_NS) {
 		return;
 	}
 	rec->looked_ns = now_ns(rec);
-	if (rec->ring != NULL) {
-		if (!ring_is_replaced(rec->ring)) {
-			return; /* done with this one, or it is no good */
-		}
-		ring_reader_destroy(rec->ring);
-		rec->ring = NULL;
+	if (reader_next(rec->reader, &lost) != READER_BEGUN) {
+		note_ring_error(rec, reader_error(rec->reader));
+		return;
 	}
-	r = ring_reader_open(rec->opt.ring_path, &rec->ring);
-	if (r == 0) {
-		r = sample_feed_create(rec->ring, rec->sink, &rec->samples);
-		if (r == 0) {
-			say(rec, "recording session %" PRIu64 " to %s",
-			    sample_feed_number(rec->samples), rec->opt.dir);
-			if (sample_feed_missed_start(rec->samples) > 0) {
-				say(rec, "came late: %" PRIu64 " samples had left the ring before",
-				    sample_feed_missed_start(rec->samples));
-			}
-		}
-	}
+	r = sample_feed_create(rec->reader, rec->sink, &rec->samples);
 	note_ring_error(rec, r);
+	if (r < 0) {
+		reader_skip_session(rec->reader);
+		return;
+	}
+	say(rec, "recording session %" PRIu64 " to %s", sample_feed_number(rec->samples),
+	    rec->opt.dir);
+	if (sample_feed_missed_start(rec->samples) > 0) {
+		say(rec, "came late: %" PRIu64 " samples had left the ring before",
+		    sample_feed_missed_start(rec->samples));
+	}
 }
 
 static void note_tai_offset(struct sample_feed *samples)
@@ -224,7 +226,6 @@ static int take_events(struct recorder *rec, enum events_until until)
 	struct feed *feed;
 	struct event ev;
 	uint64_t sequence;
-	uint64_t lost;
 	int taken = 0;
 
 	if (sink_state(rec->sink) != SINK_READY) {
@@ -232,7 +233,8 @@ static int take_events(struct recorder *rec, enum events_until until)
 	}
 	feed = open_feed(rec, SINK_EVENTS);
 	while (taken < EVENTS_A_STEP) {
-		int got = feed_read(feed, &ev, &sequence, &lost);
+		uint64_t lost = 0;
+		int got = feed_read(feed, &ev, sizeof(ev), &sequence, &lost);
 
 		if (lost > 0) {
 			sink_count_lost_events(rec->sink, lost);
@@ -256,9 +258,9 @@ static void take_sync0_events(struct recorder *rec)
 	struct feed *feed = open_feed(rec, SINK_SYNC0_EVENTS);
 	struct event ev;
 	uint64_t sequence;
-	uint64_t lost;
+	uint64_t lost = 0;
 
-	while (feed_read(feed, &ev, &sequence, &lost)) {
+	while (feed_read(feed, &ev, sizeof(ev), &sequence, &lost)) {
 		if (sample_feed_event(rec->samples, &ev, UINT64_MAX) < 0) {
 			feed_unread(feed);
 			break;
@@ -273,14 +275,14 @@ static void take_sync0(struct recorder *rec)
 	struct sync0_result result;
 	struct feed *feed;
 	uint64_t sequence;
-	uint64_t lost;
+	uint64_t lost = 0;
 
 	if (sink_state(rec->sink) != SINK_READY) {
 		return;
 	}
 	take_sync0_events(rec);
 	feed = open_feed(rec, SINK_SYNC0);
-	while (feed_read(feed, &result, &sequence, &lost)) {
+	while (feed_read(feed, &result, sizeof(result), &sequence, &lost)) {
 		if (result.session == sample_feed_number(rec->samples) &&
 		    sample_feed_sync0(rec->samples, &result, sequence) < 0) {
 			feed_unread(feed);
@@ -308,12 +310,13 @@ static int end_session(struct recorder *rec, const char *reason)
 	return 0;
 }
 
+static const char *end_reason(int error)
+{
+	return error == 0 ? "producer ended" : error == -EIO ? "ring damaged" : "producer gone";
+}
+
 static enum recorder_result follow(struct recorder *rec)
 {
-	/* Asked before reading: what was pushed before the producer went is then read. */
-	int is_gone = ring_cursor(rec->ring) >= ring_newest(rec->ring) &&
-		      (ring_is_replaced(rec->ring) || ring_is_orphaned(rec->ring));
-
 	switch (sample_feed_read(rec->samples, SAMPLES_A_STEP)) {
 	case SAMPLE_FEED_MORE:
 		(void)take_events(rec, EVENTS_UNTIL_SAMPLE);
@@ -321,13 +324,10 @@ static enum recorder_result follow(struct recorder *rec)
 	case SAMPLE_FEED_EMPTY:
 		(void)take_events(rec, EVENTS_ALL);
 		take_sync0(rec);
-		if (is_gone && sink_state(rec->sink) == SINK_READY &&
-		    end_session(rec, "producer gone") == 0) {
-			return RECORDER_ENDED;
-		}
 		return RECORDER_IDLE;
-	case SAMPLE_FEED_CLOSED:
-		return end_session(rec, "producer ended") == 0 ? RECORDER_ENDED : RECORDER_IDLE;
+	case SAMPLE_FEED_ENDED:
+		return end_session(rec, end_reason(reader_error(rec->reader))) == 0 ? RECORDER_ENDED
+										    : RECORDER_IDLE;
 	case SAMPLE_FEED_STUCK:
 		return RECORDER_IDLE;
 	}
@@ -341,7 +341,7 @@ enum recorder_result recorder_step(struct recorder *rec)
 
 	sink_tick(rec->sink, now);
 	if (rec->samples == NULL) {
-		look_for_ring(rec);
+		look_for_session(rec);
 	}
 	if (rec->samples != NULL && sink_take_rewind(rec->sink)) {
 		sample_feed_rewind(rec->samples);
@@ -371,13 +371,16 @@ int recorder_finish(struct recorder *rec)
 	int r = 0;
 
 	if (rec->samples != NULL) {
-		uint64_t until = ring_newest(rec->ring);
+		uint64_t until = reader_newest(rec->reader);
+		enum sample_feed_result result = SAMPLE_FEED_MORE;
 
-		while (sink_state(rec->sink) == SINK_READY && ring_cursor(rec->ring) < until) {
-			uint64_t left = until - ring_cursor(rec->ring);
+		while (sink_state(rec->sink) == SINK_READY && result != SAMPLE_FEED_ENDED &&
+		       reader_cursor(rec->reader) < until) {
+			uint64_t left = until - reader_cursor(rec->reader);
 
-			sample_feed_read(rec->samples,
-					 left < SAMPLES_A_STEP ? (unsigned)left : SAMPLES_A_STEP);
+			result = sample_feed_read(rec->samples, left < SAMPLES_A_STEP
+									? (unsigned)left
+									: SAMPLES_A_STEP);
 			sink_tick(rec->sink, now_ns(rec));
 		}
 		r = end_session(rec, "stopped");

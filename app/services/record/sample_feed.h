@@ -7,29 +7,28 @@
 #define RECORD_SAMPLE_FEED_H
 
 #include "base/event.h"
-#include "base/ring.h"
 #include "base/sync0.h"
+#include "reader/reader.h"
 #include "record/sink.h"
 
 struct sample_feed;
 
 /**
- * Begin to read @ring: behind the last recorded cycle if the sink knows this session, else at the
- * oldest slot. 0; -EPROTO: not a sample ring of this version; -ENOMEM. Both are kept. Free with
+ * Read the session that @reader has begun: behind the last recorded cycle if the sink knows this
+ * session, else from the oldest sample. The caller keeps both. 0, or -ENOMEM. Free with
  * sample_feed_destroy().
  */
-int sample_feed_create(struct ring_reader *ring, struct sink *sink,
-		       struct sample_feed **ret_session);
+int sample_feed_create(struct reader *reader, struct sink *sink, struct sample_feed **ret_session);
 void sample_feed_destroy(struct sample_feed *s);
 uint64_t sample_feed_number(const struct sample_feed *s);
 /** Slots that had left the ring before this session could be read for the first time. */
 uint64_t sample_feed_missed_start(const struct sample_feed *s);
 
 enum sample_feed_result {
-	SAMPLE_FEED_MORE,   /* @most samples were read, there may be more */
-	SAMPLE_FEED_EMPTY,  /* all were read */
-	SAMPLE_FEED_CLOSED, /* all were read, and the producer has closed the ring */
-	SAMPLE_FEED_STUCK,  /* the sink does not take any: come back when it is ready */
+	SAMPLE_FEED_MORE,  /* @most samples were read, there may be more */
+	SAMPLE_FEED_EMPTY, /* all were read */
+	SAMPLE_FEED_ENDED, /* all were read, and none will follow: reader_error() */
+	SAMPLE_FEED_STUCK, /* the sink does not take any: come back when it is ready */
 };
 
 /** Read up to @most slots. */

@@ -8,7 +8,7 @@
 #define RECORD_SINK_H
 
 #include "base/event.h"
-#include "record/feed.h"
+#include "reader/feed.h"
 #include "record/record_file.h"
 #include "record/recorder.h"
 #include "record/recover_file.h"
