@@ -2,13 +2,16 @@
 #include "cli/cli.h"
 
 #include <errno.h>
+#include <inttypes.h>
 #include <stdarg.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
+#include "cli/running.h"
 #include "program/error.h"
+
+enum { RUNNING_LISTED = 32 };
 
 enum exit_code cli_fail(const struct cli *cli, enum exit_code code, const char *format, ...)
 {
@@ -90,8 +93,7 @@ enum exit_code cli_exit_of(int errno_value)
 	}
 }
 
-/* Nothing stands where this user's own ecdaqd would be, but the machine's is there: that is meant.
- */
+/* None is running: the last state of the system's ecdaqd where this user has none. */
 static void prefer_the_system(char *dir)
 {
 	static const char system_dir[] = "/run/ecdaq/";
@@ -103,9 +105,32 @@ static void prefer_the_system(char *dir)
 	}
 }
 
+/* No directory was named: that of the one ecdaqd that is running. */
+static enum exit_code find_running(struct cli *cli)
+{
+	struct running found[RUNNING_LISTED];
+	size_t count = running_find("/run/ecdaq", "/dev/shm", found, RUNNING_LISTED);
+
+	if (count == 0) {
+		prefer_the_system(cli->dir);
+		return EXIT_CODE_OK;
+	}
+	if (count == 1) {
+		memcpy(cli->dir, found[0].dir, sizeof(cli->dir));
+		return EXIT_CODE_OK;
+	}
+	cli_fail(cli, EXIT_CODE_NO_DAEMON, "several ecdaqd are running: select one:");
+	for (size_t i = 0; i < count; i++) {
+		fprintf(stderr, "  --run-dir %.*s  (%s%s, pid %" PRId64 ")\n",
+			(int)strlen(found[i].dir) - 1, found[i].dir,
+			found[i].is_simulated ? "simulated, " : "", found[i].interface,
+			found[i].pid);
+	}
+	return EXIT_CODE_NO_DAEMON;
+}
+
 static enum exit_code find_dir(struct cli *cli)
 {
-	const char *env = getenv("ECDAQ_RUN_DIR");
 	struct config cfg;
 	char error[512];
 
@@ -122,10 +147,8 @@ static enum exit_code find_dir(struct cli *cli)
 	if (config_run_path(&cfg, "", cli->dir, sizeof(cli->dir)) < 0) {
 		return cli_fail(cli, EXIT_CODE_USAGE, "run directory: the path is too long");
 	}
-	if (cfg.run_dir[0] == '\0' && (env == NULL || env[0] == '\0')) {
-		prefer_the_system(cli->dir);
-	}
-	return EXIT_CODE_OK;
+	cli->is_dir_chosen = config_has_run_dir(&cfg);
+	return cli->is_dir_chosen ? EXIT_CODE_OK : find_running(cli);
 }
 
 enum exit_code cli_path(struct cli *cli, const char *file, char *ret_path)
@@ -136,6 +159,7 @@ enum exit_code cli_path(struct cli *cli, const char *file, char *ret_path)
 	if (cli->dir[0] == '\0') {
 		result = find_dir(cli);
 		if (result != EXIT_CODE_OK) {
+			cli->dir[0] = '\0';
 			return result;
 		}
 	}

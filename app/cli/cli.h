@@ -16,6 +16,7 @@ struct cli {
 	const struct verb *verb;
 	const char *run_dir;         /* --run-dir; NULL: by configuration and environment */
 	const char *config;          /* --config; NULL: none */
+	int is_dir_chosen;           /* by option, configuration or environment */
 	char dir[CONFIG_PATH_BYTES]; /* the run directory, with a slash behind it, once it was asked
 					for */
 };

@@ -127,13 +127,14 @@ static void help(void)
 		printf("  %-10s %s\n", verbs[i].name, verbs[i].summary);
 	}
 	puts("\n"
-	     "  --run-dir DIR   where ecdaqd's rings, status page and socket are (default: "
+	     "  --run-dir DIR   run directory of ecdaqd: rings, status page, socket (default: "
 	     "runtime.run_dir\n"
-	     "                  of --config, else $ECDAQ_RUN_DIR, else /run/ecdaq for root, else\n"
-	     "                  /dev/shm/ecdaq-UID, or /run/ecdaq if nothing is there)\n"
-	     "  --config FILE   the ecdaq.yaml of the ecdaqd that is meant\n"
-	     "  --help          this; after a verb: its options\n"
-	     "  --version       the version of this program\n"
+	     "                  of --config, else $ECDAQ_RUN_DIR, else that of the one ecdaqd that "
+	     "is\n"
+	     "                  running: /run/ecdaq, /dev/shm/ecdaq-*)\n"
+	     "  --config FILE   the ecdaq.yaml of that ecdaqd\n"
+	     "  --help          print this text; after a verb: its options\n"
+	     "  --version       print the version\n"
 	     "\n"
 	     "Every reading verb takes --json: one JSON value a line.\n");
 	exit_code_help(stdout, EXIT_CODE_COMMON | EXIT_CODE_BIT(CONFIG) |

@@ -79,7 +79,7 @@ static void make_footer(struct top *top)
 	int used = snprintf(top->footer, FOOTER_BYTES, "%s   Ctrl-Z: suspend", top->leave_text);
 	int len;
 
-	if (top->cli->run_dir == NULL && getenv("ECDAQ_RUN_DIR") == NULL) {
+	if (!top->cli->is_dir_chosen) {
 		return;
 	}
 	dir_len -= dir_len > 1 && dir[dir_len - 1] == '/';

@@ -26,16 +26,30 @@ int config_is_oneshot(const struct config *cfg, uint16_t slave_pos)
 	return 0;
 }
 
-int config_run_path(const struct config *cfg, const char *file, char *ret_path, size_t path_bytes)
+/* The run directory that is named, or NULL. */
+static const char *named_run_dir(const struct config *cfg)
 {
 	const char *env = getenv("ECDAQ_RUN_DIR");
+
+	if (cfg != NULL && cfg->run_dir[0] != '\0') {
+		return cfg->run_dir;
+	}
+	return env != NULL && env[0] != '\0' ? env : NULL;
+}
+
+int config_has_run_dir(const struct config *cfg)
+{
+	return named_run_dir(cfg) != NULL;
+}
+
+int config_run_path(const struct config *cfg, const char *file, char *ret_path, size_t path_bytes)
+{
+	const char *named = named_run_dir(cfg);
 	char path[2 * CONFIG_PATH_BYTES];
 	int len;
 
-	if (cfg != NULL && cfg->run_dir[0] != '\0') {
-		len = snprintf(path, sizeof(path), "%s/%s", cfg->run_dir, file);
-	} else if (env != NULL && env[0] != '\0') {
-		len = snprintf(path, sizeof(path), "%s/%s", env, file);
+	if (named != NULL) {
+		len = snprintf(path, sizeof(path), "%s/%s", named, file);
 	} else if (geteuid() == 0) {
 		len = snprintf(path, sizeof(path), "/run/ecdaq/%s", file);
 	} else {

@@ -201,6 +201,8 @@ int config_parse_duration(const char *text, int64_t *ret_ns, char *why);
 #define CONFIG_RUN_SYNC0_LOCK "sync0-lock"           /* held by the one ecdaq-sync0 */
 #define CONFIG_RUN_ADMIN "admin"                     /* socket, base/admin_protocol.h */
 
+/** 1 if the run directory is named by @cfg->run_dir or $ECDAQ_RUN_DIR, and not the default. */
+int config_has_run_dir(const struct config *cfg);
 /** Where the run directory is: @cfg->run_dir, else $ECDAQ_RUN_DIR, else /run/ecdaq (root) or
  * /dev/shm/ecdaq-UID. */
 int config_run_path(const struct config *cfg, const char *file, char *ret_path, size_t path_bytes);
