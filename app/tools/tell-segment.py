@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Say one line to a running ecdaq-sim and print its answer."""
+"""Send one line to a running ecdaq-sim and print its answer."""
 
 from __future__ import annotations
 

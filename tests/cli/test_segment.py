@@ -21,18 +21,18 @@ NIC = ["--interface", "lo"]
 MISTAKES = [
     (USAGE, [], "--interface is missing"),
     (FAILED, ["--interface", "nosuchnic"], "nosuchnic: no such interface"),
-    (FAILED, [*NIC, "--slaves", "0"], "not 1 to 64"),
-    (FAILED, [*NIC, "--slaves", "65"], "not 1 to 64"),
-    (FAILED, [*NIC, "--slaves", ""], "nothing given"),
+    (FAILED, [*NIC, "--slaves", "0"], "expected a number from 1 to 64"),
+    (FAILED, [*NIC, "--slaves", "65"], "expected a number from 1 to 64"),
+    (FAILED, [*NIC, "--slaves", ""], "no name and no number"),
     (FAILED, [*NIC, "--slaves", "a/b"], "NAME,NAME"),
     (FAILED, [*NIC, "--slaves", "el2829"], "'el2829': not in the catalogue: did you mean el2828"),
     (FAILED, [*NIC, "--slaves", "motor"], "'motor': not in the catalogue: --list-slaves"),
     (FAILED, [*NIC, "--slaves", "el", "--sii", "/tmp"], "'el': not in the catalogue nor in /tmp"),
-    (FAILED, [*NIC, "--slaves", "plant:0"], "not plant[:TAU_MS[:GAIN]]"),
-    (FAILED, [*NIC, "--slaves", "plant:50:nan"], "not plant[:TAU_MS[:GAIN]]"),
-    (FAILED, [*NIC, "--slaves", "plant:50:1:"], "not plant[:TAU_MS[:GAIN]]"),
-    (FAILED, [*NIC, "--slaves", "wago_750_354+431"], "'wago_750_354+431': not wago_750_354"),
-    (FAILED, [*NIC, "--slaves", "wago_750_354+"], "'wago_750_354+': not wago_750_354"),
+    (FAILED, [*NIC, "--slaves", "plant:0"], "expected plant[:TAU_MS[:GAIN]]"),
+    (FAILED, [*NIC, "--slaves", "plant:50:nan"], "expected plant[:TAU_MS[:GAIN]]"),
+    (FAILED, [*NIC, "--slaves", "plant:50:1:"], "expected plant[:TAU_MS[:GAIN]]"),
+    (FAILED, [*NIC, "--slaves", "wago_750_354+431"], "'wago_750_354+431': expected wago_750_354"),
+    (FAILED, [*NIC, "--slaves", "wago_750_354+"], "'wago_750_354+': expected wago_750_354"),
     (FAILED, [*NIC, "--ppm", "1,x"], "--ppm"),
     (FAILED, [*NIC, "--ppm", "1,2,3"], "more numbers than slaves"),
     (FAILED, [*NIC, "--ppm", "nan"], "--ppm"),
@@ -44,7 +44,7 @@ MISTAKES = [
     (FAILED, [*NIC, "--edges", "/nonexistent/edges"], "/nonexistent/edges: No such file"),
     (USAGE, [*NIC, "--priority", "100"], "--priority"),
     (FAILED, [*NIC, "--faults", "/nonexistent"], "/nonexistent: No such file"),
-    (USAGE, [*NIC, "word"], "more words than options"),
+    (USAGE, [*NIC, "word"], "unexpected argument"),
 ]
 
 
@@ -91,7 +91,7 @@ def test_a_file_that_is_no_image_is_refused(tmp_path: Path, length: int) -> None
     (tmp_path / "short.bin").write_bytes(b"\0" * length)
     result = segment(*NIC, "--sii", str(tmp_path), "--slaves", "short")
     assert result.returncode == FAILED
-    assert f"short.bin: no SII image: {length} bytes" in one_line(result.stderr)
+    assert f"short.bin: not an SII image: {length} bytes" in one_line(result.stderr)
 
 
 def test_an_image_larger_than_any_eeprom_is_refused(tmp_path: Path) -> None:
@@ -129,7 +129,7 @@ def test_it_takes_faults_while_it_runs_and_ends_with_a_summary(run_dir: Path) ->
         wait_for(control)
         assert ask(control, run_dir / "me", "at=1s cut slave=1") == "ok"
         assert "slave" in ask(control, run_dir / "me", "at=1s cut slave=2")
-        assert "no fault" in ask(control, run_dir / "me", "at=1s bogus")
+        assert "unknown fault" in ask(control, run_dir / "me", "at=1s bogus")
         running.send_signal(signal.SIGTERM)
         _, stderr = running.communicate(timeout=10)
     assert running.returncode == 0
@@ -148,8 +148,8 @@ def test_io_lines_reach_the_terminals_while_it_runs(run_dir: Path) -> None:
             ("io slave=1", "slot1=0x00"),
             ("io slave=2", "led=0"),
             ("io slave=3", "io: slave=N is missing, or no such slave"),
-            ("io slave=0 slot3.9=1", "slot3.9=1: no such input, or no such value"),
-            ("io slave=2 led=1", "led=1: no such input, or no such value"),
+            ("io slave=0 slot3.9=1", "slot3.9=1: unknown input or invalid value"),
+            ("io slave=2 led=1", "led=1: unknown input or invalid value"),
         ):
             assert ask(control, run_dir / "me", line) == answer
         tell = [ROOT / "app" / "tools" / "tell-segment.py", "--control", control]
@@ -196,4 +196,4 @@ def test_a_real_image_is_used_instead_of_the_catalogue(tmp_path: Path) -> None:
     (tmp_path / "ek1100.bin").write_bytes(b"\0" * 5)
     result = segment(*NIC, "--sii", str(tmp_path), "--slaves", "el2828,ek1100")
     assert result.returncode == FAILED
-    assert "ek1100.bin: no SII image: 5 bytes" in one_line(result.stderr)
+    assert "ek1100.bin: not an SII image: 5 bytes" in one_line(result.stderr)

@@ -110,7 +110,7 @@ def test_a_second_segment_at_one_interface_is_refused_and_the_first_goes_on(
     segment.start_all()
     got = segment.space.run(str(BIN / "ecdaq-sim"), "--interface", "ecsim0", check=False)
     assert got.returncode == 1
-    assert got.stderr == "ecdaq-sim: interface ecsim0: another ecdaq-sim is at it already\n"
+    assert got.stderr == "ecdaq-sim: interface ecsim0: another ecdaq-sim already uses it\n"
     assert segment.wait_for_cycles(1000, 30)["state"] == "OP"
 
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The CoE dictionary that follows from an SII image, or from what stands for one: identity,
+ * The CoE dictionary that follows from an SII image, or from a struct sii made otherwise: identity,
  * SyncManager kinds, PDO assignment (writable in PRE-OP unless fixed), PDO mapping (fixed), and the
  * mapped objects themselves, which hold what was written last. A device adds constants, and texts
  * if it has SDO information.

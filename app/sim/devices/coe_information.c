@@ -125,7 +125,7 @@ static size_t answer_entry(const struct coe_dictionary *d, const uint8_t *reques
 	put_header(request, ENTRY, answer);
 	put_le16(answer + BODY_AT, index);
 	answer[BODY_AT + 2] = subindex;
-	answer[BODY_AT + 3] = 0; /* none of the optional values is told */
+	answer[BODY_AT + 3] = 0; /* none of the optional values is sent */
 	put_le16(answer + BODY_AT + 4, info.data_type);
 	put_le16(answer + BODY_AT + 6, info.bit_len);
 	put_le16(answer + BODY_AT + 8, ACCESS_READ);

@@ -64,7 +64,7 @@ static void answer_error(struct mailbox *m, enum mailbox_error error)
 	finish_answer(m, MAILBOX_ERROR, ERROR_BYTES);
 }
 
-/* The last answer once more, unless it still lies there. */
+/* The last answer once more, unless it is still there. */
 static void answer_again(struct mailbox *m, const struct sm_view *answer)
 {
 	if (m->answer_len > 0 && !(answer->status & STATUS_FULL)) {

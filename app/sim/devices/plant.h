@@ -24,7 +24,7 @@
  */
 int plant_slave(int position, double tau_s, double gain, struct segment_slave_spec *ret_spec);
 
-/** 1 if @name is a plant's in a list of slaves, whatever stands behind it. */
+/** 1 if @name is a plant's in a list of slaves, whatever follows it. */
 int plant_is_name(const char *name);
 /** "plant", "plant:TAU_MS", "plant:TAU_MS:GAIN". 0, -ENOMEM, -EINVAL: not that. */
 int plant_by_name(int position, const char *name, struct segment_slave_spec *ret_spec);

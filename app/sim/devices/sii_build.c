@@ -179,7 +179,8 @@ static void put_dc(struct writer *w, const struct slave_model *m)
 		put(w, dc->assign_activate, 2);
 		put(w, (uint16_t)dc->sync0_factor, 2);
 		put(w, dc->name, 1);
-		put(w, 0, 5);
+		put(w, 0, 1); /* description */
+		put(w, 0, 4);
 	}
 	end(w);
 }

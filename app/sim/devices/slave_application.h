@@ -40,7 +40,7 @@ void slave_application_run(struct slave_application *app, int64_t t_ns);
 
 /** AL state, without the error bit. */
 uint8_t slave_application_state(struct slave_application *app, int64_t t_ns);
-/** 1 and where SyncManager @n lies; 0: it is off or empty, outputs untouched. */
+/** 1 and the area of SyncManager @n; 0: it is off or empty, outputs untouched. */
 int slave_application_sm(struct slave_application *app, int64_t t_ns, size_t n, uint16_t *ret_start,
 			 uint16_t *ret_len);
 

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A WAGO I/O node seen from its EtherCAT coupler: which I/O modules stand on its K-bus, and what
+ * A WAGO I/O node seen from its EtherCAT coupler: which I/O modules are on its K-bus, and what
  * follows from them: PDOs and their order, the places of all terminals in the process image,
  * dictionary, EEPROM. The coupler has one SII for every node; the modules are found at power-on.
- * Where each fact comes from is said in app/doc/reference/simulated-esc.md. Pure.
+ * The source of each fact is in app/doc/reference/simulated-esc.md. Pure.
  */
 #ifndef SIM_DEVICES_WAGO_NODE_H
 #define SIM_DEVICES_WAGO_NODE_H

@@ -17,7 +17,7 @@
 #include "segment/device.h"
 #include "segment/segment.h"
 
-/** 1 if @name is this coupler's, whatever stands behind it. */
+/** 1 if @name is this coupler's, whatever follows it. */
 int wago_750_354_is_name(const char *name);
 /** wago_750_354_slave() by @name. -EINVAL: a module that is not known. */
 int wago_750_354_by_name(int position, const char *name, struct segment_slave_spec *ret_spec);

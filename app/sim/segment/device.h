@@ -17,7 +17,7 @@ struct sim_device;
 struct sim_device_ops {
 	/** Power came on at @t_ns; the ESC has just been initialised. */
 	void (*power_on)(struct sim_device *dev, int64_t t_ns);
-	/** True time at which run() wants to be called next; INT64_MAX: not before something
+	/** True time at which run() has to be called next; INT64_MAX: not before something
 	 * happens. */
 	int64_t (*next_wake_ns)(const struct sim_device *dev);
 	void (*run)(struct sim_device *dev, int64_t t_ns);

@@ -19,7 +19,7 @@ struct edge_writer {
 	int64_t flushed_ns;
 };
 
-/* Who reads a pipe wants each edge at once; one that is gone, or too slow, must not hold us. */
+/* The reader of a pipe gets each edge at once; a missing or slow one must not block us. */
 static int set_up_pipe(struct edge_writer *ew)
 {
 	const struct sigaction ignore = { .sa_handler = SIG_IGN };

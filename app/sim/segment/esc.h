@@ -4,7 +4,7 @@
  * interface, watchdogs, distributed clock. It has two sides, as the chip has: datagrams from the
  * wire (esc_datagram) and the PDI (esc_pdi_read, esc_pdi_write). All times are true time in ns, on
  * one axis for the whole segment; the ESC's own clock runs off it by its ppm. What rests on the
- * data sheet, on captures, or is our model is said in app/doc/reference/simulated-esc.md.
+ * data sheet, on captures, or is our model is listed in app/doc/reference/simulated-esc.md.
  */
 #ifndef SIM_SEGMENT_ESC_H
 #define SIM_SEGMENT_ESC_H

@@ -97,7 +97,7 @@ void esc_dc_compare(struct esc *esc, int64_t t_ns, uint64_t received_ns)
 	}
 	c->diff_filtered_ns +=
 		((double)behind_ns - c->diff_filtered_ns) / (double)(1u << c->time_filter);
-	/* More than one comparison in a frame tells nothing new. */
+	/* More than one comparison in a frame adds no information. */
 	if (c->has_compared && since_ns <= 0) {
 		return;
 	}

@@ -44,7 +44,8 @@ static int write_physical(struct esc *esc, const struct esc_frame *frame, uint16
 	return addr >= ESC_REG_DIGITAL_OUTPUTS && esc_register_write(esc, frame, addr, buf, len);
 }
 
-/* What of an FMMU lies in a datagram, in bits; the slave's are counted from 8 * physical_start. */
+/* The part of an FMMU that is in a datagram, in bits; the slave's are counted from 8 *
+ * physical_start. */
 struct overlap {
 	size_t datagram_bit;
 	size_t physical_bit;

@@ -187,13 +187,13 @@ static int take_action(struct fault *f, const char *word, struct seen *seen, cha
 			continue;
 		}
 		if (seen->action >= 0) {
-			return fail(error, bytes, word, ": one fault a line");
+			return fail(error, bytes, word, ": only one fault per line");
 		}
 		seen->action = i;
 		f->action = actions[i].action;
 		return 0;
 	}
-	return fail(error, bytes, word, " is no fault");
+	return fail(error, bytes, word, ": unknown fault");
 }
 
 static int take_pair(struct fault *f, const char *key, const char *value, size_t slave_count,
@@ -244,13 +244,13 @@ static int check_whole(const struct fault *f, const struct seen *seen, char *err
 	const char *need;
 
 	if (seen->action < 0) {
-		return fail(error, bytes, "what?", "");
+		return fail(error, bytes, "the fault is missing", "");
 	}
 	if (seen->has_trigger == 0) {
-		return fail(error, bytes, "when? (at=, frame=, every= or p=)", "");
+		return fail(error, bytes, "the time is missing: at=, frame=, every= or p=", "");
 	}
 	if (seen->has_trigger > 1) {
-		return fail(error, bytes, "one of at=, frame=, every= and p=", "");
+		return fail(error, bytes, "only one of at=, frame=, every=, p=", "");
 	}
 	if (!actions[seen->action].is_of_frame && f->trigger != FAULT_AT &&
 	    f->trigger != FAULT_FRAME) {

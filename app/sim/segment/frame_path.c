@@ -44,7 +44,7 @@ void frame_path_find(const struct path_node *nodes, unsigned slave, unsigned por
 			process(path, slave, t);
 		}
 		t += port == 0 ? n->processing_ns : n->forwarding_ns;
-		/* A closed port hands on inside the chip; behind port 0 lies the processing unit.
+		/* A closed port hands on inside the chip; behind port 0 is the processing unit.
 		 */
 		for (port = next_port(port); !n->link[port].is_open; port = next_port(port)) {
 			if (port == 0) {

@@ -40,7 +40,7 @@ int64_t in_process_true_ns(const struct in_process *ip, mono_t now);
 void in_process_step_tai(struct in_process *ip, int64_t step_ns);
 /** Make the next wake late by @late_ns. */
 void in_process_stall(struct in_process *ip, int64_t late_ns);
-/** Frames that stand in the wire. */
+/** Frames on the wire. */
 unsigned in_process_in_flight(const struct in_process *ip);
 
 #endif

@@ -66,8 +66,7 @@ int io_line(struct segment *segment, const char *line, char *answer, size_t answ
 	}
 	while ((word = strtok_r(NULL, SPACE, &rest)) != NULL) {
 		if (set_terminal(dev, word) < 0) {
-			return fail(answer, answer_bytes, word,
-				    ": no such input, or no such value");
+			return fail(answer, answer_bytes, word, ": unknown input or invalid value");
 		}
 	}
 	dev->ops->io_get(dev, answer, answer_bytes);

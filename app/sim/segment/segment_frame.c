@@ -10,7 +10,7 @@ enum {
 	NS_A_BYTE = 80, /* 100 Mbit/s */
 	PREAMBLE_BYTES = 8,
 	FCS_AND_GAP_BYTES = 16,
-	QUEUE_NS = 5000000, /* more does not stand in the queue of a NIC */
+	QUEUE_NS = 5000000, /* the queue of a NIC holds no more */
 };
 
 static int find_datagrams(uint8_t *frame, size_t frame_len, struct ecat_datagram *dg)

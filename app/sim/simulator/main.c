@@ -107,8 +107,8 @@ static void flush_edges(struct simulation *sim, int64_t now_ns)
 	int r = sim->edges == NULL ? 0 : edge_writer_flush(sim->edges, now_ns);
 
 	if (r < 0) {
-		snprintf(error, sizeof(error), "--edges-keep: %s: %s: all is kept", sim->opt.edges,
-			 strerror(-r));
+		snprintf(error, sizeof(error), "--edges-keep: %s: %s: the whole file is kept",
+			 sim->opt.edges, strerror(-r));
 		sim_error(error);
 	}
 }

@@ -22,17 +22,18 @@ static const char usage_text[] =
 	"                     the catalogue's NAME\n"
 	"  --list-slaves      print the catalogue of slaves and exit\n"
 	"  --ppm A,B,...      crystals of the slaves, ppm (default: seeded, +-50)\n"
-	"  --wander PPM       crystals wander by so much (default 0.5)\n"
-	"  --jitter NS        time stamps of frames are off by up to this (default 10)\n"
+	"  --wander PPM       crystals drift within +-PPM (default 0.5)\n"
+	"  --jitter NS        jitter of the time stamps of frames (default 10)\n"
 	"  --signal SPEC      sine:HZ:V:OFFSET_V[:PHASE_DEG] at every ADC (default sine:1:0.5:1)\n"
-	"  --seed N           of everything that is random (default 1)\n"
-	"  --faults FILE      fault plan, a line a fault; times count from the start\n"
-	"  --control SOCKET   take fault lines at run time, one a datagram, times from then;\n"
-	"                     answered with \"ok\" or why not; or take io lines, see below\n"
-	"  --edges FILE       write every SYNC0 edge: slave, CLOCK_MONOTONIC ns, DC ns; each at "
-	"once\n"
-	"                     if FILE is a pipe (waited for until somebody reads it)\n"
-	"  --edges-keep MIB   of that file keep so much only, the newest\n"
+	"  --seed N           seed of all random numbers (default 1)\n"
+	"  --faults FILE      fault plan, one fault per line; times count from the start\n"
+	"  --control SOCKET   accept fault lines at run time, one per datagram, times count from\n"
+	"                     its arrival; the reply is \"ok\" or an error; or io lines, see "
+	"below\n"
+	"  --edges FILE       write every SYNC0 edge: slave, CLOCK_MONOTONIC ns, DC ns; "
+	"unbuffered\n"
+	"                     if FILE is a pipe (waits until it is opened for reading)\n"
+	"  --edges-keep MIB   keep only the newest MIB of that file\n"
 	"  --priority N       SCHED_FIFO\n"
 	"  --cpu N            run on this core only\n"
 	"  --help, --version\n"
@@ -46,10 +47,11 @@ static const char usage_text[] =
 	"         identity product=X, sync0-lost [count=N]\n"
 	"\n"
 	"io lines: io slave=N [KEY=VALUE...]\n"
-	"         what slave N has at its terminals, some of its inputs set first: slot3=0x01,\n"
-	"         slot3.1=1 of a wago_750_354\n"
+	"         sets inputs of slave N and replies with the values at its terminals:\n"
+	"         slot3=0x01, slot3.1=1 of a wago_750_354, 0x6000:01=1 of a slave of the\n"
+	"         catalogue\n"
 	"\n"
-	"exit codes: 0 ended by a signal, 1 failed, 2 wrong options\n";
+	"exit codes: 0 ended by a signal, 1 failed, 2 invalid options\n";
 
 int sim_error(const char *what)
 {
@@ -64,8 +66,8 @@ static int number_of(const char *text, const char *what, long low, long high, lo
 	long v = strtol(text, &end, 0);
 
 	if (end == text || *end != '\0' || v < low || v > high) {
-		snprintf(line, sizeof(line), "%s: '%.40s' is not %ld to %ld", what, text, low,
-			 high);
+		snprintf(line, sizeof(line), "%s: '%.40s' is not a number from %ld to %ld", what,
+			 text, low, high);
 		return sim_error(line);
 	}
 	*ret = v;
@@ -78,7 +80,7 @@ static int take_wander(const char *text, struct sim_options *opt)
 	double ppm = strtod(text, &end);
 
 	if (end == text || *end != '\0' || !(ppm >= 0 && ppm <= 100)) {
-		return sim_error("--wander: not 0 to 100 ppm");
+		return sim_error("--wander: expected a number from 0 to 100 (ppm)");
 	}
 	opt->wander_ppm = ppm;
 	return 0;
@@ -118,7 +120,7 @@ static int take_option(int c, const char *value, struct sim_options *opt)
 		return 0;
 	case 'g':
 		return signal_parse(value, &opt->signal) < 0
-			       ? sim_error("--signal: not sine:HZ:V:OFFSET_V[:PHASE_DEG]")
+			       ? sim_error("--signal: expected sine:HZ:V:OFFSET_V[:PHASE_DEG]")
 			       : 0;
 	case 'j':
 		if (number_of(value, "--jitter", 0, 10000, &n) < 0) {
@@ -192,11 +194,11 @@ void sim_options_read(int argc, char **argv, struct sim_options *opt)
 		}
 	}
 	if (optind < argc) {
-		sim_error("more words than options (see --help)");
+		sim_error("unexpected argument: see --help");
 		exit(2);
 	}
 	if (opt->interface == NULL) {
-		sim_error("--interface is missing: on which NIC is the master?");
+		sim_error("--interface is missing: name the NIC that the master is on");
 		exit(2);
 	}
 }

@@ -38,12 +38,12 @@ static int take_names(struct topology *l)
 
 		if (l->count == LIMIT_SLAVES || len == 0 || len >= NAME_BYTES ||
 		    memchr(text, '/', len) != NULL) {
-			return sim_error("--slaves: at most 64 names, NAME,NAME,...");
+			return sim_error("--slaves: expected NAME,NAME,..., at most 64");
 		}
 		snprintf(l->name[l->count++], NAME_BYTES, "%.*s", (int)len, text);
 		text += len + (text[len] == ',');
 	}
-	return l->count > 0 ? 0 : sim_error("--slaves: nothing given");
+	return l->count > 0 ? 0 : sim_error("--slaves: no name and no number");
 }
 
 static int take_slaves(struct topology *l)
@@ -55,7 +55,7 @@ static int take_slaves(struct topology *l)
 		return take_names(l);
 	}
 	if (count < 1 || count > LIMIT_SLAVES) {
-		return sim_error("--slaves: not 1 to 64");
+		return sim_error("--slaves: expected a number from 1 to 64");
 	}
 	for (; l->count < (int)count; l->count++) {
 		snprintf(l->name[l->count], NAME_BYTES, "fb1111_piccolo");
@@ -91,8 +91,9 @@ static int check_image(const char *path, const uint8_t *image, size_t bytes)
 	char why[160];
 
 	if (bytes < SII_CATEGORIES_BYTE) {
-		snprintf(line, sizeof(line), "%s: no SII image: %zu bytes, at least %d are needed",
-			 path, bytes, SII_CATEGORIES_BYTE);
+		snprintf(line, sizeof(line),
+			 "%s: not an SII image: %zu bytes, at least %d are needed", path, bytes,
+			 SII_CATEGORIES_BYTE);
 		return sim_error(line);
 	}
 	if (sii_checksum(image) != image[14]) {
@@ -153,8 +154,8 @@ static int make_wago(struct topology *l, int i)
 
 	if (r == -EINVAL || r == -E2BIG) {
 		snprintf(line, sizeof(line),
-			 "slave '%s': not wago_750_354, or that with +430, +457, +530, +557 for "
-			 "its modules (at most %d)",
+			 "slave '%s': expected wago_750_354[+MODULE...], MODULE 430, 457, 530 "
+			 "or 557, at most %d",
 			 l->name[i], WAGO_MODULES_MAX);
 		return sim_error(line);
 	}
@@ -168,7 +169,8 @@ static int make_plant(struct topology *l, int i)
 
 	if (r == -EINVAL) {
 		snprintf(line, sizeof(line),
-			 "slave '%s': not plant[:TAU_MS[:GAIN]], each above 0 and up to 1000000",
+			 "slave '%s': expected plant[:TAU_MS[:GAIN]], each above 0 and up to "
+			 "1000000",
 			 l->name[i]);
 		return sim_error(line);
 	}
@@ -216,7 +218,7 @@ static int take_ppm(const char **text, double *ret_ppm)
 	/* Written so that a NaN is refused, too. */
 	if (end == *text || (*end != ',' && *end != '\0') ||
 	    !(ppm >= -PPM_LIMIT && ppm <= PPM_LIMIT)) {
-		return sim_error("--ppm: numbers from -1000 to 1000, with commas");
+		return sim_error("--ppm: expected numbers from -1000 to 1000, separated by commas");
 	}
 	*text = *end == ',' ? end + 1 : end;
 	*ret_ppm = ppm;
@@ -257,7 +259,7 @@ static int make(struct topology *l, int64_t t_ns, struct segment **ret_segment)
 		return -1;
 	}
 	return segment_create(l->spec, (size_t)l->count, t_ns, ret_segment) < 0
-		       ? sim_error("the segment cannot be made: no memory")
+		       ? sim_error("cannot create the segment: no memory")
 		       : 0;
 }
 

@@ -78,7 +78,7 @@ int wire_socket_claim(const char *interface, char *error, size_t error_bytes)
 	if (bind(fd, (struct sockaddr *)&name,
 		 (socklen_t)(offsetof(struct sockaddr_un, sun_path) + 1 + len)) < 0) {
 		return fail(fd, error, error_bytes, interface,
-			    errno == EADDRINUSE ? "another ecdaq-sim is at it already"
+			    errno == EADDRINUSE ? "another ecdaq-sim already uses it"
 						: strerror(errno));
 	}
 	return fd;

@@ -151,7 +151,7 @@ static enum piccolo_al_code enter_op(struct piccolo *p)
 	return AL_OK;
 }
 
-/* Go where the master wants to; on refusal the state stays. */
+/* Enter the state that the master requests; on refusal the state stays. */
 static enum piccolo_al_code change(struct piccolo *p, unsigned wanted)
 {
 	enum piccolo_al_code code = AL_OK;

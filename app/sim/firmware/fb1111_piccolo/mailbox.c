@@ -147,7 +147,7 @@ static octet_t is_sm1_full(struct piccolo *p)
 	return OCTET((status & SM_STATUS_MAILBOX_FULL) != 0);
 }
 
-/* A repeat request is acknowledged by copying its toggle bit, once the answer lies in SM1 again. */
+/* A repeat request is acknowledged by copying its toggle bit, once the answer is in SM1 again. */
 static void finish_repeat(struct piccolo *p)
 {
 	struct piccolo_mailbox *m = &p->mailbox;
@@ -181,7 +181,7 @@ static int begin_answer(struct piccolo *p)
 	}
 	if (m->is_repeat) {
 		m->is_blocked = 0;
-		finish_repeat(p); /* the very answer still lies there */
+		finish_repeat(p); /* that answer is still there */
 	}
 	return 0;
 }

@@ -20,7 +20,7 @@ void piccolo_pdo_start(struct piccolo *p)
 {
 	octet_t data[PICCOLO_OUTPUT_OCTETS];
 
-	/* What lies in SM2 is from an earlier run; reading it takes its event away. */
+	/* The data in SM2 is from an earlier run; reading it clears its event. */
 	piccolo_esc_read(p, piccolo_description.sm[PICCOLO_SM_OUTPUTS].start, data,
 			 PICCOLO_OUTPUT_OCTETS);
 	p->al_event = (uint16_t)(p->al_event & ~(unsigned)AL_EVENT_SM2);

@@ -25,11 +25,11 @@ static void check_refused(const char *line, const char *why)
 
 TEST(sim_fault, a_line_that_makes_no_sense_is_refused_with_its_reason)
 {
-	check_refused("at=1s explode", "explode is no fault");
-	check_refused("at=1s lose double", "double: one fault a line");
-	check_refused("lose", "when? (at=, frame=, every= or p=)");
-	check_refused("at=1s frame=3 lose", "one of at=, frame=, every= and p=");
-	check_refused("at=1s", "what?");
+	check_refused("at=1s explode", "explode: unknown fault");
+	check_refused("at=1s lose double", "double: only one fault per line");
+	check_refused("lose", "the time is missing: at=, frame=, every= or p=");
+	check_refused("at=1s frame=3 lose", "only one of at=, frame=, every=, p=");
+	check_refused("at=1s", "the fault is missing");
 	check_refused("at=1 lose", "at: bad value");
 	check_refused("at=-1s lose", "at: bad value");
 	check_refused("at=1e30s lose", "at: bad value");
@@ -89,7 +89,7 @@ TEST(sim_fault, a_plan_file_with_a_mistake_is_named_with_its_line)
 
 	write_plan(path, "# a plan\nat=1s lose\n\nat=2s loose\n");
 	CHECK_EQ(fault_plan_load(plan, path, 2, error, sizeof(error)), -EINVAL);
-	snprintf(wanted, sizeof(wanted), "%s:4: loose is no fault", path);
+	snprintf(wanted, sizeof(wanted), "%s:4: loose: unknown fault", path);
 	CHECK_STR(error, wanted);
 	unlink(path);
 	CHECK_EQ(fault_plan_load(plan, path, 2, error, sizeof(error)), -ENOENT);
