@@ -90,7 +90,7 @@ function(ecdaq_targets_below directory variable)
 	set(${variable} ${targets} PARENT_SCOPE)
 endfunction()
 
-# ecdaq_test(GROUP NAME SOURCES a.c [DEPENDS module...] [LIBRARIES lib...] [TIMEOUT s] [LABELS long] [WHOLE])
+# ecdaq_test(GROUP NAME SOURCES a.c [DEPENDS module...] [LIBRARIES lib...] [TIMEOUT s of CPU time] [LABELS long] [WHOLE])
 # An executable GROUP_NAME on tests/harness; every TEST(module, sentence) in its sources becomes
 # one ctest test "module.sentence" with label GROUP. LABELS long: not under the sanitizers. WHOLE: one
 # more test, whole.GROUP_NAME, runs all of them in one process: none may leave state to the next.
@@ -106,9 +106,11 @@ function(ecdaq_test group name)
 	if(NOT T_TIMEOUT)
 		set(T_TIMEOUT 120)
 	endif()
+	math(EXPR wall_seconds "10 * ${T_TIMEOUT}")
 	if(T_WHOLE)
 		add_test(NAME whole.${exe} COMMAND ${exe})
-		set_tests_properties(whole.${exe} PROPERTIES LABELS "${group};${T_LABELS}" TIMEOUT ${T_TIMEOUT}
+		set_tests_properties(whole.${exe} PROPERTIES LABELS "${group};${T_LABELS}"
+			ENVIRONMENT "ECDAQ_TEST_CPU_SECONDS=${T_TIMEOUT}" TIMEOUT ${wall_seconds}
 			SKIP_RETURN_CODE 77)
 	endif()
 	foreach(source ${T_SOURCES})
@@ -117,7 +119,9 @@ function(ecdaq_test group name)
 		foreach(line ${lines})
 			string(REGEX REPLACE "^TEST\\(([a-z0-9_]+), *([a-z0-9_]+)\\).*" "\\1.\\2" full "${line}")
 			add_test(NAME ${full} COMMAND ${exe} ${full})
-			set_tests_properties(${full} PROPERTIES LABELS "${group};${T_LABELS}" TIMEOUT ${T_TIMEOUT}
+			# The harness limits the CPU time; the wall time only ends a deadlock.
+			set_tests_properties(${full} PROPERTIES LABELS "${group};${T_LABELS}"
+				ENVIRONMENT "ECDAQ_TEST_CPU_SECONDS=${T_TIMEOUT}" TIMEOUT ${wall_seconds}
 				SKIP_RETURN_CODE 77)
 		endforeach()
 	endforeach()

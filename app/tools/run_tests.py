@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: MIT
 """Run groups of tests and add up what ctest, pytest and the fuzz targets report.
 
-Called by `build.sh test`, which has made the Python environment and named the groups. A group is a
-list of suites; a suite is one program that runs tests in one flavour of the build. The last line
-printed is "N passed, N failed, N skipped".
+Called by `build.sh test`, which has made the Python environment. A group is a list of suites; a
+suite is one program that runs tests in one flavour of the build. The last line printed is
+"N passed, N failed, N skipped".
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import platform
 import re
+import resource
 import signal
 import subprocess
 import sys
@@ -21,7 +23,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from test_report import Outcome, read_junit, tail
+from processes import adopt_orphans, end_group
+from test_report import Outcome, fail_unexpected_skips, read_junit, tail
 
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build"
@@ -29,10 +32,25 @@ LOGS = BUILD / "test-logs"
 SUITE_SECONDS = 3000
 BOOT_SECONDS = 9000
 IMAGE_SECONDS = 5400
+FUZZ_SEED = 20261122
+# Of the slowest target, on a loaded machine.
+FUZZ_RUNS_PER_SECOND = 2
+SLOWEST = 10
 IMAGES = ("qemuarm64", "raspberrypi4-64")
 WIRE_FILES = "*/test_?0_sync0_*.py"
-# What two threads share, and how they hand it over: these run under ThreadSanitizer.
-SHARED_STATE_TESTS = r"^(ring|line|board|handover|status|histogram)[._]"
+# What threads share: the tests of these modules run under ThreadSanitizer.
+SHARED_STATE = (
+    "ring",
+    "line",
+    "board",
+    "status",
+    "histogram",
+    "cycle_thread",
+    "control_guard",
+    "daemon_event_queue",
+    "remote_board",
+)
+SHARED_STATE_TESTS = f"^({'|'.join(SHARED_STATE)})[.]"
 CONTROL_TESTS = r"^(control|sim_control|sim_loopback)[.]"
 SYNC0_TESTS = r"^sync0(_gpio|_watch)?\."
 
@@ -81,16 +99,6 @@ def run_logged(
         except BaseException:
             end_group(process)
             raise
-
-
-def end_group(process: subprocess.Popen[bytes]) -> None:
-    """End a suite with all that it started: it leads a process group of its own."""
-    os.killpg(process.pid, signal.SIGTERM)
-    try:
-        process.wait(20)
-    except subprocess.TimeoutExpired:
-        os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
 
 
 def environment(suite: Suite) -> dict[str, str]:
@@ -170,6 +178,9 @@ def run_fuzz_target(suite: Suite, target: Path, seconds: int) -> Outcome:
     for folder in (found, artifacts):
         folder.mkdir(parents=True, exist_ok=True)
     limits = ["-timeout=10", "-rss_limit_mb=2048", f"-artifact_prefix={artifacts}/"]
+    limits += ["-print_final_stats=1"]
+    if os.environ.get("CI"):
+        limits.append(f"-seed={FUZZ_SEED}")
     if (source / f"{name}.dict").exists():
         limits.append(f"-dict={source / f'{name}.dict'}")
     corpus = sorted((source / "corpus").glob("*"))
@@ -191,6 +202,16 @@ def run_fuzz_target(suite: Suite, target: Path, seconds: int) -> Outcome:
         status = run_logged(command, log, environment(suite))
         if (status != 0) == must_fail:
             outcome.passed += 1
+            runs = re.search(
+                r"^stat::number_of_executed_units: *(\d+)", log.read_text(errors="replace"), re.M
+            )
+            if step == "search" and (not runs or int(runs[1]) < FUZZ_RUNS_PER_SECOND * seconds):
+                outcome.passed -= 1
+                did = runs[1] if runs else "no"
+                outcome.failures.append(
+                    f"fuzz: {name} search: {did} runs in {seconds} s, at least "
+                    f"{FUZZ_RUNS_PER_SECOND} a second are expected"
+                )
         else:
             text = tail(log.read_text(errors="replace"), 40)
             outcome.failures.append(f"fuzz: {name} {step}: ended with {status}\n{text}")
@@ -204,6 +225,22 @@ def run_fuzz(suite: Suite, options: argparse.Namespace) -> Outcome:
         if options.only and not re.search(options.only, target.name):
             continue
         outcome.add(run_fuzz_target(suite, target, options.fuzz_seconds))
+    return outcome
+
+
+def run_shared_state(suite: Suite, options: argparse.Namespace) -> Outcome:
+    """The unit tests of what threads share; a name without a test is an error."""
+    listing = subprocess.run(
+        ["ctest", "--test-dir", suite.build_dir, "--show-only=json-v1", *suite.arguments],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    tests = [test["name"] for test in json.loads(listing.stdout)["tests"]]
+    outcome = run_ctest(suite, options)
+    for name in SHARED_STATE:
+        if not any(test.startswith(f"{name}.") for test in tests):
+            outcome.failures.append(f"{suite.name}: no test named {name}.*")
     return outcome
 
 
@@ -226,7 +263,7 @@ GROUPS: dict[str, list[Suite]] = {
     "unit": [
         ctest("unit", "release"),
         ctest("unit", "asan", "-LE", "^long$"),
-        ctest("unit", "tsan", "-R", SHARED_STATE_TESTS),
+        replace(ctest("unit", "tsan", "-R", SHARED_STATE_TESTS), run=run_shared_state),
     ],
     "tidy": [pytest("tidy", "release")],
     "cli": [
@@ -334,6 +371,37 @@ def run_group(group: str, builder: Builder, options: argparse.Namespace) -> Outc
     return total
 
 
+def cpu_seconds() -> float:
+    """Of all children that have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def run_timed(group: str, builder: Builder, options: argparse.Namespace) -> Outcome:
+    started, cpu = time.monotonic(), cpu_seconds()
+    outcome = run_group(group, builder, options)
+    outcome.groups = [(group, time.monotonic() - started, cpu_seconds() - cpu)]
+    return outcome
+
+
+def report_times(total: Outcome) -> None:
+    """Print time per group and the slowest tests; keep both for ./build.sh measure ci."""
+    print(f"\n{'time per group':24} {'wall':>9} {'CPU':>9}")
+    for group, wall, cpu in total.groups:
+        print(f"  {group:22} {wall:7.1f} s {cpu:7.1f} s")
+    slowest = sorted(total.times, reverse=True)[:SLOWEST]
+    print("\nslowest tests")
+    for seconds, name in slowest:
+        print(f"  {seconds:7.1f} s  {name}")
+    LOGS.mkdir(parents=True, exist_ok=True)
+    times = {"groups": total.groups, "slowest": slowest, "totals": total.totals()}
+    (LOGS / "times.json").write_text(json.dumps(times) + "\n")
+
+
+def end_on_signal(number: int, _frame: object) -> None:
+    raise SystemExit(128 + number)
+
+
 def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="build.sh test")
     parser.add_argument("groups", nargs="*")
@@ -351,7 +419,9 @@ def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
 
 def main(arguments: Sequence[str]) -> int:
     # A shell that starts us in the background has SIGINT ignored, and so would all tests' programs.
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, end_on_signal)
+    adopt_orphans()
     options = parse_arguments(arguments)
     for group in options.groups:
         if group not in GROUPS:
@@ -365,14 +435,17 @@ def main(arguments: Sequence[str]) -> int:
     wanted = [g for g in GROUPS if g in (options.groups or usual)]
     builder = Builder()
     for group in wanted:
-        total.add(run_group(group, builder, options))
+        total.add(run_timed(group, builder, options))
         if total.failures and options.fail_fast:
             break
+    if os.environ.get("CI"):
+        fail_unexpected_skips(total, ROOT / "tests" / "expected_skips.txt")
     if total.skips:
         print("\nskipped, and why:\n  " + "\n  ".join(total.skips))
     if total.failures:
         heads = [failure.splitlines()[0] for failure in total.failures]
         print("\nfailed:\n  " + "\n  ".join(heads) + f"\nlogs: {LOGS.relative_to(ROOT)}/")
+    report_times(total)
     print(f"\n{total.totals()}")
     return 1 if total.failures or total.ran == 0 else 0
 

@@ -17,6 +17,9 @@ class Outcome:
     failures: list[str] = field(default_factory=list)
     skips: list[str] = field(default_factory=list)
     log: str = ""
+    # (seconds, name) of each test; (group, wall seconds, CPU seconds) of each group.
+    times: list[tuple[float, str]] = field(default_factory=list)
+    groups: list[tuple[str, float, float]] = field(default_factory=list)
 
     @property
     def ran(self) -> int:
@@ -26,6 +29,8 @@ class Outcome:
         self.passed += other.passed
         self.failures += other.failures
         self.skips += other.skips
+        self.times += other.times
+        self.groups += other.groups
 
     def totals(self) -> str:
         return f"{self.passed} passed, {len(self.failures)} failed, {len(self.skips)} skipped"
@@ -33,6 +38,16 @@ class Outcome:
 
 def tail(text: str, lines: int) -> str:
     return "\n".join(text.rstrip().splitlines()[-lines:])
+
+
+def fail_unexpected_skips(total: Outcome, expected: Path) -> None:
+    """Each skip that no line of @expected (PATTERN, two blanks, REASON) matches is a failure."""
+    lines = [line for line in expected.read_text().splitlines() if line and line[0] != "#"]
+    patterns = [line.split("  ")[0] for line in lines]
+    for skip in list(total.skips):
+        if not any(re.search(pattern, skip) for pattern in patterns):
+            total.skips.remove(skip)
+            total.failures.append(f"{skip} (a skip that tests/expected_skips.txt does not list)")
 
 
 def read_junit(path: Path, label: str) -> Outcome:
@@ -43,6 +58,7 @@ def read_junit(path: Path, label: str) -> Outcome:
         name = case.get("name", "?")
         if where and where != name:
             name = f"{where}.{name}"
+        outcome.times.append((float(case.get("time") or 0), f"{label}: {name}"))
         output = case.findtext("system-out") or ""
         bad = [e for e in case if e.tag in ("failure", "error")]
         skipped = case.find("skipped")

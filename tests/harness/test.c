@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 #include "harness/test.h"
 
+#include <setjmp.h>
 #include <stdarg.h>
 
-jmp_buf *test_after_skip;
-
 static struct test *tests;
+static jmp_buf skip_target;
+static int can_skip;
 
 void test_register(struct test *t)
 {
@@ -25,13 +26,23 @@ void test_fail(const char *file, int line, const char *format, ...)
 	exit(1);
 }
 
-void test_skip(const char *reason)
+void test_skip(const char *why)
 {
-	printf("skipped: %s\n", reason);
-	if (test_after_skip != NULL) {
-		longjmp(*test_after_skip, 1);
+	printf("skipped: %s\n", why);
+	if (!can_skip) {
+		exit(77);
 	}
-	exit(77);
+	longjmp(skip_target, 1);
+}
+
+enum test_result test_run(const struct test *t)
+{
+	can_skip = 1;
+	if (setjmp(skip_target) != 0) {
+		return TEST_SKIPPED;
+	}
+	t->run();
+	return TEST_PASSED;
 }
 
 const struct test *test_first(void)

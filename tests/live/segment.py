@@ -48,7 +48,7 @@ class Namespace:
         )
         assert self.holder.stdout is not None
         if self.holder.stdout.readline() != "ready\n":
-            raise OSError("no network namespace of one's own is to be had here")
+            raise PermissionError("this user may not make a network namespace")
         self.enter = ["nsenter", "--target", str(self.holder.pid), "--net", "--mount"]
         if os.geteuid() != 0:
             self.enter += ["--user", "--preserve-credentials"]

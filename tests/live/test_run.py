@@ -76,7 +76,8 @@ def test_a_minute_at_one_millisecond_loses_and_invents_nothing(
         good.append({s.cycle: s for s in samples if s.good})
         check_values(good[-1])
     both = good[0].keys() & good[1].keys()
-    assert len(both) >= summary["samples_good"] // 2 - 10
+    # Each bad sample takes at most one cycle from those in which both are good.
+    assert 2 * len(both) >= summary["samples_good"] - summary["samples_bad"]
     # The same instant: both slaves stamped their sample with the SYNC0 edge of the cycle.
     assert all(
         good[0][k].sample_time == good[1][k].sample_time == good[0][k].dc_time_ns for k in both
@@ -136,17 +137,19 @@ def test_a_stopped_reader_of_the_ring_changes_nothing_for_the_cycle(
         "watch",
         f"{PICCOLOS[0]}.adc",
     )
-    before = segment.status()
-    with_reader = segment.wait_for_cycles(5_000, 60)
-    segment.send("watch", signal.SIGSTOP)
-    stopped = segment.wait_for_cycles(5_000, 60)
+    lost: dict[signal.Signals, list[int]] = {signal.SIGCONT: [], signal.SIGSTOP: []}
+    for number in [signal.SIGCONT, signal.SIGSTOP] * 3:
+        segment.send("watch", number)
+        before = segment.status()
+        after = segment.wait_for_cycles(2_000, 60)
+        lost[number].append(after["frames_lost"] - before["frames_lost"])
+        for key in ("page_faults", "samples_bad_unexplained"):
+            assert after[key] == 0
     segment.send("watch", signal.SIGCONT)
-    for key in ("page_faults", "samples_bad_unexplained"):
-        assert stopped[key] == 0
-    lost_with = with_reader["frames_lost"] - before["frames_lost"]
-    lost_stopped = stopped["frames_lost"] - with_reader["frames_lost"]
-    print(f"frames lost: {lost_with} with a reader, {lost_stopped} while it was stopped")
-    assert lost_stopped <= 2 * lost_with + 50  # the machine is noisy: only a flood would count
+    print(f"frames lost in 2000 cycles: {lost}")
+    # The machine's own losses come and go; those of a reader that holds up the cycle would be in
+    # each round.
+    assert min(lost[signal.SIGSTOP]) <= max(lost[signal.SIGCONT]) + 5
 
 
 def test_the_cycle_thread_is_alone_with_its_rights(make_segment: Callable[..., Segment]) -> None:

@@ -7,6 +7,7 @@ import argparse
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -166,22 +167,71 @@ def fuzz_target(build: Path, name: str, script: str) -> None:
 
 def test_fuzz_targets_need_a_corpus_and_the_canary_must_be_found(own_build: Path) -> None:
     build = own_build / "build" / "fuzz"
-    fuzz_target(build, "good", "exit 0")
+    fuzz_target(build, "good", "echo stat::number_of_executed_units: 100")
     fuzz_target(build, "bad", "echo ERROR: overflow; exit 77")
     fuzz_target(build, "bare", "exit 0")
+    fuzz_target(build, "slow", "echo stat::number_of_executed_units: 1")
     fuzz_target(build, "canary", "exit 77")
-    for name in ("good", "bad"):
+    for name in ("good", "bad", "slow"):
         corpus = own_build / "tests" / "fuzz" / name / "corpus"
         corpus.mkdir(parents=True)
         (corpus / "one").write_bytes(b"1")
     outcome = run_tests.run_fuzz(run_tests.GROUPS["fuzz"][0], OPTIONS)
-    assert outcome.passed == 3
+    assert outcome.passed == 4
     assert [head.split(":")[1].strip() for head in heads(outcome)] == [
         "bad corpus",
         "bad search",
         "bare",
+        "slow search",
     ]
     fuzz_target(build, "canary", "exit 0")
     assert "fuzz: canary is found: ended with 0" in heads(
         run_tests.run_fuzz(run_tests.GROUPS["fuzz"][0], OPTIONS)
     )
+
+
+def test_a_shared_structure_without_a_test_fails(
+    own_build: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (own_build / "CMakeLists.txt").write_text(CTEST)
+    build = own_build / "build" / "tsan"
+    subprocess.run(["cmake", "-S", own_build, "-B", build], check=True, capture_output=True)
+    monkeypatch.setattr(run_tests, "SHARED_STATE", ("a", "handover"))
+    suite = run_tests.ctest("unit", "tsan", "-R", "^(a|handover)[.]ok")
+    outcome = run_tests.run_shared_state(suite, OPTIONS)
+    assert heads(outcome) == ["unit tsan: no test named handover.*"]
+    assert outcome.passed == 1
+
+
+def test_an_unexpected_skip_is_a_failure_in_ci(own_build: Path) -> None:
+    expected = own_build / "expected"
+    expected.write_text("# comment\nno captures  they are not in the tree\n")
+    total = Outcome(passed=1, skips=["replay: a: no captures here", "live: b: no network"])
+    run_tests.fail_unexpected_skips(total, expected)
+    assert total.skips == ["replay: a: no captures here"]
+    assert heads(total) == [
+        "live: b: no network (a skip that tests/expected_skips.txt does not list)"
+    ]
+
+
+def test_a_signal_ends_everything_that_was_started(own_build: Path) -> None:
+    """A process that has left the process group of its suite, too."""
+    program = f"""
+import signal, sys
+sys.path.insert(0, {str(Path(run_tests.__file__).parent)!r})
+import run_tests
+signal.signal(signal.SIGTERM, run_tests.end_on_signal)
+run_tests.adopt_orphans()
+script = "setsid sleep 600 & echo $! > hidden; sleep 600 & echo $! > visible; wait"
+run_tests.ROOT = run_tests.Path({str(own_build)!r})
+run_tests.run_logged(["sh", "-c", script], run_tests.ROOT / "log", {{"PATH": "/usr/bin:/bin"}})
+"""
+    runner = subprocess.Popen([sys.executable, "-c", program], cwd=own_build)
+    pids = [own_build / "hidden", own_build / "visible"]
+    end = time.monotonic() + 60
+    while not all(path.exists() and path.read_text().strip() for path in pids):
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    runner.terminate()
+    assert runner.wait(60) == 143
+    assert not [path.name for path in pids if Path(f"/proc/{path.read_text().strip()}").exists()]

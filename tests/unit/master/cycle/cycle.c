@@ -2,6 +2,10 @@
 /* The whole cycle against a scripted exchange: what it does with what the bus says. */
 #include "cycle/cycle.h"
 
+#include <pthread.h>
+#include <sched.h>
+#include <stdatomic.h>
+#include <stdlib.h>
 #include <unistd.h>
 
 #include "base/event.h"
@@ -78,10 +82,13 @@ int exchange_ride(struct exchange *ex, mono_t deadline)
 	return 0;
 }
 
+/* In the thread that only reads the DC time, whose host clock is always 0. */
+static _Thread_local int is_dc_reader;
+
 static mono_t world_now(void *ctx)
 {
 	(void)ctx;
-	return world.now;
+	return is_dc_reader ? (mono_t){ 0 } : world.now;
 }
 
 static int64_t world_tai(void *ctx)
@@ -701,4 +708,51 @@ TEST(cycle, outputs_of_a_slave_that_is_not_in_op_are_at_fail_safe)
 	cycle_slaves_set(cy, 3);
 	steps(2);
 	CHECK_EQ(world.seen_output & 1, 1);
+}
+
+enum { DC_READS = 2000 };
+
+struct dc_reads {
+	_Atomic unsigned done;
+	_Atomic int64_t least_ns; /* DC time minus host time */
+	_Atomic int64_t most_ns;
+};
+
+static void *read_dc_time(void *arg)
+{
+	struct dc_reads *reads = arg;
+	int64_t least_ns = INT64_MAX;
+	int64_t most_ns = INT64_MIN;
+
+	is_dc_reader = 1;
+	for (unsigned n = 0; n < DC_READS; sched_yield()) {
+		int64_t dc_ns;
+
+		if (cycle_dc_now(cy, &dc_ns) == 0) {
+			least_ns = dc_ns < least_ns ? dc_ns : least_ns;
+			most_ns = dc_ns > most_ns ? dc_ns : most_ns;
+			n++;
+		}
+	}
+	atomic_store(&reads->least_ns, least_ns);
+	atomic_store(&reads->most_ns, most_ns);
+	atomic_store(&reads->done, 1);
+	return NULL;
+}
+
+TEST(cycle_thread, the_dc_time_read_by_another_thread_belongs_to_its_host_time)
+{
+	struct dc_reads reads = { 0 };
+	pthread_t thread;
+
+	start_in_op();
+	CHECK_EQ(pthread_create(&thread, NULL, read_dc_time, &reads), 0);
+	while (!atomic_load(&reads.done)) {
+		cycle_step(cy);
+	}
+	pthread_join(thread, NULL);
+	/* One cycle is 1 ms: a time of one cycle with the host time of another is that far off. */
+	CHECK(llabs(atomic_load(&reads.least_ns) - world.dc_offset_ns) < PERIOD_NS / 4);
+	CHECK(llabs(atomic_load(&reads.most_ns) - world.dc_offset_ns) < PERIOD_NS / 4);
+	cycle_destroy(cy);
 }
