@@ -79,7 +79,7 @@ static int learn_schema(struct columns *c, const struct mcap_item *item)
 	return 0;
 }
 
-/* 1 if @name is in the list asked for; a list not given has all. */
+/* 1 if @name is in the requested list; no list means all. */
 static int is_wanted(const struct columns *c, const char *name)
 {
 	size_t len = strlen(name);
@@ -180,7 +180,7 @@ static int learn_channel(struct columns *c, const struct mcap_item *item)
 	}
 	for (size_t i = 0; i < c->topic_count; i++) {
 		if (c->topic[i].id == item->id) {
-			return 0; /* said again */
+			return 0; /* a repeated record */
 		}
 	}
 	for (size_t i = 0; i < c->schema_count; i++) {

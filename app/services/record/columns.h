@@ -21,7 +21,7 @@ void columns_destroy(struct columns *c);
  * out. */
 int columns_learn(struct columns *c, const struct mcap_item *item);
 /**
- * All is learnt: check that every channel asked for is there. 0; -ENOENT with its name in
+ * All channels are known: check that every requested one exists. 0; -ENOENT with its name in
  * @ret_missing; -ENODATA: there is no "/ecdaq/cycle".
  */
 int columns_freeze(struct columns *c, char *ret_missing, size_t missing_bytes);

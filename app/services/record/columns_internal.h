@@ -40,7 +40,7 @@ struct columns {
 	size_t topic_count;
 	struct column *column;
 	size_t column_count;
-	int cycle_channel; /* -1: not seen */
+	int cycle_channel; /* -1: none */
 	int is_frozen;
 	int has_row;
 	struct {

@@ -5,7 +5,8 @@
 
 #include "record/mcap.h"
 
-/** Append to *@fd, which must stay where it is as long as the io is used. Short writes go on. */
+/** Append to *@fd, which must stay where it is as long as the io is used. Short writes are
+ * continued. */
 struct mcap_io file_io(int *fd);
 
 /** Read from *@fd as long as it is now. 0 or -errno. */

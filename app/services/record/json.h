@@ -10,7 +10,7 @@
  * U+FFFD. */
 void json_string_n(FILE *out, const char *text, size_t len);
 void json_string(FILE *out, const char *text);
-/** The shortest text that reads back as @value; null for what JSON cannot say. */
+/** The shortest text that reads back as @value; null for what JSON cannot represent. */
 void json_real(FILE *out, double value);
 /** The same as text, "nan" and "inf" included. Returns its length as snprintf does. */
 int real_format(double value, char *buf, size_t buf_len);

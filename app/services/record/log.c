@@ -117,7 +117,7 @@ static int parse(struct args *args, int argc, char **argv, int *ret_code)
 	return 0;
 }
 
-/* The directory asked for, or record.dir. */
+/* The directory of --dir, or record.dir. */
 static int find_dir(const struct arguments *a, char *dir, size_t dir_bytes)
 {
 	static struct config cfg;

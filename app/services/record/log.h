@@ -28,7 +28,7 @@ int log_info(const char *path, enum log_format format, FILE *out, FILE *err);
  * without a gap inside of files and from one to the next. EXIT_CODE_OK: clean.
  */
 int log_check(const char *const *paths, size_t count, enum log_format format, FILE *out, FILE *err);
-/** Repair @path in place, or copy what is whole to @output where that is not NULL. */
+/** Repair @path in place, or copy its undamaged part to @output if that is not NULL. */
 int log_recover(const char *path, const char *output, enum log_format format, FILE *out, FILE *err);
 
 struct log_export_options {

@@ -27,8 +27,9 @@ int log_fail_errno(FILE *err, const char *what, int error)
 	case ENODATA:
 		return log_fail(err, what, "ends before its first record, there is nothing in it");
 	case EXDEV:
-		return log_fail(err, what,
-				"damaged before its end: use --output FILE to copy what is whole");
+		return log_fail(
+			err, what,
+			"damaged before its end: use --output FILE to copy the undamaged part");
 	case EINVAL:
 		return log_fail(err, what, "not a regular file");
 	default:

@@ -13,7 +13,7 @@
 
 struct export {
 	const struct log_export_options *options;
-	struct columns *first; /* of the first file: what the header says */
+	struct columns *first; /* of the first file: as the header describes it */
 	FILE *out;
 	FILE *err;
 	uint64_t rows;
@@ -33,7 +33,7 @@ static void put_row(struct export *ex, const struct columns *c)
 	}
 }
 
-/* All channels are known: they must be what the header says. */
+/* All channels are known: they must be as the header describes it. */
 static int freeze(struct export *ex, struct columns *c, const char *path)
 {
 	char missing[256];
@@ -102,7 +102,7 @@ static int read_items(struct export *ex, struct columns *c, struct mcap_reader *
 				return taken;
 			}
 		} else if (item.kind == MCAP_ITEM_DAMAGE && !log_is_recording(path)) {
-			/* What is whole is exported all the same; the exit code tells. */
+			/* The undamaged part is exported; the exit code reports the damage. */
 			result = log_fail(ex->err, path, item.reason);
 		}
 	}

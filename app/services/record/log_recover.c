@@ -15,8 +15,8 @@ static const char *result_to_str(enum recover_result result)
 	switch (result) {
 	case RECOVER_WAS_WHOLE:
 		return "whole";
-	case RECOVER_MENDED:
-		return "mended";
+	case RECOVER_REPAIRED:
+		return "repaired";
 	case RECOVER_COPIED:
 		return "copied";
 	case RECOVER_EMPTY:
@@ -44,10 +44,10 @@ static void put_result(FILE *out, const char *path, const struct recover_outcome
 	if (o->track.cycles > 0 && o->result != RECOVER_WAS_WHOLE) {
 		fprintf(out, ", lost after cycle %" PRIu64, o->track.last_cycle);
 	}
-	fprintf(out, ", %" PRIu64 " bytes given up\n", o->found.lost_bytes);
+	fprintf(out, ", %" PRIu64 " bytes discarded\n", o->found.lost_bytes);
 }
 
-/* "X.part", mended, becomes "X.mcap" (@ret_path). */
+/* "X.part", repaired, becomes "X.mcap" (@ret_path). */
 static int rename_part(const char *path, char ret_path[PATH_MAX])
 {
 	if (snprintf(ret_path, PATH_MAX, "%s", path) >= PATH_MAX) {
@@ -71,7 +71,7 @@ int log_recover(const char *path, const char *output, enum log_format format, FI
 	if (output != NULL) {
 		r = recover_copy(path, output, &o);
 		if (r == -EEXIST) {
-			return log_fail(err, output, "is there already");
+			return log_fail(err, output, "already exists");
 		}
 		if (r < 0) {
 			return log_fail_errno(err, path, r);
@@ -87,7 +87,7 @@ int log_recover(const char *path, const char *output, enum log_format format, FI
 		return log_fail_errno(err, path, r);
 	}
 	if (o.result == RECOVER_EMPTY) {
-		return log_fail(err, path, "there is no whole chunk in it");
+		return log_fail(err, path, "contains no complete chunk");
 	}
 	r = rename_part(path, final);
 	if (r < 0) {

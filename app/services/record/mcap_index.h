@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What the summary section at the end of an MCAP file will say, collected while the file is written
- * (or scanned for recovery). Index records are kept ready-made; MCAP_LIMIT_INDEX_BYTES bounds them.
+ * The contents of the summary section at the end of an MCAP file, collected while the file is
+ * written (or scanned for recovery). Index records are kept ready-made; MCAP_LIMIT_INDEX_BYTES
+ * bounds them.
  */
 #ifndef RECORD_MCAP_INDEX_H
 #define RECORD_MCAP_INDEX_H
@@ -28,7 +29,7 @@ struct mcap_index {
 	uint32_t metadata_count;
 };
 
-/* A chunk as it stands in the file. */
+/* A chunk in the file. */
 struct mcap_chunk_place {
 	uint64_t offset; /* of its record */
 	uint64_t record_len;
@@ -48,7 +49,7 @@ int mcap_index_channel(struct mcap_index *ix, const uint8_t *record, size_t reco
 /** Note the chunk at @place whose messages @messages was built from. */
 int mcap_index_chunk(struct mcap_index *ix, const struct mcap_chunk_place *place,
 		     const struct mcap_chunk_index *messages);
-/** Note a metadata or attachment record (whole) that stands at @offset. */
+/** Note a metadata or attachment record (whole) at @offset. */
 int mcap_index_metadata(struct mcap_index *ix, uint64_t offset, const uint8_t *record,
 			size_t record_len);
 int mcap_index_attachment(struct mcap_index *ix, uint64_t offset, const uint8_t *record,

@@ -141,7 +141,7 @@ static const char *open_chunk(struct mcap_reader *r, const struct mcap_chunk_fie
 		return "chunk has a compression that this reader does not know";
 	}
 	r->inner_len = (size_t)c->uncompressed_len;
-	/* A CRC of 0 says: none. */
+	/* A CRC of 0 means: none. */
 	if (c->crc != 0 && c->crc != (uint32_t)crc32(0, r->inner, (uInt)r->inner_len)) {
 		return "chunk has a wrong CRC";
 	}

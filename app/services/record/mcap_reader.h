@@ -27,7 +27,7 @@ enum mcap_item_kind {
 				    counts */
 	MCAP_ITEM_OTHER,         /* a record that this reader has no use for */
 	MCAP_ITEM_DATA_END,      /* the last item of a file that was closed */
-	MCAP_ITEM_DAMAGE,        /* reason; the reader goes on behind it if !is_final */
+	MCAP_ITEM_DAMAGE,        /* reason; the reader continues after it if !is_final */
 };
 
 /* Not zero-terminated. */
@@ -40,7 +40,7 @@ struct mcap_text {
 struct mcap_item {
 	enum mcap_item_kind kind;
 	int is_final; /* damage: nothing behind it can be read */
-	int is_inner; /* the record stands inside a chunk */
+	int is_inner; /* the record is inside a chunk */
 	const char *reason;
 	uint64_t offset;       /* of the record in the file; inside a chunk: of the chunk */
 	const uint8_t *record; /* whole, head included; NULL for damage */

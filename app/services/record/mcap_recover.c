@@ -145,7 +145,7 @@ static int take_item(struct mcap_scan *scan, const struct mcap_item *item)
 		return 0;
 	}
 	if (!item->is_inner && scan->found.damaged > 0) {
-		scan->found.needs_copy = 1; /* something whole stands behind the damage */
+		scan->found.needs_copy = 1; /* there are complete records after the damage */
 	}
 	if (!item->is_inner && scan->has_open_index && item->kind != MCAP_ITEM_MESSAGE_INDEX) {
 		scan->found.needs_copy = 1; /* a chunk without its index */
@@ -232,7 +232,7 @@ int mcap_scan_resume(struct mcap_scan *scan, const struct mcap_io *io,
 	if (r < 0) {
 		return r;
 	}
-	/* The index of the last chunk was cut: write it anew as a whole. */
+	/* The index of the last chunk was cut: write it again completely. */
 	mcap_writer_resume(w, scan->has_open_index ? scan->chunk_end : scan->found.valid_bytes,
 			   &scan->index);
 	if (scan->has_open_index) {
@@ -306,7 +306,7 @@ static int copy_item(struct mcap_writer *w, struct mcap_chunk_index *messages,
 	case MCAP_ITEM_ATTACHMENT:
 	case MCAP_ITEM_METADATA:
 		return mcap_writer_copy(w, item->record, item->record_len);
-	case MCAP_ITEM_MESSAGE_INDEX: /* made anew behind its chunk */
+	case MCAP_ITEM_MESSAGE_INDEX: /* generated again after its chunk */
 	case MCAP_ITEM_STATISTICS:
 	case MCAP_ITEM_OTHER:
 	case MCAP_ITEM_DATA_END:

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Mends MCAP files. A file that only lost its end (power cut, killed writer) is mended in place:
- * cut to its last whole record, index of the last chunk completed, summary written. A file that is
- * damaged before its end is copied, damaged records left out. Context of all functions: blocking.
+ * Repairs MCAP files. A file that only lost its end (power cut, killed writer) is repaired in
+ * place: cut to its last whole record, index of the last chunk completed, summary written. A file
+ * that is damaged before its end is copied, damaged records left out. Context of all functions:
+ * blocking.
  */
 #ifndef RECORD_MCAP_RECOVER_H
 #define RECORD_MCAP_RECOVER_H
@@ -21,7 +22,7 @@ struct mcap_findings {
 	const char *reason;   /* of the first; NULL: none */
 	uint64_t reason_offset;
 	enum mcap_ending ending;
-	int needs_copy; /* cannot be mended in place */
+	int needs_copy; /* cannot be repaired in place */
 };
 
 /* Called for each item that the reader finds, damage included. */
@@ -42,7 +43,7 @@ const struct mcap_findings *mcap_scan_findings(const struct mcap_scan *scan);
 int mcap_scan_is_whole(const struct mcap_scan *scan);
 
 /**
- * A writer to @io, the scanned file itself, that goes on behind its valid part; the caller may add
+ * A writer to @io, the scanned file itself, that continues after its valid part; the caller may add
  * records and finishes it. 0; -EXDEV: needs_copy; or -errno. Consumes the scan's index: once per
  * scan.
  */

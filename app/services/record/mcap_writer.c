@@ -23,7 +23,7 @@ struct mcap_writer {
 	uint64_t offset;       /* end of the last whole record in the file */
 	uint16_t next_schema;
 	uint32_t next_channel;
-	int is_torn; /* something may stand behind offset: cut before writing */
+	int is_torn; /* there may be bytes after offset: truncate before writing */
 };
 
 int mcap_writer_create(const struct mcap_io *io, int zstd_level, struct mcap_writer **ret_writer)
@@ -72,7 +72,7 @@ void mcap_writer_destroy(struct mcap_writer *w)
 	free(w);
 }
 
-static int mend(struct mcap_writer *w)
+static int repair(struct mcap_writer *w)
 {
 	int r;
 
@@ -87,7 +87,7 @@ static int mend(struct mcap_writer *w)
 /* Append w->out; on failure cut back to where the file was. */
 static int write_out(struct mcap_writer *w)
 {
-	int r = w->out.error < 0 ? w->out.error : mend(w);
+	int r = w->out.error < 0 ? w->out.error : repair(w);
 
 	if (r < 0) {
 		return r;
@@ -95,7 +95,7 @@ static int write_out(struct mcap_writer *w)
 	r = w->io.write(w->io.ctx, w->out.data, w->out.len);
 	if (r < 0) {
 		w->is_torn = 1;
-		mend(w);
+		repair(w);
 		return r;
 	}
 	w->offset += w->out.len;
@@ -354,7 +354,7 @@ int mcap_writer_finish(struct mcap_writer *w)
 	if (r < 0) {
 		w->offset = data_end;
 		w->is_torn = 1;
-		mend(w);
+		repair(w);
 	}
 	return r;
 }

@@ -43,8 +43,8 @@ void mcap_writer_destroy(struct mcap_writer *w);
 
 /** Magic and header: first of all. 0 or -errno of the I/O. */
 int mcap_writer_begin(struct mcap_writer *w, const char *profile, const char *library);
-/** Go on with a file that ends in a whole record at @offset and has what @index says; @index is
- * moved in. */
+/** Continue a file that ends in a complete record at @offset and contains what @index lists; @index
+ * is moved in. */
 void mcap_writer_resume(struct mcap_writer *w, uint64_t offset, struct mcap_index *index);
 
 /** Add a schema. Its id (from 1 on) or -errno. */
@@ -70,7 +70,7 @@ int mcap_writer_attachment(struct mcap_writer *w, const char *name, const char *
 
 /** Append @record as it is, and note it in the index: for copying what a reader found whole. */
 int mcap_writer_copy(struct mcap_writer *w, const uint8_t *record, size_t record_len);
-/** Note a schema or channel record that stands inside a chunk that is copied. */
+/** Note a schema or channel record inside a chunk that is copied. */
 int mcap_writer_note(struct mcap_writer *w, const uint8_t *record, size_t record_len);
 /** Append the chunk record @record with the index built from its content. */
 int mcap_writer_copy_chunk(struct mcap_writer *w, const uint8_t *record, size_t record_len,

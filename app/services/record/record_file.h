@@ -22,7 +22,7 @@ struct record_file;
 struct record_seam {
 	/** Replace calls of @io, which writes the file at @path. */
 	void (*wrap)(void *ctx, const char *path, struct mcap_io *io);
-	/** Free bytes in @dir. NULL: ask the file system. */
+	/** Free bytes in @dir. NULL: read from the file system. */
 	int (*free_bytes)(void *ctx, const char *dir, uint64_t *ret_bytes);
 	void *ctx;
 };

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What stands in a recording besides its messages: at the start and at the end. Context: blocking.
+/* Records of a recording besides its messages: at the start and at the end. Context: blocking.
  */
 #ifndef RECORD_RECORD_HEAD_H
 #define RECORD_RECORD_HEAD_H

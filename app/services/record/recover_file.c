@@ -12,7 +12,7 @@
 
 #include "record/file_io.h"
 
-/* The note in the file that it was mended, and what is known to be lost. */
+/* A note in the file that it was repaired, and what is known to be lost. */
 static int put_note(struct mcap_writer *w, const struct recover_outcome *o)
 {
 	char last[24];
@@ -60,7 +60,7 @@ static int look(int *fd, struct recover_outcome *o, struct mcap_scan **ret_scan)
 	return r;
 }
 
-static int mend(int *fd, struct mcap_scan *scan, const struct recover_outcome *o)
+static int repair(int *fd, struct mcap_scan *scan, const struct recover_outcome *o)
 {
 	struct mcap_io io = file_io(fd);
 	struct mcap_writer *w;
@@ -76,7 +76,7 @@ static int mend(int *fd, struct mcap_scan *scan, const struct recover_outcome *o
 
 int recover_in_place(const char *path, struct recover_outcome *ret_outcome)
 {
-	struct recover_outcome o = { .result = RECOVER_MENDED };
+	struct recover_outcome o = { .result = RECOVER_REPAIRED };
 	struct mcap_scan *scan = NULL;
 	int fd = open(path, O_RDWR | O_CLOEXEC);
 	int r;
@@ -95,7 +95,7 @@ int recover_in_place(const char *path, struct recover_outcome *ret_outcome)
 	} else if (o.found.messages == 0 && !o.found.needs_copy) {
 		o.result = RECOVER_EMPTY;
 	} else {
-		r = mend(&fd, scan, &o);
+		r = repair(&fd, scan, &o);
 	}
 	mcap_scan_destroy(scan);
 	if (close(fd) < 0 && r == 0) {
@@ -157,7 +157,7 @@ int recover_copy(const char *path, const char *output, struct recover_outcome *r
 	return r;
 }
 
-static void say(const struct recover_report *report, const char *name, const char *what)
+static void report_line(const struct recover_report *report, const char *name, const char *what)
 {
 	char line[512];
 
@@ -165,19 +165,19 @@ static void say(const struct recover_report *report, const char *name, const cha
 	report->line(report->ctx, line);
 }
 
-static void say_outcome(const struct recover_report *report, const char *name,
-			const struct recover_outcome *o)
+static void report_outcome(const struct recover_report *report, const char *name,
+			   const struct recover_outcome *o)
 {
 	char what[320];
 
 	switch (o->result) {
 	case RECOVER_WAS_WHOLE:
-		say(report, name, "was finished but not renamed");
+		report_line(report, name, "complete, but had not been renamed");
 		return;
 	case RECOVER_EMPTY:
-		say(report, name, "removed, there is no sample in it");
+		report_line(report, name, "removed: contains no sample");
 		return;
-	case RECOVER_MENDED:
+	case RECOVER_REPAIRED:
 	case RECOVER_COPIED:
 		snprintf(what, sizeof(what),
 			 "recovered %" PRIu64 " cycles up to cycle %" PRIu64 "%s%s",
@@ -186,7 +186,7 @@ static void say_outcome(const struct recover_report *report, const char *name,
 						     : "",
 			 o->result == RECOVER_COPIED && o->found.reason != NULL ? o->found.reason
 										: "");
-		say(report, name, what);
+		report_line(report, name, what);
 		return;
 	}
 }
@@ -248,7 +248,7 @@ static int recover_part(const struct store *s, const struct store_entry *e,
 	if (r == -EXDEV) {
 		r = replace_by_copy(path, &o);
 	} else if (r == -EPROTO) {
-		say(report, e->name, "is not an MCAP file, kept as .damaged");
+		report_line(report, e->name, "not an MCAP file, kept as .damaged");
 		return rename_part(path, ".damaged");
 	} else if (r == -ENODATA || (r == 0 && o.result == RECOVER_EMPTY)) {
 		o.result = RECOVER_EMPTY;
@@ -257,10 +257,10 @@ static int recover_part(const struct store *s, const struct store_entry *e,
 		r = rename_part(path, ".mcap");
 	}
 	if (r < 0) {
-		say(report, e->name, strerror(-r));
+		report_line(report, e->name, strerror(-r));
 		return r;
 	}
-	say_outcome(report, e->name, &o);
+	report_outcome(report, e->name, &o);
 	set_state(state, &o.track);
 	return 0;
 }

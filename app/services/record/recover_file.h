@@ -9,8 +9,8 @@
 #include "record/track.h"
 
 enum recover_result {
-	RECOVER_WAS_WHOLE, /* nothing to mend */
-	RECOVER_MENDED,    /* in place */
+	RECOVER_WAS_WHOLE, /* nothing to repair */
+	RECOVER_REPAIRED,  /* in place */
 	RECOVER_COPIED,    /* to a new file; damaged records were left out */
 	RECOVER_EMPTY,     /* no message in it: nothing to keep */
 };
@@ -22,9 +22,9 @@ struct recover_outcome {
 };
 
 /**
- * Mend the file at @path in place and make it durable. 0; -EXDEV: damaged before its end, copy it;
- * -EPROTO: not MCAP; -ENODATA: ends before its first record; or -errno. An empty recording is left
- * as it is.
+ * Repair the file at @path in place and make it durable. 0; -EXDEV: damaged before its end, copy
+ * it; -EPROTO: not MCAP; -ENODATA: ends before its first record; or -errno. An empty recording is
+ * left as it is.
  */
 int recover_in_place(const char *path, struct recover_outcome *ret_outcome);
 
@@ -39,7 +39,7 @@ struct recover_report {
 };
 
 /**
- * Mend and rename all .part files of the store, and set @state by what they hold. Empty ones are
+ * Repair and rename all .part files of the store, and set @state by what they hold. Empty ones are
  * removed, what cannot be read is renamed to .damaged. 0, or -errno of the first that failed in a
  * way that may pass (EIO, ENOSPC).
  */

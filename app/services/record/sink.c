@@ -64,7 +64,7 @@ int sink_create(const struct recorder_options *opt, struct sink **ret_sink, char
 		free(s);
 		return r;
 	}
-	/* A state file that is not there or damaged says nothing; the recordings do. */
+	/* If the state file is missing or damaged, the recordings tell where to resume. */
 	(void)store_load_state(s->store, &s->resume);
 	r = recover(s);
 	if (r < 0) {

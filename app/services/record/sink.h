@@ -18,7 +18,7 @@ struct sink;
 
 enum sink_state {
 	SINK_READY,
-	SINK_FULL,   /* no space, or less than the reserve; asked again every second */
+	SINK_FULL,   /* no space, or less than the reserve; checked again every second */
 	SINK_FAILED, /* another error; every second all is recovered as at start, then it is ready
 			again */
 };
@@ -28,7 +28,7 @@ int sink_create(const struct recorder_options *opt, struct sink **ret_sink, char
 		size_t error_bytes);
 void sink_destroy(struct sink *s);
 
-/** Where recording is to go on, as the store knows it. */
+/** Where recording resumes, according to the store. */
 const struct store_state *sink_resume_point(const struct sink *s);
 
 /* The rings whose records are kept beside the samples. */

@@ -89,7 +89,7 @@ int sink_finish_file(struct sink *s, const char *reason)
 		/* The state before the name: if we are killed in between, .part and state agree. */
 		int saved = store_save_state(s->store, &s->resume);
 
-		if (saved < 0) { /* the newest file knows the same, it is only slower to ask */
+		if (saved < 0) { /* the newest file holds the same, it is only slower to read */
 			sink_say(s, "%s: state file: %s", s->opt.dir, strerror(-saved));
 		}
 		r = record_file_publish(s->file);
@@ -167,7 +167,7 @@ int sink_sample(struct sink *s, const struct sample_header *header, const uint8_
 	s->resume.next_cycle = header->cycle + 1;
 	/* By bus time, too: a backlog is read much faster than it came. */
 	if ((int64_t)record_file_open_cycles(s->file) >= s->opt.chunk_period_ns / period_ns) {
-		(void)sink_close_chunk(s); /* the sample is taken; trouble shows in the state */
+		(void)sink_close_chunk(s); /* the sample is kept; an error shows in the state */
 		if (s->state == SINK_READY && sink_is_rotation_due(s)) {
 			(void)sink_finish_file(s, "rotated");
 		}

@@ -12,7 +12,7 @@
 struct sink {
 	struct recorder_options opt;
 	struct store *store;
-	struct store_state resume; /* where to go on if all ended now */
+	struct store_state resume; /* where to resume if recording stopped now */
 	enum sink_state state;
 	int has_rewind;
 	struct record_file *file;    /* NULL between files */
@@ -22,7 +22,7 @@ struct sink {
 	int64_t file_opened_ns;
 	int64_t chunk_opened_ns; /* 0: the chunk is empty */
 	int64_t synced_ns;
-	int64_t checked_ns; /* free space was asked; trouble was looked at */
+	int64_t checked_ns; /* last check of free space and errors */
 	int is_dirty;       /* written since the last sync */
 	uint64_t synced_cycle;
 	uint64_t events_lost; /* in this session, by this process */
@@ -30,7 +30,7 @@ struct sink {
 	uint64_t bytes_done; /* in finished files */
 	uint64_t bytes_free;
 	int64_t last_utc_ns;     /* of the newest sample */
-	struct event full_event; /* the disk was full: told in the next file */
+	struct event full_event; /* the disk was full: written to the next file */
 	int64_t full_utc_ns;
 	char path[512]; /* of the newest file */
 	char message[256];

@@ -2,7 +2,7 @@
 /*
  * The directory of recordings: ecdaq-<UTC>-<session>-<sequence>.mcap, .part while being written.
  * The sequence counts up over all sessions, so it orders the files even where the clock was wrong.
- * One recorder at a time (lock file). The state file says where recording is to go on; an
+ * One recorder at a time (lock file). The state file says where recording resumes; an
  * unfinished file knows better. Context: blocking.
  */
 #ifndef RECORD_STORE_H
@@ -22,7 +22,7 @@ struct store_entry {
 	int is_part;
 };
 
-/* Where to go on, and what was recorded of that session. All zero: nothing was recorded yet. */
+/* Where to resume, and what was recorded of that session. All zero: nothing was recorded yet. */
 struct store_state {
 	uint64_t session;
 	uint64_t next_cycle;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What a recording says of itself while it is read: its session, its cycles and the gaps between
+ * Summary of a recording, made while it is read: its session, its cycles and the gaps between
  * them, its events. A visitor for mcap_scan_create(), or fed item by item. Context: any.
  */
 #ifndef RECORD_TRACK_H
@@ -41,7 +41,7 @@ void track_item(struct track *t, const struct mcap_item *item);
 /** The same as a visitor's function; @track is a struct track. */
 void track_visit(void *track, const struct mcap_item *item);
 
-/** Where to go on behind the (one) recording that was read, and what was recorded of its session so
+/** Where to resume after the (one) recording that was read, and what was recorded of its session so
  * far. */
 struct store_state track_state(const struct track *t);
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Any bytes as a recording: read, checked, printed as a table, mended. What was mended must be
+ * Any bytes as a recording: read, checked, printed as a table, repaired. What was repaired must be
  * whole, and have the messages that were found before.
  */
 #include <assert.h>
@@ -113,7 +113,7 @@ static void check_whole(struct bytes *b, uint64_t messages)
 	mcap_scan_destroy(scan);
 }
 
-static void mend(struct bytes *b)
+static void repair(struct bytes *b)
 {
 	const struct mcap_source source = source_of(b);
 	const struct mcap_io io = io_of(b);
@@ -171,7 +171,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 		mcap_reader_destroy(reader);
 	}
 	print_table(&b, nowhere);
-	mend(&b);
+	repair(&b);
 	free(b.data);
 	return 0;
 }

@@ -156,7 +156,7 @@ TEST(log, check_takes_a_file_that_is_being_recorded_for_no_damage)
 	bench_done(&b);
 }
 
-TEST(log, recover_mends_an_unfinished_recording_and_not_one_in_the_making)
+TEST(log, recover_repairs_an_unfinished_recording_and_not_one_in_the_making)
 {
 	struct bench b = { .calls = 0 };
 	struct printed p = begin();
@@ -177,7 +177,7 @@ TEST(log, recover_mends_an_unfinished_recording_and_not_one_in_the_making)
 	open_both(&p);
 	CHECK_EQ(log_recover(path, NULL, LOG_TEXT, p.out_file, p.err_file), EXIT_CODE_OK);
 	close_both(&p);
-	CHECK(strstr(p.out, "mended") != NULL);
+	CHECK(strstr(p.out, "repaired") != NULL);
 	CHECK(strstr(p.out, "lost after cycle 499") != NULL);
 	done(&p);
 	open_both(&p);
@@ -189,7 +189,7 @@ TEST(log, recover_mends_an_unfinished_recording_and_not_one_in_the_making)
 	open_both(&p);
 	CHECK_EQ(log_recover(path, path, LOG_TEXT, p.out_file, p.err_file), EXIT_CODE_FAILED);
 	close_both(&p);
-	CHECK(strstr(p.err, "is there already") != NULL);
+	CHECK(strstr(p.err, "already exists") != NULL);
 	done(&p);
 	bench_done(&b);
 }

@@ -136,7 +136,7 @@ static void recover_cut(const struct memory_file *whole, size_t len, unsigned ch
 	source = memory_source(&f, f.len);
 	CHECK_EQ(mcap_ending_check(&source, &ending), 0);
 	CHECK_EQ(ending, MCAP_ENDING_GOOD);
-	/* And the mended file has nothing left to mend. */
+	/* And the repaired file has nothing left to repair. */
 	CHECK_EQ(mcap_scan_create(&source, NULL, &scan), 0);
 	CHECK(mcap_scan_is_whole(scan));
 	CHECK(!mcap_scan_findings(scan)->needs_copy);
@@ -167,12 +167,12 @@ static void cut_everywhere(int zstd_level)
 	memory_done(&f);
 }
 
-TEST(mcap, cut_at_every_byte_each_chunk_before_the_cut_is_read_and_the_file_is_mended)
+TEST(mcap, cut_at_every_byte_each_chunk_before_the_cut_is_read_and_the_file_is_repaired)
 {
 	cut_everywhere(0);
 }
 
-TEST(mcap, cut_at_every_byte_a_compressed_file_is_mended_too)
+TEST(mcap, cut_at_every_byte_a_compressed_file_is_repaired_too)
 {
 	cut_everywhere(3);
 }

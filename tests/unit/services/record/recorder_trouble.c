@@ -173,7 +173,7 @@ TEST(recorder_trouble, three_failing_calls_in_a_row_cost_nothing)
 	}
 }
 
-TEST(recorder_trouble, stopped_on_a_full_disk_the_part_stays_and_the_next_start_mends_it)
+TEST(recorder_trouble, stopped_on_a_full_disk_the_part_stays_and_the_next_start_repairs_it)
 {
 	struct bench b = { .error = -ENOSPC };
 	unsigned finished;
