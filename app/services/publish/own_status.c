@@ -35,7 +35,7 @@ static int have_page(struct own_status *own, const struct config *cfg)
 }
 
 void own_status_put(struct own_status *own, const struct config *cfg, const struct topics *topics,
-		    uint64_t session, const struct samples_counts *samples,
+		    uint64_t session, const struct sample_counts *samples,
 		    struct commands_counts commands)
 {
 	struct dds_status *page;

@@ -14,25 +14,24 @@
 #include "base/status.h"
 #include "publish/commands.h"
 #include "publish/domain.h"
-#include "publish/events.h"
+#include "publish/feeds.h"
 #include "publish/own_status.h"
-#include "publish/samples.h"
+#include "publish/sample_writer.h"
 #include "publish/state.h"
-#include "publish/sync0.h"
 #include "publish/topics.h"
 #include "reader/page.h"
 
-#define LOOK_NS (NS_PER_S / 10) /* for rings and pages */
+#define FOLLOW_NS (NS_PER_S / 10) /* between checks for new rings and boards */
 #define PAGE_NS (5 * NS_PER_MS)
 #define PENDING_POLL_NS (200 * NS_PER_US)
-enum { SAMPLES_A_STEP = 64, LOOKS_A_STATUS = 10 };
+enum { SAMPLES_PER_STEP = 64, FOLLOWS_PER_STATUS = 10 };
 
 struct publisher {
 	const struct config *cfg;
 	struct topics topics;
 	struct commands *commands;
 	struct feed *events;
-	struct feed *sync0_events; /* its alarms go to ecdaq/event, too */
+	struct feed *sync0_events; /* published on ecdaq/event as well */
 	struct feed *sync0;
 	struct own_status own;
 	char ring_path[CONFIG_PATH_BYTES];
@@ -41,12 +40,12 @@ struct publisher {
 	const struct status_page *page; /* page_copy; NULL: none */
 	int64_t page_read_ns;
 	struct reader *reader;
-	int reader_error;        /* reported last */
-	struct samples *samples; /* NULL: no session */
-	struct samples_counts counts;
-	int64_t looked_ns;
-	unsigned looks;
-	const char *time_quality; /* as it was told last; NULL: not yet */
+	int reader_error;              /* reported last */
+	struct sample_writer *samples; /* NULL: no session */
+	struct sample_counts counts;
+	int64_t followed_ns;
+	unsigned follows;
+	const char *time_quality; /* reported last; NULL: none */
 };
 
 static int64_t now_ns(void)
@@ -66,7 +65,8 @@ static int open_feed(const struct publisher *p, enum feed_kind kind, const char 
 	if (r < 0) {
 		return r;
 	}
-	/* What happened before we came is in the recording; of a later writer all is published. */
+	/* Older records are in the recording; those of later writers are published from the first.
+	 */
 	*ret_feed = feed_create(kind, path, FEED_AT_NEWEST);
 	return *ret_feed == NULL ? -ENOMEM : 0;
 }
@@ -87,7 +87,7 @@ static int open_sources(struct publisher *p)
 				       sizeof(p->status_path));
 }
 
-static void look_at_page(struct publisher *p)
+static void read_page(struct publisher *p)
 {
 	p->page = page_read_status(p->status_path, &p->page_copy) == 0 ? &p->page_copy : NULL;
 	p->page_read_ns = now_ns();
@@ -130,12 +130,12 @@ int publisher_create(const struct config *cfg, struct publisher **ret_publisher,
 		return -ENOMEM;
 	}
 	p->cfg = cfg;
-	p->looked_ns = INT64_MIN / 2;
+	p->followed_ns = INT64_MIN / 2;
 	r = open_sources(p);
 	if (r < 0) {
 		snprintf(error, error_bytes, "runtime.run_dir: %s", strerror(-r));
 	} else {
-		look_at_page(p);
+		read_page(p);
 		r = check_interface(p, error, error_bytes);
 	}
 	r = r < 0 ? r : domain_check_security(cfg, identity, error, error_bytes);
@@ -152,20 +152,20 @@ int publisher_create(const struct config *cfg, struct publisher **ret_publisher,
 	return 0;
 }
 
-static void tell_own(struct publisher *p)
+static void write_status_page(struct publisher *p)
 {
 	own_status_put(&p->own, p->cfg, &p->topics,
-		       p->samples == NULL ? 0 : samples_table(p->samples)->meta.session, &p->counts,
-		       commands_counts(p->commands));
+		       p->samples == NULL ? 0 : sample_writer_table(p->samples)->meta.session,
+		       &p->counts, commands_counts(p->commands));
 }
 
 static void end_session(struct publisher *p)
 {
 	if (p->samples != NULL) {
-		tell_own(p);
+		write_status_page(p);
 		fprintf(stderr, "ecdaq-dds: session %" PRIu64 " ended\n",
-			samples_table(p->samples)->meta.session);
-		samples_destroy(p->samples);
+			sample_writer_table(p->samples)->meta.session);
+		sample_writer_destroy(p->samples);
 		p->samples = NULL;
 	}
 }
@@ -188,16 +188,17 @@ void publisher_destroy(struct publisher *p)
 
 static void begin_session(struct publisher *p)
 {
-	int r = samples_create(p->reader, p->cfg, &p->topics, &p->counts, &p->samples);
+	int r = sample_writer_create(p->reader, p->cfg, &p->topics, &p->counts, &p->samples);
 
-	r = r < 0 ? r : state_put_channels(&p->topics, p->cfg, samples_table(p->samples));
+	r = r < 0 ? r : state_put_channels(&p->topics, p->cfg, sample_writer_table(p->samples));
 	if (r < 0) {
 		fprintf(stderr, "ecdaq-dds: %s: %s\n", p->ring_path, strerror(-r));
 		reader_skip_session(p->reader);
 		return;
 	}
 	fprintf(stderr, "ecdaq-dds: publishing session %" PRIu64 " in domain %u on %s\n",
-		samples_table(p->samples)->meta.session, p->cfg->dds_domain, p->cfg->dds_interface);
+		sample_writer_table(p->samples)->meta.session, p->cfg->dds_domain,
+		p->cfg->dds_interface);
 }
 
 /* Report once why no session can be read. */
@@ -221,33 +222,33 @@ static void follow_ring(struct publisher *p)
 	report_error(p);
 }
 
-static void tell_state(struct publisher *p)
+static void publish_state(struct publisher *p)
 {
 	struct state_view view = {
 		.page = p->page,
-		.table = p->samples == NULL ? NULL : samples_table(p->samples),
+		.table = p->samples == NULL ? NULL : sample_writer_table(p->samples),
 		.samples = p->counts,
 		.commands = commands_counts(p->commands),
 	};
 	struct timex t = { .modes = 0 };
 
 	state_put_status(&p->topics, &view);
-	tell_own(p);
+	write_status_page(p);
 	if (p->samples != NULL && adjtimex(&t) >= 0) {
-		samples_note_tai_offset(p->samples, t.tai);
+		sample_writer_note_tai_offset(p->samples, t.tai);
 	}
 }
 
-static int look(struct publisher *p, int64_t now, char *error, size_t error_bytes)
+static int follow(struct publisher *p, int64_t now, char *error, size_t error_bytes)
 {
-	p->looked_ns = now;
+	p->followed_ns = now;
 	follow_ring(p);
 	(void)feed_open(p->events, NULL);
 	(void)feed_open(p->sync0_events, NULL);
 	(void)feed_open(p->sync0, NULL);
 	commands_follow(p->commands);
-	if (p->looks++ % LOOKS_A_STATUS == 0) {
-		tell_state(p);
+	if (p->follows++ % FOLLOWS_PER_STATUS == 0) {
+		publish_state(p);
 	}
 	return p->page == NULL                                     ? 0
 	       : check_interface(p, error, error_bytes) == -EINVAL ? -EINVAL
@@ -260,8 +261,8 @@ static int is_op(const struct publisher *p, const struct channel_table *table)
 	       atomic_load_explicit(&p->page->bus_state, memory_order_relaxed) == BUS_OP;
 }
 
-/* Once, and again when it changes: what UTC in the samples is worth. */
-static void tell_time_quality(struct publisher *p, const struct timemap_state *map)
+/* Report the quality of UTC in the samples when it changes. */
+static void report_time_quality(struct publisher *p, const struct timemap_state *map)
 {
 	const char *quality = utc_quality(map);
 
@@ -274,21 +275,21 @@ static void tell_time_quality(struct publisher *p, const struct timemap_state *m
 
 static int publish(struct publisher *p)
 {
-	enum samples_result result = SAMPLES_EMPTY;
+	enum sample_writer_result result = SAMPLE_WRITER_EMPTY;
 	struct timemap_state map;
 
 	if (p->samples == NULL) {
 		return 0;
 	}
-	result = samples_step(p->samples, SAMPLES_A_STEP);
-	if (samples_utc_changed(p->samples, &map) != UTC_UNCHANGED) {
-		state_put_timemap(&p->topics, samples_table(p->samples)->meta.session, &map);
-		tell_time_quality(p, &map);
+	result = sample_writer_step(p->samples, SAMPLES_PER_STEP);
+	if (sample_writer_utc_changed(p->samples, &map) != UTC_UNCHANGED) {
+		state_put_timemap(&p->topics, sample_writer_table(p->samples)->meta.session, &map);
+		report_time_quality(p, &map);
 	}
-	if (result == SAMPLES_ENDED) {
+	if (result == SAMPLE_WRITER_ENDED) {
 		end_session(p);
 	}
-	return result == SAMPLES_MORE;
+	return result == SAMPLE_WRITER_MORE;
 }
 
 static void wait_for_work(const struct publisher *p, int is_pending)
@@ -310,25 +311,25 @@ int publisher_step(struct publisher *publisher, char *error, size_t error_bytes)
 	struct gate_view view = { .now_ns = now };
 	int has_more;
 	int is_pending;
-	int r = now - p->looked_ns >= LOOK_NS ? look(p, now, error, error_bytes) : 0;
+	int r = now - p->followed_ns >= FOLLOW_NS ? follow(p, now, error, error_bytes) : 0;
 
 	if (r < 0) {
 		return r;
 	}
-	/* Whether a command is taken depends on the bus state. */
+	/* Commands are accepted in OP only. */
 	if (now - p->page_read_ns >= PAGE_NS) {
-		look_at_page(p);
+		read_page(p);
 	}
 	has_more = publish(p);
 	if (p->samples != NULL) {
-		view.table = samples_table(p->samples);
-		view.cycle = samples_cycle(p->samples);
+		view.table = sample_writer_table(p->samples);
+		view.cycle = sample_writer_cycle(p->samples);
 		view.is_op = is_op(p, view.table);
 	}
 	is_pending = commands_step(p->commands, &p->topics, &view);
-	events_step(p->events, &p->topics, p->samples);
-	events_step(p->sync0_events, &p->topics, p->samples);
-	sync0_step(p->sync0, &p->topics, p->samples);
+	feeds_put_events(p->events, &p->topics, p->samples);
+	feeds_put_events(p->sync0_events, &p->topics, p->samples);
+	feeds_put_sync0(p->sync0, &p->topics, p->samples);
 	if (!has_more) {
 		wait_for_work(p, is_pending);
 	}

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The whole of ecdaq-dds but its command line: follows the master, publishes, passes commands on.
- */
+/* ecdaq-dds without its command line: follows the master, publishes, forwards commands. */
 #ifndef PUBLISH_PUBLISHER_H
 #define PUBLISH_PUBLISHER_H
 
@@ -15,7 +14,7 @@ int publisher_create(const struct config *cfg, struct publisher **ret_publisher,
 		     size_t error_bytes);
 void publisher_destroy(struct publisher *publisher);
 
-/** One step; waits for news, a cycle at most. 0; -EINVAL: DDS sits on the EtherCAT NIC, end. */
+/** One step; blocks for at most one cycle. 0; -EINVAL: DDS uses the EtherCAT NIC: end. */
 int publisher_step(struct publisher *publisher, char *error, size_t error_bytes);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What is told again to whoever comes later: ecdaq/channels, ecdaq/status, ecdaq/timemap,
- * ecdaq/idl. Context: publisher's thread.
+ * The TRANSIENT_LOCAL topics, which late readers receive as well: ecdaq/channels, ecdaq/status,
+ * ecdaq/timemap, ecdaq/idl. Context: publisher's thread.
  */
 #ifndef PUBLISH_STATE_H
 #define PUBLISH_STATE_H
@@ -10,14 +10,14 @@
 #include "base/timemap.h"
 #include "config/config.h"
 #include "publish/commands.h"
-#include "publish/samples.h"
+#include "publish/sample_writer.h"
 #include "publish/topics.h"
 #include "reader/table.h"
 
 struct state_view {
 	const struct status_page *page;    /* NULL: none */
 	const struct channel_table *table; /* NULL: no master runs */
-	struct samples_counts samples;
+	struct sample_counts samples;
 	struct commands_counts commands;
 };
 

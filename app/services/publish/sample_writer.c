@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "publish/samples.h"
+#include "publish/sample_writer.h"
 
 #include <errno.h>
 #include <math.h>
@@ -10,7 +10,7 @@
 #include "image/image.h"
 #include "ros2.h"
 
-/* One slave's messages; their sequences point to memory of ours. */
+/* The messages of one slave; their sequences point to the buffers below. */
 struct slave_out {
 	ecdaq_SampleV1 sample;
 	ecdaq_BlockV1 block;
@@ -31,11 +31,11 @@ struct slave_out {
 	const struct channel *sample_time_channel;
 };
 
-struct samples {
+struct sample_writer {
 	struct reader *reader;
 	const struct channel_table *table; /* the reader's */
 	const struct topics *topics;
-	struct samples_counts *counts;
+	struct sample_counts *counts;
 	struct utc *utc;
 	uint32_t block_cycles;
 	uint64_t cycle;
@@ -112,7 +112,7 @@ static void free_out(struct slave_out *out)
 	free(out->block_raw);
 }
 
-static int make_all(struct samples *s)
+static int make_all(struct sample_writer *s)
 {
 	uint32_t slaves = s->table->meta.slave_count;
 
@@ -131,10 +131,11 @@ static int make_all(struct samples *s)
 	return 0;
 }
 
-int samples_create(struct reader *reader, const struct config *cfg, const struct topics *topics,
-		   struct samples_counts *counts, struct samples **ret_samples)
+int sample_writer_create(struct reader *reader, const struct config *cfg,
+			 const struct topics *topics, struct sample_counts *counts,
+			 struct sample_writer **ret_samples)
 {
-	struct samples *s = calloc(1, sizeof(*s));
+	struct sample_writer *s = calloc(1, sizeof(*s));
 	int r;
 
 	if (s == NULL) {
@@ -147,20 +148,20 @@ int samples_create(struct reader *reader, const struct config *cfg, const struct
 	s->block_cycles = cfg->dds_block_cycles;
 	r = make_all(s);
 	if (r < 0) {
-		samples_destroy(s);
+		sample_writer_destroy(s);
 		return r;
 	}
 	*ret_samples = s;
 	return 0;
 }
 
-static void put(struct samples *s, dds_entity_t writer, const void *message)
+static void put(struct sample_writer *s, dds_entity_t writer, const void *message)
 {
 	s->counts->failed += topics_write(writer, message, s->utc_ns) < 0;
 }
 
-/* The same once more, under the names of ROS 2. One writer for all slaves: the type has no key. */
-static void mirror(struct samples *s, struct slave_out *out)
+/* The same sample for ROS 2. One writer for all slaves: the type has no key. */
+static void mirror(struct sample_writer *s, struct slave_out *out)
 {
 	const ecdaq_SampleV1 *m = &out->sample;
 	ecdaq_msgs_msg_dds__Sample_ twin = {
@@ -181,7 +182,7 @@ static void mirror(struct samples *s, struct slave_out *out)
 	put(s, s->topics->ros2_sample, &twin);
 }
 
-static void flush_block(struct samples *s, struct slave_out *out)
+static void flush_block(struct sample_writer *s, struct slave_out *out)
 {
 	ecdaq_BlockV1 *b = &out->block;
 	uint32_t n = b->count;
@@ -203,7 +204,7 @@ static void flush_block(struct samples *s, struct slave_out *out)
 	b->count = 0;
 }
 
-void samples_destroy(struct samples *s)
+void sample_writer_destroy(struct sample_writer *s)
 {
 	if (s == NULL) {
 		return;
@@ -217,7 +218,7 @@ void samples_destroy(struct samples *s)
 	free(s);
 }
 
-static void add_to_block(struct samples *s, struct slave_out *out)
+static void add_to_block(struct sample_writer *s, struct slave_out *out)
 {
 	const ecdaq_SampleV1 *m = &out->sample;
 	ecdaq_BlockV1 *b = &out->block;
@@ -248,7 +249,7 @@ static uint64_t raw_of(const struct channel *ch, const uint8_t *image)
 	return ch == NULL ? 0 : image_get_raw(image, ch);
 }
 
-static void put_slave(struct samples *s, uint32_t slave)
+static void put_slave(struct sample_writer *s, uint32_t slave)
 {
 	const struct sample_header *h = reader_header(s->reader);
 	const uint8_t *image = reader_image(s->reader);
@@ -276,7 +277,7 @@ static void put_slave(struct samples *s, uint32_t slave)
 	add_to_block(s, out);
 }
 
-static void put_cycle(struct samples *s)
+static void put_cycle(struct sample_writer *s)
 {
 	/* Without memory for a new map the old one goes on for this sample. */
 	(void)utc_feed(s->utc, reader_header(s->reader), &s->utc_ns);
@@ -287,7 +288,7 @@ static void put_cycle(struct samples *s)
 	s->counts->published++;
 }
 
-enum samples_result samples_step(struct samples *s, unsigned most)
+enum sample_writer_result sample_writer_step(struct sample_writer *s, unsigned most)
 {
 	uint64_t lost = 0;
 
@@ -300,37 +301,37 @@ enum samples_result samples_step(struct samples *s, unsigned most)
 			s->counts->missed += lost;
 			break;
 		case READER_EMPTY:
-			return SAMPLES_EMPTY;
+			return SAMPLE_WRITER_EMPTY;
 		case READER_BEGUN:
 		case READER_WAITING:
 		case READER_ENDED:
-			return SAMPLES_ENDED;
+			return SAMPLE_WRITER_ENDED;
 		}
 	}
-	return SAMPLES_MORE;
+	return SAMPLE_WRITER_MORE;
 }
 
-const struct channel_table *samples_table(const struct samples *s)
+const struct channel_table *sample_writer_table(const struct sample_writer *s)
 {
 	return s->table;
 }
 
-uint64_t samples_cycle(const struct samples *s)
+uint64_t sample_writer_cycle(const struct sample_writer *s)
 {
 	return s->cycle;
 }
 
-int64_t samples_utc_of_tai(const struct samples *s, int64_t tai_ns)
+int64_t sample_writer_utc_of_tai(const struct sample_writer *s, int64_t tai_ns)
 {
 	return utc_of_tai(s->utc, tai_ns);
 }
 
-void samples_note_tai_offset(struct samples *s, int32_t tai_offset_s)
+void sample_writer_note_tai_offset(struct sample_writer *s, int32_t tai_offset_s)
 {
 	utc_note_tai_offset(s->utc, tai_offset_s);
 }
 
-enum utc_change samples_utc_changed(struct samples *s, struct timemap_state *ret)
+enum utc_change sample_writer_utc_changed(struct sample_writer *s, struct timemap_state *ret)
 {
 	return utc_changed(s->utc, ret);
 }

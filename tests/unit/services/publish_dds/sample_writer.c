@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "publish/samples.h"
+#include "publish/sample_writer.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -41,10 +41,10 @@ struct bench {
 	char path[128];
 	struct config cfg;
 	struct topics topics;
-	struct samples_counts counts;
+	struct sample_counts counts;
 	struct ring *ring;
 	struct reader *reader;
-	struct samples *samples;
+	struct sample_writer *samples;
 };
 
 static void bench_open(struct bench *b, uint64_t slots)
@@ -62,12 +62,12 @@ static void bench_open(struct bench *b, uint64_t slots)
 	b->ring = made_ring(b->path, &meta, slots);
 	CHECK_EQ(reader_create(b->path, READER_AT_OLDEST, &b->reader), 0);
 	CHECK_EQ(reader_next(b->reader, &lost), READER_BEGUN);
-	CHECK_EQ(samples_create(b->reader, &b->cfg, &b->topics, &b->counts, &b->samples), 0);
+	CHECK_EQ(sample_writer_create(b->reader, &b->cfg, &b->topics, &b->counts, &b->samples), 0);
 }
 
 static void bench_close(struct bench *b)
 {
-	samples_destroy(b->samples);
+	sample_writer_destroy(b->samples);
 	reader_destroy(b->reader);
 	ring_destroy(b->ring);
 	fake_topics(NULL);
@@ -83,7 +83,7 @@ TEST(publish_samples, a_low_working_counter_marks_the_lost_slaves_sample_only)
 	made_push(b.ring, 1, 2, SAMPLE_WKC_LOW);
 	made_push(b.ring, 2, 3, SAMPLE_LOST);
 	made_push(b.ring, 3, 0, SAMPLE_LATE);
-	CHECK_EQ(samples_step(b.samples, 10), SAMPLES_EMPTY);
+	CHECK_EQ(sample_writer_step(b.samples, 10), SAMPLE_WRITER_EMPTY);
 	CHECK_EQ(got_count, 6);
 	CHECK_EQ(got[0].slave, 0);
 	CHECK_EQ(got[0].flags, SAMPLE_WKC_LOW);
@@ -102,17 +102,17 @@ TEST(publish_samples, a_low_working_counter_marks_the_lost_slaves_sample_only)
 TEST(publish_samples, a_ring_truncated_while_it_is_published_ends_the_session)
 {
 	struct bench b;
-	enum samples_result result;
+	enum sample_writer_result result;
 
 	bench_open(&b, 4096);
 	for (uint64_t i = 0; i < 1500; i++) {
 		made_push(b.ring, i, 0, 0);
 	}
-	CHECK_EQ(samples_step(b.samples, 10), SAMPLES_MORE);
+	CHECK_EQ(sample_writer_step(b.samples, 10), SAMPLE_WRITER_MORE);
 	made_truncate(b.path, 4096);
-	while ((result = samples_step(b.samples, 64)) == SAMPLES_MORE) {
+	while ((result = sample_writer_step(b.samples, 64)) == SAMPLE_WRITER_MORE) {
 	}
-	CHECK_EQ(result, SAMPLES_ENDED);
+	CHECK_EQ(result, SAMPLE_WRITER_ENDED);
 	CHECK(b.counts.published >= 10 && b.counts.published < 1500);
 	made_truncate(b.path, 1 << 20);
 	bench_close(&b);
@@ -128,7 +128,7 @@ TEST(publish_samples, sizes_raised_while_it_is_published_change_no_message)
 		made_push(b.ring, i, 0, 0);
 	}
 	made_overwrite(b.path, MADE_PAYLOAD_BYTES, &large, sizeof(large));
-	CHECK_EQ(samples_step(b.samples, 1000), SAMPLES_EMPTY);
+	CHECK_EQ(sample_writer_step(b.samples, 1000), SAMPLE_WRITER_EMPTY);
 	CHECK_EQ(got_count, 400);
 	for (size_t i = 0; i < got_count; i++) {
 		CHECK_EQ(got[i].cycle, i / 2);
