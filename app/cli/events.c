@@ -8,18 +8,19 @@
 
 #include "base/clock.h"
 #include "base/event.h"
-#include "base/ring.h"
 #include "cli/cli.h"
 #include "cli/json.h"
 #include "cli/screen.h"
 #include "cli/text.h"
 #include "program/args.h"
+#include "reader/feed.h"
+#include "reader/reader.h"
 
 struct events {
 	struct cli *cli;
-	struct ring_reader *reader;
-	struct ring_reader *sync0; /* that of ecdaq-sync0; NULL: none */
-	struct event waiting;      /* read from it, and not older than what was printed */
+	struct feed *feed;
+	struct feed *sync0;   /* of ecdaq-sync0 */
+	struct event waiting; /* read from it, and not older than what was printed */
 	int has_waiting;
 	int is_json;
 	int is_follow;
@@ -105,23 +106,18 @@ static void print_lost(const struct events *events, uint64_t lost)
 /* Merge both rings: print the events of ecdaq-sync0 before @mono_ns. */
 static void print_sync0_until(struct events *events, int64_t mono_ns)
 {
-	uint64_t lost = 0;
+	for (;;) {
+		uint64_t lost = 0;
 
-	while (events->sync0 != NULL) {
 		if (!events->has_waiting) {
-			switch (ring_read(events->sync0, &events->waiting, sizeof(events->waiting),
-					  &lost)) {
-			case RING_OK:
-				events->has_waiting = 1;
-				break;
-			case RING_LOST:
-				print_lost(events, lost);
-				continue;
-			case RING_EMPTY:
-			case RING_CLOSED:
-			case RING_DAMAGED:
-				return;
-			}
+			events->has_waiting = feed_read(events->sync0, &events->waiting,
+							sizeof(events->waiting), NULL, &lost);
+		}
+		if (lost > 0) {
+			print_lost(events, lost);
+		}
+		if (!events->has_waiting) {
+			return;
 		}
 		if (events->waiting.mono_ns >= mono_ns) {
 			return;
@@ -131,100 +127,83 @@ static void print_sync0_until(struct events *events, int64_t mono_ns)
 	}
 }
 
-/* It may not have been started, or anew: look again, as long as nothing of it is left to read. */
-static void open_sync0(struct events *events)
-{
-	char path[CONFIG_PATH_BYTES];
-	uint64_t oldest;
-
-	if (events->sync0 != NULL) {
-		if (events->has_waiting || !ring_is_replaced(events->sync0)) {
-			return;
-		}
-		ring_reader_destroy(events->sync0);
-		events->sync0 = NULL;
-	}
-	if (cli_path(events->cli, CONFIG_RUN_SYNC0_EVENTS, path) != EXIT_CODE_OK ||
-	    ring_reader_open(path, &events->sync0) < 0) {
-		events->sync0 = NULL;
-		return;
-	}
-	if (strcmp(ring_kind(events->sync0), "event") != 0 ||
-	    ring_payload_bytes(events->sync0) != sizeof(struct event)) {
-		ring_reader_destroy(events->sync0);
-		events->sync0 = NULL;
-		return;
-	}
-	oldest = ring_oldest(events->sync0);
-	if (events->count > 0 && ring_newest(events->sync0) - oldest > events->count) {
-		oldest = ring_newest(events->sync0) - events->count;
-	}
-	ring_seek(events->sync0, oldest);
-}
-
 static enum exit_code run(struct events *events)
 {
-	uint64_t lost = 0;
-	struct event ev;
-
 	for (;;) {
-		switch (ring_read(events->reader, &ev, sizeof(ev), &lost)) {
-		case RING_OK:
+		uint64_t lost = 0;
+		struct event ev;
+		int got = feed_read(events->feed, &ev, sizeof(ev), NULL, &lost);
+
+		if (lost > 0) {
+			print_lost(events, lost);
+		}
+		if (got) {
 			print_sync0_until(events, ev.mono_ns);
 			print(events, &ev);
-			break;
-		case RING_LOST:
-			print_lost(events, lost);
-			break;
-		case RING_EMPTY:
-			print_sync0_until(events, INT64_MAX);
-			if (!events->is_follow || ring_is_orphaned(events->reader)) {
-				return EXIT_CODE_OK;
-			}
-			fflush(stdout);
-			open_sync0(events);
-			screen_wait(20 * NS_PER_MS);
-			if (screen_is_over() || ferror(stdout)) {
-				return EXIT_CODE_OK;
-			}
-			break;
-		case RING_CLOSED:
-		case RING_DAMAGED:
-			print_sync0_until(events, INT64_MAX);
+			continue;
+		}
+		print_sync0_until(events, INT64_MAX);
+		if (feed_is_over(events->feed)) {
+			return feed_open(events->feed, NULL) == -EIO
+				       ? cli_fail(events->cli, EXIT_CODE_FAILED, "events: %s",
+						  reader_error_to_str(-EIO))
+				       : EXIT_CODE_OK;
+		}
+		if (!events->is_follow) {
+			return EXIT_CODE_OK;
+		}
+		fflush(stdout);
+		/* It may not have been started yet, or started again. */
+		(void)feed_open(events->sync0, NULL);
+		screen_wait(20 * NS_PER_MS);
+		if (screen_is_over() || ferror(stdout)) {
 			return EXIT_CODE_OK;
 		}
 	}
 }
 
-static enum exit_code open_ring(struct events *events)
+static enum exit_code fail_open(const struct cli *cli, const char *path, int error)
+{
+	switch (error) {
+	case -ENOENT:
+	case -ENOTDIR:
+		return cli_fail(cli, EXIT_CODE_NO_DAEMON,
+				"events: %s is not there: is ecdaqd running?", path);
+	case -EACCES:
+	case -EPERM:
+		return cli_fail(cli, EXIT_CODE_PERMISSION,
+				"events: no permission to read %s: be root or in its group", path);
+	case -EPROTO:
+		return cli_fail(cli, EXIT_CODE_FAILED,
+				"events: %s is of another version of ecdaq, or damaged", path);
+	default:
+		return cli_fail(cli, EXIT_CODE_FAILED, "events: %s: %s", path, strerror(-error));
+	}
+}
+
+static enum exit_code open_feeds(struct events *events)
 {
 	char path[CONFIG_PATH_BYTES];
+	char sync0_path[CONFIG_PATH_BYTES];
 	enum exit_code result = cli_path(events->cli, CONFIG_RUN_EVENTS, path);
 	int r;
 
+	result = result != EXIT_CODE_OK
+			 ? result
+			 : cli_path(events->cli, CONFIG_RUN_SYNC0_EVENTS, sync0_path);
 	if (result != EXIT_CODE_OK) {
 		return result;
 	}
-	r = ring_reader_open(path, &events->reader);
-	if (r == -ENOENT || r == -ENOTDIR) {
-		return cli_fail(events->cli, EXIT_CODE_NO_DAEMON,
-				"events: %s is not there: is ecdaqd running?", path);
+	events->feed = feed_create(FEED_EVENTS, path, FEED_AT_OLDEST);
+	events->sync0 = feed_create(FEED_EVENTS, sync0_path, FEED_AT_OLDEST);
+	r = events->feed == NULL || events->sync0 == NULL ? -ENOMEM : feed_open(events->feed, NULL);
+	if (r < 0) {
+		return fail_open(events->cli, path, r);
 	}
-	if (r == -EACCES || r == -EPERM) {
-		return cli_fail(events->cli, EXIT_CODE_PERMISSION,
-				"events: no permission to read %s: be root or in its group", path);
-	}
-	if (r == 0 && (strcmp(ring_kind(events->reader), "event") != 0 ||
-		       ring_payload_bytes(events->reader) != sizeof(struct event))) {
-		ring_reader_destroy(events->reader);
-		r = -EPROTO;
-	}
-	if (r == -EPROTO) {
-		return cli_fail(events->cli, EXIT_CODE_FAILED,
-				"events: %s is of another version of ecdaq, or damaged", path);
-	}
-	return r < 0 ? cli_fail(events->cli, EXIT_CODE_FAILED, "events: %s: %s", path, strerror(-r))
-		     : EXIT_CODE_OK;
+	feed_seek_back(events->feed, events->count);
+	(void)feed_open(events->sync0, NULL);
+	feed_seek_back(events->sync0, events->count);
+	return EXIT_CODE_OK;
 }
 
 static enum exit_code parse_level(struct events *events)
@@ -254,7 +233,6 @@ enum exit_code verb_events(struct cli *cli, int argc, char **argv)
 	};
 	struct args args = { .options = options, .option_count = 4 };
 	enum exit_code result;
-	uint64_t oldest;
 
 	if (!cli_parse(cli, &args, argc, argv, &result)) {
 		return result;
@@ -263,19 +241,12 @@ enum exit_code verb_events(struct cli *cli, int argc, char **argv)
 	if (result != EXIT_CODE_OK) {
 		return result;
 	}
-	result = open_ring(&events);
-	if (result != EXIT_CODE_OK) {
-		return result;
+	result = open_feeds(&events);
+	if (result == EXIT_CODE_OK) {
+		screen_catch_signals();
+		result = run(&events);
 	}
-	oldest = ring_oldest(events.reader);
-	if (events.count > 0 && ring_newest(events.reader) - oldest > events.count) {
-		oldest = ring_newest(events.reader) - events.count;
-	}
-	ring_seek(events.reader, oldest);
-	open_sync0(&events);
-	screen_catch_signals();
-	result = run(&events);
-	ring_reader_destroy(events.reader);
-	ring_reader_destroy(events.sync0);
+	feed_destroy(events.feed);
+	feed_destroy(events.sync0);
 	return result;
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "cli/follow.h"
 
+#include <errno.h>
 #include <stddef.h>
 
 #include "base/clock.h"
@@ -41,23 +42,6 @@ static int may_go_on(struct follow *follow)
 	return source_is_alive(page->pid) && state != BUS_STOPPED && state != BUS_FAILED;
 }
 
-static enum follow_news next_ring(struct follow *follow)
-{
-	struct samples samples;
-
-	if (!ring_is_replaced(follow->samples.reader)) {
-		return may_go_on(follow) ? FOLLOW_IDLE : FOLLOW_ENDED;
-	}
-	/* The path may be empty for a moment. */
-	if (samples_try(follow->cli, &samples) < 0) {
-		return may_go_on(follow) ? FOLLOW_IDLE : FOLLOW_ENDED;
-	}
-	samples_close(&follow->samples);
-	follow->samples = samples;
-	ring_seek(samples.reader, ring_oldest(samples.reader));
-	return FOLLOW_NEW_BUS;
-}
-
 enum follow_news follow_next(struct follow *follow, uint64_t *ret_lost)
 {
 	enum follow_news news = FOLLOW_IDLE;
@@ -68,20 +52,25 @@ enum follow_news follow_next(struct follow *follow, uint64_t *ret_lost)
 	if (screen_is_over()) {
 		return FOLLOW_OVER;
 	}
-	switch (ring_read(follow->samples.reader, follow->samples.payload,
-			  ring_payload_bytes(follow->samples.reader), ret_lost)) {
-	case RING_OK:
+	switch (reader_next(follow->samples.reader, ret_lost)) {
+	case READER_SAMPLE:
 		news = FOLLOW_SAMPLE;
 		break;
-	case RING_LOST:
+	case READER_LOST:
 		news = FOLLOW_LOST;
 		break;
-	case RING_EMPTY:
-		news = ring_is_orphaned(follow->samples.reader) ? next_ring(follow) : FOLLOW_IDLE;
+	case READER_EMPTY:
 		break;
-	case RING_CLOSED:
-	case RING_DAMAGED:
-		news = next_ring(follow);
+	case READER_BEGUN:
+		samples_take_table(&follow->samples);
+		news = FOLLOW_NEW_BUS;
+		break;
+	case READER_ENDED:
+	case READER_WAITING:
+		if (reader_error(follow->samples.reader) == -EIO) {
+			return FOLLOW_DAMAGED;
+		}
+		news = may_go_on(follow) ? FOLLOW_IDLE : FOLLOW_ENDED;
 		break;
 	}
 	follow->is_idle = news == FOLLOW_IDLE;

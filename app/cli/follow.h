@@ -22,6 +22,7 @@ enum follow_news {
 	FOLLOW_IDLE,    /* nothing more for now: write out what you have */
 	FOLLOW_NEW_BUS, /* ecdaqd has started the bus anew: look channels up again */
 	FOLLOW_ENDED,   /* ecdaqd has ended */
+	FOLLOW_DAMAGED, /* the ring was truncated or overwritten */
 	FOLLOW_OVER,    /* the user wants to stop */
 };
 

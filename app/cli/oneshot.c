@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* ecdaq oneshot: arm SYNC0 of one slave or of all for one instant, and wait for the conversion. */
+#include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
@@ -185,6 +186,9 @@ static enum exit_code wait_for_all(struct oneshot *one)
 		case FOLLOW_ENDED:
 			return cli_fail(one->cli, EXIT_CODE_FAILED,
 					"the bus was stopped before the conversion");
+		case FOLLOW_DAMAGED:
+			return cli_fail(one->cli, EXIT_CODE_FAILED, "samples: %s",
+					reader_error_to_str(-EIO));
 		case FOLLOW_OVER:
 			return cli_fail(one->cli, EXIT_CODE_FAILED, "interrupted");
 		}

@@ -28,9 +28,7 @@ void report_gather(struct cli *cli, const struct status_page *page,
 	report.sync0 = sync0_source_try(cli);
 	report.is_sync0_running = report.sync0 != NULL && source_is_alive(report.sync0->pid);
 	if (samples_try(cli, &samples) == 0) {
-		if (samples.meta->session == page->session &&
-		    ring_peek_newest(samples.reader, samples.payload,
-				     ring_payload_bytes(samples.reader)) == RING_OK) {
+		if (samples.meta->session == page->session && reader_read_newest(samples.reader)) {
 			struct sample_header header = samples_header(&samples);
 
 			report.has_wkc = 1;

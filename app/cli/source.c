@@ -7,7 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "image/image.h"
 #include "reader/page.h"
 
 /* Say why @path cannot be read. */
@@ -94,11 +93,6 @@ int source_is_alive(int64_t pid)
 	return pid > 0 && (kill((pid_t)pid, 0) == 0 || errno == EPERM);
 }
 
-static int is_closed_text(const char *text, size_t len)
-{
-	return memchr(text, 0, len) != NULL;
-}
-
 const struct dds_status *source_dds(struct cli *cli)
 {
 	struct dds_status *dds = malloc(sizeof(*dds));
@@ -112,64 +106,34 @@ const struct dds_status *source_dds(struct cli *cli)
 	return dds;
 }
 
-/* Does the ring's description fit into its meta area, and what it describes into a slot? */
-static int is_sane(const struct ring_reader *reader)
+void samples_take_table(struct samples *samples)
 {
-	size_t bytes;
-	const struct sample_meta *meta = ring_meta(reader, &bytes);
-	const struct slave_info *slaves;
-	const struct channel *channels;
-
-	if (strcmp(ring_kind(reader), "sample") != 0 || bytes < sizeof(*meta) ||
-	    meta->version != SAMPLE_VERSION || meta->slave_count > LIMIT_SLAVES ||
-	    meta->channel_count > LIMIT_CHANNELS ||
-	    bytes < sizeof(*meta) + meta->slave_count * sizeof(*slaves) +
-			    meta->channel_count * sizeof(*channels) ||
-	    ring_payload_bytes(reader) < sizeof(struct sample_header) ||
-	    meta->image_bytes > ring_payload_bytes(reader) - sizeof(struct sample_header)) {
-		return 0;
-	}
-	slaves = sample_meta_slaves(meta);
-	channels = sample_meta_channels(meta);
-	for (uint32_t i = 0; i < meta->slave_count; i++) {
-		if (!is_closed_text(slaves[i].name, sizeof(slaves[i].name)) ||
-		    !is_closed_text(slaves[i].device, sizeof(slaves[i].device))) {
-			return 0;
-		}
-	}
-	for (uint32_t i = 0; i < meta->channel_count; i++) {
-		if (!is_closed_text(channels[i].name, sizeof(channels[i].name)) ||
-		    !is_closed_text(channels[i].unit, sizeof(channels[i].unit)) ||
-		    !image_channel_fits(&channels[i], meta->image_bytes)) {
-			return 0;
-		}
-	}
-	return 1;
+	samples->table = reader_table(samples->reader);
+	samples->meta = &samples->table->meta;
+	samples->slaves = samples->table->slaves;
+	samples->channels = samples->table->channels;
 }
 
 int samples_try(struct cli *cli, struct samples *ret_samples)
 {
 	struct samples samples = { .reader = NULL };
 	char path[CONFIG_PATH_BYTES];
-	size_t bytes;
+	uint64_t lost;
 	int r;
 
 	if (cli_path(cli, CONFIG_RUN_SAMPLES, path) != EXIT_CODE_OK) {
 		return -ENAMETOOLONG;
 	}
-	r = ring_reader_open(path, &samples.reader);
+	r = reader_create(path, READER_AT_NEWEST, &samples.reader);
 	if (r < 0) {
 		return r;
 	}
-	samples.payload = malloc(ring_payload_bytes(samples.reader));
-	if (samples.payload == NULL || !is_sane(samples.reader)) {
-		r = samples.payload == NULL ? -ENOMEM : -EPROTO;
+	if (reader_next(samples.reader, &lost) != READER_BEGUN) {
+		r = reader_error(samples.reader);
 		samples_close(&samples);
 		return r;
 	}
-	samples.meta = ring_meta(samples.reader, &bytes);
-	samples.slaves = sample_meta_slaves(samples.meta);
-	samples.channels = sample_meta_channels(samples.meta);
+	samples_take_table(&samples);
 	*ret_samples = samples;
 	return 0;
 }
@@ -189,23 +153,18 @@ enum exit_code samples_open(struct cli *cli, struct samples *ret_samples)
 
 void samples_close(struct samples *samples)
 {
-	ring_reader_destroy(samples->reader);
-	free(samples->payload);
+	reader_destroy(samples->reader);
 	samples->reader = NULL;
-	samples->payload = NULL;
 }
 
 struct sample_header samples_header(const struct samples *samples)
 {
-	struct sample_header header;
-
-	memcpy(&header, samples->payload, sizeof(header));
-	return header;
+	return *reader_header(samples->reader);
 }
 
 const uint8_t *samples_image(const struct samples *samples)
 {
-	return samples->payload + sizeof(struct sample_header);
+	return reader_image(samples->reader);
 }
 
 const char *samples_flag_name(unsigned bit)

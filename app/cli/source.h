@@ -9,10 +9,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "base/ring.h"
 #include "base/sample.h"
 #include "base/status.h"
 #include "cli/cli.h"
+#include "reader/reader.h"
 
 /** A copy of ecdaqd's status page. EXIT_CODE_OK, or the code of a failure that was said. */
 enum exit_code source_status(struct cli *cli, const struct status_page **ret_page);
@@ -31,11 +31,11 @@ int source_is_alive(int64_t pid);
 
 /* The sample ring with its own description. */
 struct samples {
-	struct ring_reader *reader;
-	const struct sample_meta *meta;
+	struct reader *reader;
+	const struct channel_table *table;
+	const struct sample_meta *meta; /* of the table, as the others */
 	const struct slave_info *slaves;
 	const struct channel *channels;
-	uint8_t *payload; /* one slot: a sample_header, then the image */
 };
 
 /** EXIT_CODE_OK, or the code of a failure that was said. Release with samples_close(). */
@@ -43,6 +43,8 @@ enum exit_code samples_open(struct cli *cli, struct samples *ret_samples);
 /** The same without a word; 0 or -errno. */
 int samples_try(struct cli *cli, struct samples *ret_samples);
 void samples_close(struct samples *samples);
+/** Take the table of the session that the reader has begun. */
+void samples_take_table(struct samples *samples);
 
 /** Header and image of the slot that was read last. */
 struct sample_header samples_header(const struct samples *samples);

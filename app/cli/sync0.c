@@ -8,7 +8,6 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "base/ring.h"
 #include "cli/bars.h"
 #include "cli/cli.h"
 #include "cli/json.h"
@@ -16,6 +15,7 @@
 #include "cli/sync0_source.h"
 #include "cli/text.h"
 #include "program/args.h"
+#include "reader/feed.h"
 
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
 
@@ -36,28 +36,24 @@ struct view {
 static void read_results(struct cli *cli, struct view *view)
 {
 	char path[CONFIG_PATH_BYTES];
-	struct ring_reader *ring;
 	struct sync0_result r;
-	uint64_t newest;
-	uint64_t oldest;
-	uint64_t lost;
+	struct feed *feed;
+	uint64_t lost = 0;
 
-	if (cli_path(cli, CONFIG_RUN_SYNC0, path) != EXIT_CODE_OK ||
-	    ring_reader_open(path, &ring) < 0) {
+	if (cli_path(cli, CONFIG_RUN_SYNC0, path) != EXIT_CODE_OK) {
 		return;
 	}
-	if (strcmp(ring_kind(ring), "sync0") == 0 && ring_payload_bytes(ring) == sizeof(r)) {
-		newest = ring_newest(ring);
-		oldest = ring_oldest(ring);
-		ring_seek(ring, newest - oldest > NEWEST ? newest - NEWEST : oldest);
-		while (ring_read(ring, &r, sizeof(r), &lost) == RING_OK) {
+	feed = feed_create(FEED_SYNC0, path, FEED_AT_OLDEST);
+	if (feed != NULL && feed_open(feed, NULL) == 0) {
+		feed_seek_back(feed, NEWEST);
+		while (feed_read(feed, &r, sizeof(r), NULL, &lost)) {
 			if (r.line < view->lines) {
 				view->result[r.line] = r;
 				view->has_result[r.line] = 1;
 			}
 		}
 	}
-	ring_reader_destroy(ring);
+	feed_destroy(feed);
 }
 
 static void write_line(const struct view *view, uint32_t number)

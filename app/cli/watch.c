@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* ecdaq watch: values of channels as lines, JSON or curves. */
+#include <errno.h>
 #include <inttypes.h>
 #include <limits.h>
 #include <math.h>
@@ -151,7 +152,7 @@ static enum exit_code begin_plot(struct watch *watch)
 		.columns = screen_size().columns,
 		.style = screen_is_utf8() ? PLOT_BRAILLE : PLOT_ASCII,
 	};
-	struct ring_reader *reader = watch->follow.samples.reader;
+	struct reader *reader = watch->follow.samples.reader;
 	uint64_t period_ns = watch->follow.samples.meta->period_ns;
 	uint64_t back = period_ns == 0 ? 0 : (uint64_t)watch->window_ns / period_ns;
 
@@ -165,10 +166,10 @@ static enum exit_code begin_plot(struct watch *watch)
 	}
 	/* A live plot starts with the samples that are in the ring. */
 	if (watch->is_live) {
-		uint64_t newest = ring_newest(reader);
-		uint64_t oldest = ring_oldest(reader);
+		uint64_t newest = reader_newest(reader);
+		uint64_t oldest = reader_oldest(reader);
 
-		ring_seek(reader, newest - oldest < back ? oldest : newest - back);
+		reader_seek(reader, newest - oldest < back ? oldest : newest - back);
 		watch->follow.idle_ns = 20 * NS_PER_MS;
 	}
 	return EXIT_CODE_OK;
@@ -276,6 +277,9 @@ static enum exit_code run(struct watch *watch)
 			break;
 		case FOLLOW_ENDED:
 			return ended(watch);
+		case FOLLOW_DAMAGED:
+			return cli_fail(watch->cli, EXIT_CODE_FAILED, "samples: %s",
+					reader_error_to_str(-EIO));
 		case FOLLOW_OVER:
 			return EXIT_CODE_OK;
 		}

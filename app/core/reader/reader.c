@@ -196,3 +196,8 @@ void reader_skip_session(struct reader *r)
 {
 	r->is_done = 1;
 }
+
+int reader_is_orphaned(struct reader *r)
+{
+	return r->ring != NULL && ring_is_orphaned(r->ring);
+}

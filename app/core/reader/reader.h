@@ -78,6 +78,8 @@ uint64_t reader_oldest(struct reader *reader);       /* that can still be read *
 uint64_t reader_newest(struct reader *reader);       /* one past it */
 /** Continue at @sequence; a session that has ended is read again from there. */
 void reader_seek(struct reader *reader, uint64_t sequence);
+/** 1 if the process of the session is gone without ending it. */
+int reader_is_orphaned(struct reader *reader);
 /** Read no more of this session; reader_next() waits for the next one. */
 void reader_skip_session(struct reader *reader);
 

@@ -6,12 +6,12 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "base/sample.h"
+#include "reader/table.h"
 #include "sync0/checker.h"
 
 struct master;
 
-/** NULL with errno. @path is kept. Context: blocking. */
+/** NULL with errno. @path is copied. Context: blocking. */
 struct master *master_create(const char *path);
 void master_destroy(struct master *m);
 
@@ -21,7 +21,7 @@ void master_destroy(struct master *m);
  */
 int master_open(struct master *m);
 /** Of the open session. */
-const struct sample_meta *master_meta(const struct master *m);
+const struct channel_table *master_table(const struct master *m);
 
 /* Slaves whose shots are looked for: bit n of the positions. */
 void master_watch_shots(struct master *m, uint64_t slaves);

@@ -46,8 +46,8 @@ static void on_deviation(void *ctx, size_t line, int64_t ns)
 /* A simulation has an edge of every slave with DC: each is a line. */
 static void lines_of_session(struct watch *w)
 {
-	const struct sample_meta *meta = master_meta(w->master);
-	const struct slave_info *slave = sample_meta_slaves(meta);
+	const struct sample_meta *meta = &master_table(w->master)->meta;
+	const struct slave_info *slave = master_table(w->master)->slaves;
 	struct sync0_status *page = output_page(w->out);
 
 	if (w->lines == NULL) {
@@ -121,7 +121,7 @@ static void fit_to_period(struct watch *w, struct checker_spec *spec)
 static struct checker_spec session_spec(struct watch *w)
 {
 	const struct config *cfg = w->spec.cfg;
-	const struct sample_meta *meta = master_meta(w->master);
+	const struct sample_meta *meta = &master_table(w->master)->meta;
 	int64_t now = watch_now_ns(w);
 	int64_t heard_ns = w->since_ns > now ? w->since_ns : now;
 	struct checker_spec spec = {
