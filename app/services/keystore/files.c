@@ -10,7 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "keystore/keystore.h"
+#include "keystore/store_layout.h"
 
 enum { DIR_MODE = 0700, FILE_MODE = 0600 };
 

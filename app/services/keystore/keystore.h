@@ -1,14 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The keys of DDS Security: a directory with two certificate authorities and one directory per
- * participant, which contains what the participant needs and nothing else. File names are those of
- * SROS 2. Context: blocking; start-up and command line only.
- *
- *   ca/            identity_ca.key.pem, permissions_ca.key.pem: these admit participants
- *   appliance/     for ecdaq-dds (dds.security)
- *   NAME/          for one subscriber or commander
- *     identity_ca.cert.pem  permissions_ca.cert.pem  governance.p7s
- *     cert.pem  key.pem  permissions.p7s
+ * The keys of DDS Security: create the store and its participants, check them
+ * (keystore/store_layout.h has what is where). Context: blocking; start-up and command line only.
  */
 #ifndef KEYSTORE_KEYSTORE_H
 #define KEYSTORE_KEYSTORE_H
@@ -16,21 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum keystore_role {
-	KEYSTORE_APPLIANCE,  /* publishes, accepts commands */
-	KEYSTORE_SUBSCRIBER, /* reads what is published, writes nothing */
-	KEYSTORE_COMMANDER,  /* a subscriber that writes commands */
-};
-
-enum { KEYSTORE_NAME_BYTES = 41, KEYSTORE_ERROR_BYTES = 512 };
-
-/* In each participant's directory. */
-#define KEYSTORE_IDENTITY_CA "identity_ca.cert.pem"
-#define KEYSTORE_PERMISSIONS_CA "permissions_ca.cert.pem"
-#define KEYSTORE_GOVERNANCE "governance.p7s"
-#define KEYSTORE_CERT "cert.pem"
-#define KEYSTORE_KEY "key.pem"
-#define KEYSTORE_PERMISSIONS "permissions.p7s"
+#include "keystore/store_layout.h"
 
 /**
  * Create the store @dir, which must not exist or be empty, with the appliance's directory in it.

@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "keystore/keystore.h"
+#include "keystore/store_layout.h"
 
 enum { POLICY_TEXT_BYTES = 8192 };
 

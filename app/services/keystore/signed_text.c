@@ -10,7 +10,7 @@
 #include <string.h>
 
 #include "keystore/files.h"
-#include "keystore/keystore.h"
+#include "keystore/store_layout.h"
 
 int signed_text_write(const char *text, size_t text_len, const struct pki_pair *ca, const char *dir,
 		      const char *name, char *error)
