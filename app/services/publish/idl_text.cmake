@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # IN, a text, becomes a C string "idl_text" in OUT.
-file(STRINGS ${IN} lines NEWLINE_CONSUME)
+file(READ ${IN} lines)
 string(REPLACE "\\" "\\\\" lines "${lines}")
 string(REPLACE "\"" "\\\"" lines "${lines}")
 string(REPLACE "\n" "\\n\"\n\t\"" lines "${lines}")
