@@ -142,6 +142,44 @@ BANNED_TEXT: list[tuple[str, str]] = [
 ]
 
 
+# What is decided in one place: the words that decide it, where they may be, what others use.
+ONE_PLACE: list[tuple[str, str, str]] = [
+    (
+        r"#\s*include\s+\"base/ring\.h\"",
+        r"^app/(core/(base|reader)|master/(daemon|cycle))/|^app/services/sync0/output\.c$",
+        "only producers and core/reader see the ring: use reader/reader.h, reader/feed.h",
+    ),
+    # What a control program is given in slaves_bad is the cycle's, under the same name.
+    (
+        r"(?:->|\.)slaves_bad\b",
+        r"^app/(core/reader|master/(cycle|control))/",
+        "which sample is good is decided once: sample_is_good() of reader/table.h",
+    ),
+    (
+        r"\bversion\s*[!=]=\s*SAMPLE_VERSION\b",
+        r"^app/core/reader/table\.c$",
+        "a sample ring's tables are checked once: channel_table_create()",
+    ),
+    (
+        r"\btimemap_(?:tai_to_utc_ns|note_tai_offset)\b",
+        r"^app/core/(base|reader)/",
+        "samples are mapped to UTC once: reader/utc.h",
+    ),
+]
+
+
+def rule_one_place(source: Source) -> Iterable[Finding]:
+    """A decision that all readers share is taken in one place."""
+    if not source.is_app_c:
+        return
+    stripped = strip_comments(source.text).splitlines()
+    for number, (raw, line) in enumerate(zip(source.lines, stripped, strict=False), 1):
+        for pattern, where, instead in ONE_PLACE:
+            text = raw if pattern.startswith("#") else line
+            if re.search(pattern, text) and not re.search(where, source.path):
+                yield Finding(source.path, number, instead)
+
+
 def rule_includes(source: Source) -> Iterable[Finding]:
     """The include table."""
     if not source.is_app_c or source.module not in INCLUDE_TABLE:
@@ -334,6 +372,7 @@ def python_sleeps(source: Source) -> Iterable[Finding]:
 RULES: list[Rule] = [
     rule_includes,
     rule_known_module,
+    rule_one_place,
     rule_banned_calls,
     rule_realtime_clock,
     rule_allocation,

@@ -98,6 +98,30 @@ CASES = [
         LONG_FUNCTION.replace("\tg();\n", "", 1),
     ),
     Case(rules.rule_function_size, "tests/a.py", "def f():\n" + "    g()\n" * 70, "f = 1\n"),
+    Case(
+        rules.rule_one_place,
+        "app/cli/a.c",
+        '#include "base/ring.h"',
+        '#include "reader/reader.h"',
+    ),
+    Case(
+        rules.rule_one_place,
+        "app/services/record/a.c",
+        "is_bad = header->slaves_bad >> pos & 1;",
+        "is_good = sample_is_good(header, pos);",
+    ),
+    Case(
+        rules.rule_one_place,
+        "app/services/publish/a.c",
+        "return meta->version == SAMPLE_VERSION;",
+        "return channel_table_create(meta, bytes, &table);",
+    ),
+    Case(
+        rules.rule_one_place,
+        "app/services/record/a.c",
+        "return timemap_tai_to_utc_ns(map, tai_ns);",
+        "return utc_of_tai(utc, tai_ns);",
+    ),
     Case(rules.rule_spdx, "app/master/bus/a.c", "int a;\n", SPDX_C + "int a;\n"),
     Case(
         rules.rule_spdx, "app/a.sh", "#!/bin/sh\nset\n", "#!/bin/sh\n# SPDX-License-Identifier: MIT"
@@ -170,6 +194,14 @@ def test_a_source_that_no_list_names_is_found() -> None:
     assert not list(whole_tree.unlisted_sources([built, *named]))
     for stray in ("app/master/bus/c.c", "app/master/bus/b.c", "app/core/wire/a.c"):
         assert list(whole_tree.unlisted_sources([built, *named, Source(stray, "")]))
+
+
+def test_a_second_definition_of_what_readers_share_is_found() -> None:
+    body = "int sample_is_good(void)\n{\n\treturn 1;\n}\n"
+    files = [Source("app/a.c", body), Source("app/b.c", body)]
+    found = [f for f in whole_tree.not_defined_once(files) if f.path == "sample_is_good"]
+    assert len(found) == 1
+    assert not [f for f in whole_tree.not_defined_once(files[:1]) if f.path == "sample_is_good"]
 
 
 def test_a_doubled_test_name_is_found() -> None:

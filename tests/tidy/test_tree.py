@@ -29,6 +29,10 @@ def test_every_source_is_built() -> None:
     expect_none(whole_tree.unlisted_sources(sources()))
 
 
+def test_what_readers_share_is_defined_once() -> None:
+    expect_none(whole_tree.not_defined_once(sources()))
+
+
 def test_every_test_has_a_name_of_its_own() -> None:
     expect_none(whole_tree.doubled_test_names(sources()))
 

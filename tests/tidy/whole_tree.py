@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from project import Finding, Source
+from project import Finding, Source, functions
 
 
 def unlisted_sources(files: Sequence[Source]) -> Iterable[Finding]:
@@ -91,3 +91,21 @@ def foreign_binaries(root: Path, names: Iterable[str], data: Path) -> Iterable[F
         equal = known.get(hashlib.sha256((root / name).read_bytes()).digest())
         if equal:
             yield Finding(name, 1, f"a copy of {equal} from the shared data")
+
+
+# Functions of which each reader once had a copy.
+DEFINED_ONCE = ["sample_is_good", "channel_table_create", "utc_feed", "reader_next", "feed_read"]
+
+
+def not_defined_once(files: Sequence[Source]) -> Iterable[Finding]:
+    """One definition each of good sample, ring validity, UTC map, session and feed."""
+    for name in DEFINED_ONCE:
+        places = [
+            source.path
+            for source in files
+            if source.path.startswith("app/") and source.path.endswith(".c")
+            for function in functions(source.text)
+            if function.name == name
+        ]
+        if len(places) != 1:
+            yield Finding(name, 1, f"defined {len(places)} times: {', '.join(places)}")
