@@ -84,7 +84,7 @@ int number(struct parse *p, const char *what, long long min, long long max, long
 
 int number16(struct parse *p, const char *what, uint16_t *ret)
 {
-	long long value;
+	long long value = 0;
 	int r = number(p, what, 0, UINT16_MAX, &value);
 
 	*ret = r < 0 ? 0 : (uint16_t)value;
@@ -116,7 +116,7 @@ int object_address(struct parse *p, uint16_t *ret_index, uint8_t *ret_subindex)
 int text_number(struct parse *p, uint8_t *ret)
 {
 	struct slave_model *m = p->m;
-	char text[SII_NAME_BYTES];
+	char text[SII_NAME_BYTES] = "";
 	size_t len = 0;
 
 	skip_spaces(p);

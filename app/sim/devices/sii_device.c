@@ -149,12 +149,24 @@ static const struct sii_pdo *find_pdo(const struct sii *sii, uint16_t index)
 	return NULL;
 }
 
+/* An object may be an entry of several PDOs: it has one value. */
+static void set_object(struct sii_device *d, size_t entry, uint64_t value)
+{
+	const struct sii *s = &d->model.sii;
+
+	for (size_t i = 0; i < s->entry_count; i++) {
+		if (s->entry[i].index == s->entry[entry].index &&
+		    s->entry[i].subindex == s->entry[entry].subindex) {
+			d->app.coe.dictionary.entry_value[i] = value;
+		}
+	}
+}
+
 /* Go through the entries that are assigned to SM @sm: inputs into @area, outputs from it. */
 static void copy_entries(struct sii_device *d, size_t sm, uint8_t *area, size_t bytes, int64_t t_ns)
 {
 	const struct coe_assignment *a = &d->app.coe.dictionary.assignment[sm];
 	const struct sii *s = &d->model.sii;
-	uint64_t *value = d->app.coe.dictionary.entry_value;
 	uint32_t bit = 0;
 
 	for (uint8_t i = 0; i < a->count; i++) {
@@ -165,13 +177,17 @@ static void copy_entries(struct sii_device *d, size_t sm, uint8_t *area, size_t 
 		}
 		for (size_t n = pdo->first_entry; n < pdo->first_entry + (size_t)pdo->entry_count;
 		     n++) {
-			if (s->entry[n].index != 0 && pdo->is_tx) {
-				value[n] = shown(d, n, bit, t_ns);
-				put_bits(area, bit, s->entry[n].bit_len, value[n]);
-			} else if (s->entry[n].index != 0) {
-				value[n] = get_bits(area, bit, s->entry[n].bit_len);
+			uint8_t bits = s->entry[n].bit_len;
+
+			if (s->entry[n].index != 0) {
+				set_object(d, n,
+					   pdo->is_tx ? shown(d, n, bit, t_ns)
+						      : get_bits(area, bit, bits));
 			}
-			bit += s->entry[n].bit_len;
+			if (pdo->is_tx) {
+				put_bits(area, bit, bits, d->app.coe.dictionary.entry_value[n]);
+			}
+			bit += bits;
 		}
 	}
 }

@@ -12,7 +12,12 @@
 #include "devices/slave_application.h"
 #include "wire/esc_reg.h"
 
-enum { REPEAT_MAX = 64, NOT_ASSIGNED = 0xff, DEVICE_TYPE_MODULAR = 5001 };
+enum {
+	EEPROM_BYTES_MAX = 131072,
+	REPEAT_MAX = 64,
+	NOT_ASSIGNED = 0xff,
+	DEVICE_TYPE_MODULAR = 5001
+};
 
 #define COUNT(a) (sizeof(a) / sizeof((a)[0]))
 
@@ -104,7 +109,7 @@ static int take_config(struct parse *p)
 static int take_eeprom(struct parse *p)
 {
 	long long bytes = 0;
-	int r = number(p, "EEPROM size", 128, SII_LIMIT_PDO * 1024, &bytes);
+	int r = number(p, "EEPROM size", 128, EEPROM_BYTES_MAX, &bytes);
 
 	p->m->sii.size_bytes = (uint32_t)bytes;
 	return r;

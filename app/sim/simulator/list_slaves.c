@@ -5,7 +5,6 @@
 
 #include "devices/catalogue.h"
 #include "devices/fb1111_piccolo.h"
-#include "devices/slave_application.h"
 #include "wire/esc_reg.h"
 #include "wire/sii.h"
 

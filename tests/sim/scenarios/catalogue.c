@@ -119,3 +119,65 @@ TEST(catalogue, an_analog_terminal_shows_the_signal_at_its_scale)
 	CHECK(high > 4890 && high < 4930);
 	close_all();
 }
+
+static int make_drive(int position, struct segment_slave_spec *ret_spec)
+{
+	static const char *const names[] = { "akd", "el1008", "el2828" };
+
+	return make_some(names, position, ret_spec);
+}
+
+static void set(const char *channel, uint64_t raw)
+{
+	struct admin_request rq = { .magic = ADMIN_MAGIC, .verb = ADMIN_SET, .count = 1 };
+
+	snprintf(rq.item[0].channel, sizeof(rq.item[0].channel), "%s", channel);
+	rq.item[0].raw = raw;
+	CHECK_EQ(virtual_master_ask(&vm, &rq).result, 0);
+	CHECK_EQ(virtual_master_run(&vm, 20), SESSION_GOES_ON);
+}
+
+TEST(catalogue, a_drive_follows_its_controlword_and_its_set_point)
+{
+	static const char *const settings[] = { "slaves[0].name=drive", "slaves[1].name=di",
+						"slaves[2].name=do", NULL };
+
+	open_all(3, make_drive, settings);
+	CHECK_EQ(virtual_master_value(&vm, "drive.statusword"), 0x50);
+	set("drive.controlword", 0x06);
+	CHECK_EQ(virtual_master_value(&vm, "drive.statusword"), 0x31);
+	set("drive.controlword", 0x07);
+	set("drive.controlword", 0x0f);
+	CHECK_EQ(virtual_master_value(&vm, "drive.statusword"), 0x37);
+	set("drive.1st_set_point", 123456);
+	CHECK_EQ(virtual_master_value(&vm, "drive.position_actual_internal_value"), 123456);
+	close_all();
+}
+
+TEST(catalogue, terminals_are_read_and_set_by_the_address_of_their_entries)
+{
+	static const char *const settings[] = { "slaves[0].name=drive", "slaves[1].name=di",
+						"slaves[2].name=do", NULL };
+	struct sim_device *di;
+	struct sim_device *terminals;
+	char text[256];
+
+	open_all(3, make_drive, settings);
+	di = segment_device(b.segment, 1);
+	terminals = segment_device(b.segment, 2);
+	for (unsigned on = 0; on < 2; on++) {
+		CHECK_EQ(di->ops->io_set(di, "0x6010:01", on ? "1" : "0"), 0);
+		CHECK_EQ(virtual_master_run(&vm, 5), SESSION_GOES_ON);
+		CHECK_EQ(virtual_master_value(&vm, "di.channel_2_input"), on);
+	}
+	CHECK(di->ops->io_set(di, "0x7010:01", "1") < 0);
+	CHECK(di->ops->io_set(di, "0x6010:02", "1") < 0);
+	CHECK(di->ops->io_set(di, "0x6010:01", "on") < 0);
+	CHECK(terminals->ops->io_set(terminals, "0x7010:01", "1") < 0);
+	set("do.channel_3_output", 1);
+	terminals->ops->io_get(terminals, text, sizeof(text));
+	CHECK(strstr(text, "0x7010:01=0 0x7020:01=1 0x7030:01=0") != NULL);
+	terminals->ops->io_get(terminals, text, 20);
+	CHECK_STR(text, "0x7000:01=0"); /* whole words only */
+	close_all();
+}
