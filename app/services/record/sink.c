@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "record/sink_internal.h"
+#include "record/sink.h"
 
 #include <errno.h>
 #include <inttypes.h>
@@ -8,7 +8,50 @@
 #include <stdlib.h>
 #include <string.h>
 
-void sink_say(struct sink *s, const char *format, ...)
+#include "base/clock.h"
+
+#define SINK_RETRY_NS NS_PER_S
+
+struct sink {
+	struct recorder_options opt;
+	struct store *store;
+	struct store_state resume; /* where to resume if recording stopped now */
+	enum sink_state state;
+	int has_rewind;
+	struct record_file *file;    /* NULL between files */
+	const struct layout *layout; /* NULL between sessions */
+	struct timemap_state timemap;
+	int64_t now_ns; /* of the newest tick */
+	int64_t file_opened_ns;
+	int64_t chunk_opened_ns; /* 0: the chunk is empty */
+	int64_t synced_ns;
+	int64_t checked_ns; /* last check of free space and errors */
+	int is_dirty;       /* written since the last sync */
+	uint64_t synced_cycle;
+	uint64_t events_lost; /* in this session, by this process */
+	uint64_t files;
+	uint64_t bytes_done; /* in finished files */
+	uint64_t bytes_free;
+	int64_t last_utc_ns;     /* of the newest sample */
+	struct event full_event; /* the disk was full: written to the next file */
+	int64_t full_utc_ns;
+	char path[512]; /* of the newest file */
+	char message[256];
+};
+
+/* The open file, below. Each: 0, or -errno after fail(). */
+static int close_chunk(struct sink *s);
+static int sync_file(struct sink *s);
+static int finish_file(struct sink *s, const char *reason);
+static int is_rotation_due(const struct sink *s);
+
+/* The newest cycle recorded; 0 before the first. */
+static uint64_t last_cycle(const struct sink *s)
+{
+	return s->resume.next_cycle > 0 ? s->resume.next_cycle - 1 : 0;
+}
+
+__attribute__((format(printf, 2, 3))) static void report(struct sink *s, const char *format, ...)
 {
 	va_list args;
 
@@ -68,8 +111,8 @@ int sink_create(const struct recorder_options *opt, struct sink **ret_sink, char
 	(void)store_load_state(s->store, &s->resume);
 	r = recover(s);
 	if (r < 0) {
-		sink_say(s, "%s: cannot recover what is there: %s; trying again", opt->dir,
-			 strerror(-r));
+		report(s, "%s: cannot recover what is there: %s; trying again", opt->dir,
+		       strerror(-r));
 		s->state = SINK_FAILED;
 	}
 	*ret_sink = s;
@@ -120,7 +163,7 @@ int sink_take_rewind(struct sink *s)
 	return has_rewind;
 }
 
-int sink_ask_free_bytes(struct sink *s)
+static int read_free_bytes(struct sink *s)
 {
 	const struct record_seam *seam = s->opt.seam;
 
@@ -129,15 +172,15 @@ int sink_ask_free_bytes(struct sink *s)
 		       : store_free_bytes(s->store, &s->bytes_free);
 }
 
-int sink_trouble(struct sink *s, int error, const char *what)
+static int fail(struct sink *s, int error, const char *what)
 {
 	s->checked_ns = s->now_ns;
 	if (error == -ENOSPC || error == -EDQUOT) {
 		if (s->state != SINK_FULL) {
-			sink_say(s,
-				 "recording stopped, disk full: %s: %" PRIu64
-				 " bytes free, reserve %" PRIu64,
-				 s->opt.dir, s->bytes_free, s->opt.reserve_bytes);
+			report(s,
+			       "recording stopped, disk full: %s: %" PRIu64
+			       " bytes free, reserve %" PRIu64,
+			       s->opt.dir, s->bytes_free, s->opt.reserve_bytes);
 			s->full_event = (struct event){ .id = EVENT_RECORD_DISK_FULL,
 							.cycle = s->resume.next_cycle,
 							.value = (int64_t)s->bytes_free,
@@ -148,8 +191,8 @@ int sink_trouble(struct sink *s, int error, const char *what)
 		return error;
 	}
 	if (s->state != SINK_FAILED) {
-		sink_say(s, "recording failed: %s: %s: %s; trying again", s->opt.dir, what,
-			 strerror(-error));
+		report(s, "recording failed: %s: %s: %s; trying again", s->opt.dir, what,
+		       strerror(-error));
 	}
 	/* What is on disk is recovered as after a crash; what is not is still in the ring. */
 	record_file_destroy(s->file);
@@ -171,7 +214,7 @@ void sink_begin_session(struct sink *s, const struct layout *layout, enum sink_n
 		s->resume.missing = 0;
 	}
 	s->events_lost = 0;
-	s->synced_cycle = sink_last_cycle(s);
+	s->synced_cycle = last_cycle(s);
 }
 
 void sink_count_gap(struct sink *s, uint64_t cycles)
@@ -183,7 +226,7 @@ void sink_count_gap(struct sink *s, uint64_t cycles)
 void sink_count_lost_events(struct sink *s, uint64_t events)
 {
 	s->events_lost += events;
-	sink_say(s, "%" PRIu64 " events were overwritten before they could be recorded", events);
+	report(s, "%" PRIu64 " events were overwritten before they could be recorded", events);
 }
 
 static void check_space(struct sink *s)
@@ -192,13 +235,13 @@ static void check_space(struct sink *s)
 	int r = store_enforce_budget(s->store, s->opt.budget_bytes, open_bytes);
 
 	if (r < 0) {
-		sink_say(s, "%s: cannot delete old recordings: %s", s->opt.dir, strerror(-r));
+		report(s, "%s: cannot delete old recordings: %s", s->opt.dir, strerror(-r));
 	}
 	s->checked_ns = s->now_ns;
-	if (sink_ask_free_bytes(s) == 0 && s->bytes_free < s->opt.reserve_bytes) {
-		(void)sink_trouble(s, -ENOSPC, s->opt.dir);
+	if (read_free_bytes(s) == 0 && s->bytes_free < s->opt.reserve_bytes) {
+		(void)fail(s, -ENOSPC, s->opt.dir);
 		/* The reserve is there for this: leave a whole file behind. */
-		(void)sink_finish_file(s, "disk full");
+		(void)finish_file(s, "disk full");
 	}
 }
 
@@ -208,19 +251,19 @@ static void tick_ready(struct sink *s)
 		return;
 	}
 	if (s->chunk_opened_ns != 0 && s->now_ns - s->chunk_opened_ns >= s->opt.chunk_period_ns &&
-	    sink_close_chunk(s) < 0) {
+	    close_chunk(s) < 0) {
 		return;
 	}
 	if (s->now_ns - s->synced_ns >= s->opt.sync_period_ns) {
 		if (s->is_dirty) {
-			(void)sink_sync_file(s);
+			(void)sync_file(s);
 		}
 		if (s->state == SINK_READY && s->now_ns - s->checked_ns >= SINK_RETRY_NS) {
 			check_space(s);
 		}
 	}
-	if (s->state == SINK_READY && s->file != NULL && sink_is_rotation_due(s)) {
-		(void)sink_finish_file(s, "rotated");
+	if (s->state == SINK_READY && s->file != NULL && is_rotation_due(s)) {
+		(void)finish_file(s, "rotated");
 	}
 }
 
@@ -231,14 +274,14 @@ static void tick_full(struct sink *s)
 	uint64_t wanted = s->opt.reserve_bytes + s->opt.reserve_bytes / 8;
 
 	s->checked_ns = s->now_ns;
-	if (s->file != NULL && sink_finish_file(s, "disk full") < 0) {
+	if (s->file != NULL && finish_file(s, "disk full") < 0) {
 		return;
 	}
-	if (sink_ask_free_bytes(s) < 0 || s->bytes_free < wanted || s->bytes_free == 0) {
+	if (read_free_bytes(s) < 0 || s->bytes_free < wanted || s->bytes_free == 0) {
 		return;
 	}
 	s->state = SINK_READY;
-	sink_say(s, "recording again: %" PRIu64 " bytes free", s->bytes_free);
+	report(s, "recording again: %" PRIu64 " bytes free", s->bytes_free);
 	s->message[0] = '\0';
 }
 
@@ -250,7 +293,7 @@ static void tick_failed(struct sink *s)
 	}
 	s->state = SINK_READY;
 	s->has_rewind = 1;
-	sink_say(s, "recording again behind cycle %" PRIu64, s->resume.next_cycle);
+	report(s, "resuming after cycle %" PRIu64, s->resume.next_cycle);
 	s->message[0] = '\0';
 }
 
@@ -266,11 +309,6 @@ void sink_tick(struct sink *s, int64_t now_ns)
 	} else {
 		tick_failed(s);
 	}
-}
-
-uint64_t sink_last_cycle(const struct sink *s)
-{
-	return s->resume.next_cycle > 0 ? s->resume.next_cycle - 1 : 0;
 }
 
 void sink_get_status(struct sink *s, struct record_status *page)
@@ -289,10 +327,258 @@ void sink_get_status(struct sink *s, struct record_status *page)
 	atomic_store_explicit(&page->recorded_gaps, s->resume.gaps, memory_order_relaxed);
 	atomic_store_explicit(&page->cycles_missing, s->resume.missing, memory_order_relaxed);
 	atomic_store_explicit(&page->first_cycle, s->resume.first_cycle, memory_order_relaxed);
-	atomic_store_explicit(&page->last_cycle, sink_last_cycle(s), memory_order_relaxed);
+	atomic_store_explicit(&page->last_cycle, last_cycle(s), memory_order_relaxed);
 	atomic_store_explicit(&page->synced_cycle, s->synced_cycle, memory_order_relaxed);
 	atomic_store_explicit(&page->bytes_written, s->bytes_done + open_bytes,
 			      memory_order_relaxed);
 	atomic_store_explicit(&page->files, s->files, memory_order_relaxed);
 	atomic_store_explicit(&page->bytes_free, s->bytes_free, memory_order_relaxed);
+}
+
+/* --- the open file --- */
+
+/* Own events carry no ring sequence. */
+static int put_own_event(struct sink *s, const struct event *ev, int64_t utc_ns)
+{
+	char text[256];
+
+	event_format(ev, text, sizeof(text));
+	return record_file_event(s->file, &(struct messages_event){ .event = *ev,
+								    .sequence = UINT64_MAX,
+								    .utc_ns = utc_ns,
+								    .text = text });
+}
+
+static int put_first_events(struct sink *s, uint64_t first_cycle, int64_t utc_ns)
+{
+	struct event ev = { .id = EVENT_RECORD_STARTED,
+			    .cycle = first_cycle,
+			    .value = (int64_t)first_cycle,
+			    .slave_pos = EVENT_NO_SLAVE };
+	int r = put_own_event(s, &ev, utc_ns);
+
+	if (r < 0 || s->full_event.id == EVENT_NONE) {
+		return r;
+	}
+	r = put_own_event(s, &s->full_event, s->full_utc_ns);
+	ev.id = EVENT_RECORD_RESUMED;
+	r = r < 0 ? r : put_own_event(s, &ev, utc_ns);
+	if (r == 0) {
+		s->full_event.id = EVENT_NONE;
+	}
+	return r;
+}
+
+int sink_open_file(struct sink *s, uint64_t first_cycle, int64_t utc_ns)
+{
+	char name[STORE_NAME_BYTES];
+	struct record_file_spec spec = { .dir = s->opt.dir,
+					 .name = name,
+					 .layout = s->layout,
+					 .zstd_level = s->opt.zstd_level,
+					 .before = &s->resume,
+					 .file_sequence = s->resume.sequence + 1,
+					 .start_utc_ns = utc_ns > 0 ? (uint64_t)utc_ns : 0,
+					 .timemap = &s->timemap,
+					 .config_path = s->opt.config_path,
+					 .config_text = s->opt.config_text,
+					 .seam = s->opt.seam };
+	int r;
+
+	if (s->file != NULL) {
+		return 0;
+	}
+	if (read_free_bytes(s) == 0 && s->bytes_free < s->opt.reserve_bytes) {
+		return fail(s, -ENOSPC, s->opt.dir);
+	}
+	store_make_name(name, utc_ns, s->resume.session, spec.file_sequence);
+	r = record_file_create(&spec, &s->file);
+	if (r < 0) {
+		return fail(s, r, name);
+	}
+	s->resume.sequence++;
+	s->files++;
+	snprintf(s->path, sizeof(s->path), "%s", record_file_path(s->file));
+	s->file_opened_ns = s->now_ns;
+	s->synced_ns = s->now_ns;
+	s->chunk_opened_ns = s->now_ns;
+	s->is_dirty = 1;
+	r = put_first_events(s, first_cycle, utc_ns);
+	return r < 0 ? fail(s, r, name) : 0;
+}
+
+static int finish_file(struct sink *s, const char *reason)
+{
+	const struct record_file_end end = { .reason = reason,
+					     .events_lost = s->events_lost,
+					     .after = &s->resume,
+					     .timemap = &s->timemap };
+	int r = record_file_finish(s->file, &end);
+
+	if (r == 0) {
+		/* The state before the name: if we are killed in between, .part and state agree. */
+		int saved = store_save_state(s->store, &s->resume);
+
+		if (saved < 0) { /* the newest file holds the same, it is only slower to read */
+			report(s, "%s: state file: %s", s->opt.dir, strerror(-saved));
+		}
+		r = record_file_publish(s->file);
+	}
+	if (r < 0) {
+		return fail(s, r, record_file_path(s->file));
+	}
+	snprintf(s->path, sizeof(s->path), "%s", record_file_path(s->file));
+	s->synced_cycle = last_cycle(s);
+	s->is_dirty = 0;
+	s->chunk_opened_ns = 0;
+	s->bytes_done += record_file_bytes(s->file);
+	record_file_destroy(s->file);
+	s->file = NULL;
+	r = store_enforce_budget(s->store, s->opt.budget_bytes, 0);
+	if (r < 0) {
+		report(s, "%s: cannot delete old recordings: %s", s->opt.dir, strerror(-r));
+	}
+	return 0;
+}
+
+int sink_end_session(struct sink *s, const char *reason)
+{
+	int r = s->file != NULL ? finish_file(s, reason) : 0;
+
+	if (r < 0) {
+		return r;
+	}
+	s->layout = NULL;
+	return 0;
+}
+
+static int close_chunk(struct sink *s)
+{
+	int r = record_file_close_chunk(s->file);
+
+	if (r < 0) {
+		return fail(s, r, record_file_path(s->file));
+	}
+	s->chunk_opened_ns = 0;
+	s->is_dirty = 1;
+	return 0;
+}
+
+static int is_rotation_due(const struct sink *s)
+{
+	return (s->opt.rotate_bytes > 0 &&
+		record_file_final_bytes(s->file) >= s->opt.rotate_bytes) ||
+	       (s->opt.rotate_period_ns > 0 &&
+		s->now_ns - s->file_opened_ns >= s->opt.rotate_period_ns) ||
+	       record_file_is_full(s->file);
+}
+
+static void note_open(struct sink *s)
+{
+	if (s->chunk_opened_ns == 0) {
+		s->chunk_opened_ns = s->now_ns;
+	}
+}
+
+int sink_sample(struct sink *s, const struct sample_header *header, const uint8_t *image,
+		int64_t utc_ns)
+{
+	int64_t period_ns = (int64_t)layout_meta(s->layout)->period_ns;
+	int r = record_file_sample(s->file, header, image, utc_ns > 0 ? (uint64_t)utc_ns : 0);
+
+	if (r < 0) {
+		return fail(s, r, record_file_path(s->file));
+	}
+	note_open(s);
+	if (s->resume.cycles++ == 0) {
+		s->resume.first_cycle = header->cycle;
+	}
+	s->last_utc_ns = utc_ns;
+	s->resume.next_cycle = header->cycle + 1;
+	/* By bus time, too: a backlog is read much faster than it came. */
+	if ((int64_t)record_file_open_cycles(s->file) >= s->opt.chunk_period_ns / period_ns) {
+		(void)close_chunk(s); /* the sample is kept; an error shows in the state */
+		if (s->state == SINK_READY && is_rotation_due(s)) {
+			(void)finish_file(s, "rotated");
+		}
+	}
+	return 0;
+}
+
+int sink_event(struct sink *s, const struct messages_event *ev)
+{
+	int r = record_file_event(s->file, ev);
+
+	if (r < 0) {
+		return fail(s, r, record_file_path(s->file));
+	}
+	note_open(s);
+	if (ev->sequence != UINT64_MAX) {
+		s->resume.event_next = ev->sequence + 1;
+		s->resume.event_mono_ns = ev->event.mono_ns;
+	}
+	return 0;
+}
+
+int sink_sync0(struct sink *s, const struct sync0_result *result, int64_t utc_ns, uint64_t sequence)
+{
+	int r = record_file_sync0(s->file, result, utc_ns);
+
+	if (r < 0) {
+		return fail(s, r, record_file_path(s->file));
+	}
+	note_open(s);
+	s->resume.sync0_next = sequence + 1;
+	s->resume.sync0_mono_ns = result->mono_ns;
+	return 0;
+}
+
+void sink_mark_sync0_event(struct sink *s, const struct event *ev, uint64_t sequence)
+{
+	s->resume.sync0_event_next = sequence + 1;
+	s->resume.sync0_event_mono_ns = ev->mono_ns;
+}
+
+int sink_timemap(struct sink *s, const struct timemap_state *state)
+{
+	int r = 0;
+
+	s->timemap = *state;
+	if (s->file != NULL) {
+		r = record_file_timemap(s->file, state,
+					state->utc_ns > 0 ? (uint64_t)state->utc_ns : 0);
+		note_open(s);
+	}
+	return r < 0 ? fail(s, r, record_file_path(s->file)) : 0;
+}
+
+int sink_clock_step(struct sink *s, const struct timemap_state *state)
+{
+	int r = s->file != NULL ? finish_file(s, "clock step") : 0;
+
+	s->timemap = *state;
+	report(s, "the host's clock took a step of %" PRId64 " ns: new file", state->step_ns);
+	return r;
+}
+
+static int sync_file(struct sink *s)
+{
+	uint64_t last_closed;
+	int r;
+
+	if (s->chunk_opened_ns != 0) {
+		r = close_chunk(s);
+		if (r < 0) {
+			return r;
+		}
+	}
+	last_closed = record_file_last_cycle(s->file);
+	r = record_file_sync(s->file);
+	if (r < 0) {
+		return fail(s, r, record_file_path(s->file));
+	}
+	s->synced_ns = s->now_ns;
+	s->synced_cycle = last_closed;
+	s->is_dirty = 0;
+	return 0;
 }
