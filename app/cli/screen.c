@@ -79,7 +79,10 @@ static void on_signal(int number)
 /* If it fails, the signal has the effect that it always had. */
 static void handle_signal(int number, void (*handler)(int number))
 {
-	struct sigaction action = { .sa_handler = handler };
+	/* Job control must not make a write to the terminal fail. */
+	int is_job_control = number == SIGTSTP || number == SIGCONT;
+	struct sigaction action = { .sa_handler = handler,
+				    .sa_flags = is_job_control ? SA_RESTART : 0 };
 
 	sigemptyset(&action.sa_mask);
 	sigaction(number, &action, NULL);
@@ -135,36 +138,25 @@ static void give_terminal_back(void)
 /* Ctrl-Z: stop, with the terminal restored for the shell; SIGCONT resumes. */
 static void suspend(void)
 {
-	sigset_t stop;
-	sigset_t mask;
-
 	give_terminal_back();
-	sigemptyset(&stop);
-	sigaddset(&stop, SIGTSTP);
 	handle_signal(SIGTSTP, SIG_DFL);
-	raise(SIGTSTP);
-	sigprocmask(SIG_UNBLOCK, &stop, &mask); /* here it stops */
-	sigprocmask(SIG_SETMASK, &mask, NULL);
+	raise(SIGTSTP); /* here it stops */
 	handle_signal(SIGTSTP, on_signal);
 	must_suspend = 0;
 	was_continued = 0;
 	take_terminal();
 }
 
-/* Job control of the shell. 1 if the screen must be drawn anew. */
-static int attend_job_control(void)
+/* Job control of the shell. Not with signals blocked: taking the terminal may wait for them. */
+static void attend_job_control(void)
 {
 	if (is_taken && must_suspend) {
 		suspend();
-		return 1;
-	}
-	/* Stopped by SIGSTOP or SIGTTIN: the shell has changed the terminal meanwhile. */
-	if (is_taken && was_continued) {
+	} else if (is_taken && was_continued) {
+		/* Stopped by SIGSTOP or SIGTTIN: the shell has changed the terminal meanwhile. */
 		was_continued = 0;
 		take_terminal();
-		return 1;
 	}
-	return 0;
 }
 
 void screen_begin(void)
@@ -188,6 +180,8 @@ void screen_end(void)
 		give_terminal_back();
 		handle_signal(SIGTSTP, SIG_DFL);
 		handle_signal(SIGCONT, SIG_DFL);
+		must_suspend = 0;
+		was_continued = 0;
 	}
 }
 
@@ -290,7 +284,7 @@ int screen_wait(int64_t ns)
 		sigaddset(&caught, numbers[i]);
 	}
 	sigprocmask(SIG_BLOCK, &caught, &mask);
-	while (!is_over && key == 0 && !attend_job_control()) {
+	while (!is_over && key == 0 && !must_suspend && !was_continued) {
 		int64_t left_ns = until_ns - now_ns();
 		struct timespec left = { .tv_sec = left_ns / NS_PER_S,
 					 .tv_nsec = left_ns % NS_PER_S };
@@ -303,6 +297,7 @@ int screen_wait(int64_t ns)
 		}
 	}
 	sigprocmask(SIG_SETMASK, &mask, NULL);
+	attend_job_control();
 	if (key == 'q' || key == 'Q' || key == 3) {
 		is_over = 1;
 	}

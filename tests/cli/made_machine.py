@@ -122,6 +122,18 @@ def running_threads(pid: int, priority: int = 80, cores: str = "3", policy: int 
     }
 
 
+def idle_state(latency_us: int, is_disabled: int = 0) -> Files:
+    """A second idle state, and neither a process nor ecdaqd that limits the latency."""
+    yaml = "bus:\n  interface: ecat0\ncycle:\n  cpu: 3\n  cpu_dma_latency: -1us\n"
+    return {
+        f"{CORE}/cpuidle/state1/name": "C6\n",
+        f"{CORE}/cpuidle/state1/latency": f"{latency_us}\n",
+        f"{CORE}/cpuidle/state1/disable": f"{is_disabled}\n",
+        "/dev/cpu_dma_latency": struct.pack("=i", 2000000000),
+        "ecdaq.yaml": yaml,
+    }
+
+
 def disk(**changed: int) -> Files:
     """The file system of the recordings."""
     figures = {"bytes_total": 32 * 10**9, "bytes_free": 30 * 10**9, "inodes_total": 2000000}

@@ -23,6 +23,8 @@ from made_machine import (
     checks,
     disk,
     examine,
+    idle_state,
+    irq_thread,
     report,
     running_threads,
     thread,
@@ -39,6 +41,20 @@ def test_a_good_machine_has_nothing_to_fix(machine: Machine) -> None:
 
 # check, what is otherwise and still good, what is said
 ALSO_GOOD: list[tuple[str, Files, str]] = [
+    ("idle_states", idle_state(10), "at most C6: exit latency 10 us"),
+    ("idle_states", idle_state(133, is_disabled=1), "at most WFI: exit latency 1 us"),
+    ("disk", disk(bytes_free=1500000001, bytes_total=30 * 10**9), "1.4 GiB free"),
+    ("inodes", disk(inodes_free=1000), "1000 inodes free"),
+    ("irq_threads", irq_thread(81), "above the cycle's 80"),
+    (
+        "other_irqs",
+        {
+            "/proc/interrupts": " 34:  0  0  0  0  GICv2 158 Level  mmc0\n",
+            "/proc/irq/34/effective_affinity_list": "3\n",
+        },
+        "none on core 3",
+    ),
+    ("core_users", thread(700, "backup", "0-2"), "no other thread"),
     ("kernel", {"/sys/kernel/realtime": None}, "PREEMPT_RT"),
     (
         "isolation",

@@ -3,8 +3,6 @@
 
 from __future__ import annotations
 
-import struct
-
 import pytest
 from ecdaq import FAILED, fails
 from made_machine import (
@@ -18,6 +16,7 @@ from made_machine import (
     checks,
     disk,
     examine,
+    idle_state,
     irq_thread,
     report,
     thread,
@@ -69,18 +68,8 @@ BAD: list[tuple[str, Files, str, str]] = [
         "core 3 shares its hardware: cores 1,3",
     ),
     ("governor", {f"{CORE}/cpufreq/scaling_governor": "ondemand\n"}, "WARN", "echo performance"),
-    (
-        "idle_states",
-        {
-            f"{CORE}/cpuidle/state1/name": "C6\n",
-            f"{CORE}/cpuidle/state1/latency": "133\n",
-            f"{CORE}/cpuidle/state1/disable": "0\n",
-            "/dev/cpu_dma_latency": struct.pack("=i", 2000000000),
-            "ecdaq.yaml": "bus:\n  interface: ecat0\ncycle:\n  cpu: 3\n  cpu_dma_latency: -1us\n",
-        },
-        "WARN",
-        "may enter C6: exit latency 133 us",
-    ),
+    ("idle_states", idle_state(11), "WARN", "may enter C6: exit latency 11 us"),
+    ("core_users", thread(700, "equal", "3", (1, 80)), "FAIL", "equal (SCHED_FIFO 80) may preempt"),
     (
         "core_users",
         thread(700, "backup", "0-3"),
@@ -181,6 +170,22 @@ BAD: list[tuple[str, Files, str, str]] = [
         "WARN",
         "TAI - UTC is 0 s instead of 37 s",
     ),
+    (
+        "tai",
+        {"/calls/clock": "synchronised 1\nerror_us 850\ntai_offset_s 36\n"},
+        "WARN",
+        "is 36 s instead of 37 s",
+    ),
+    ("disk", disk(bytes_free=64 << 20, bytes_total=10**9), "FAIL", "recording stops below"),
+    ("disk", disk(bytes_free=100 << 20, bytes_total=10**9), "WARN", "recording stops below"),
+    ("inodes", disk(inodes_free=999), "WARN", "999 inodes free"),
+    (
+        "coalescing",
+        {"/calls/coalesce.ecat0": "rx_us 0\nrx_frames 1\nadaptive 1\n"},
+        "WARN",
+        "up to 0 us, adaptively",
+    ),
+    ("irq_threads", irq_thread(80), "FAIL", "SCHED_FIFO 80, not above the cycle's 80"),
     ("watchdog", {"/sys/class/watchdog": None}, "WARN", "none"),
     (
         "watchdog",
@@ -196,7 +201,7 @@ BAD: list[tuple[str, Files, str, str]] = [
     ),
     (
         "watchdog",
-        {"/sys/class/watchdog/watchdog0/timeout": "60\n"},
+        {"/sys/class/watchdog/watchdog0/timeout": "16\n"},
         "WARN",
         "supports 15 s at most",
     ),

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from ecdaq import ECDAQ, FAKE, NO_DAEMON, OK, ROOT, Fake, environment
+from ecdaq import ECDAQ, FAKE, NO_DAEMON, OK, ROOT, Fake, environment, wait_until
 
 ENTER, LEAVE = "\x1b[?1049h", "\x1b[?1049l"
 
@@ -38,13 +38,14 @@ class Terminal:
         self.text = ""
         self.process: subprocess.Popen[bytes] | None = None
 
-    def start(self, daemon: Fake, *words: str) -> None:
+    def start(self, daemon: Fake, *words: str, cwd: str | None = None) -> None:
         self.process = subprocess.Popen(
             [ECDAQ, *words],
             env=environment(daemon.run_dir, LANG="C.UTF-8"),
             stdin=self.slave,
             stdout=self.slave,
             stderr=subprocess.PIPE,
+            cwd=cwd,
         )
 
     def start_shell(self, run_dir: Path, **more: str) -> None:
@@ -189,16 +190,51 @@ def test_the_last_lines_say_what_q_does_and_what_a_second_terminal_calls(
     assert "2 slaves" in said.stdout and not said.stderr
 
 
+@pytest.mark.parametrize("missing", [0, 1])
 def test_the_line_for_a_second_terminal_wraps_between_words(
-    daemon: Fake, terminal: Terminal
+    daemon: Fake, terminal: Terminal, missing: int
 ) -> None:
-    fcntl.ioctl(terminal.slave, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 60, 0, 0))
-    terminal.start(daemon, "top", "--interval", "20ms")
+    command = f"--run-dir {daemon.run_dir} status"
+    name = ECDAQ.resolve()
+    width = len(f"2nd terminal: {name} {command}")
+    fcntl.ioctl(terminal.slave, termios.TIOCSWINSZ, struct.pack("HHHH", 24, width - missing, 0, 0))
+    terminal.start(daemon, "top", "--interval", "20ms", cwd="/")
     terminal.wait_for(r"(?s)(\x1b\[H.*){4}")
     frame = screens(terminal.text)[1]
     terminal.press("q")
     assert terminal.end() == (OK, "")
-    assert frame[-1].strip() == f"--run-dir {daemon.run_dir} status"
+    if missing:
+        assert frame[-2:] == [f"2nd terminal: {name} \\", f"  {command}"]
+    else:
+        assert frame[-1] == f"2nd terminal: {name} {command}"
+
+
+def state_of(pid: str) -> str:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except FileNotFoundError:
+        return "gone"
+
+
+def test_a_view_in_the_background_stops_and_ends_without_the_foreground(
+    daemon: Fake, terminal: Terminal
+) -> None:
+    terminal.start_shell(daemon.run_dir)
+    terminal.press(f"{ECDAQ} top --interval 20ms\n")
+    terminal.wait_for_new(r"(?s)\x1b\[\?1049h.*\x1b\[H")
+    terminal.press("\x1a")
+    terminal.wait_for_new(r"(?s)Stopped.*READY> ")
+    terminal.press("jobs -l\n")
+    found = re.search(r"\[1\]\+ +(\d+) Stopped", terminal.wait_for_new(r"(?s)Stopped.*READY> "))
+    assert found
+    terminal.press("bg\n")
+    terminal.wait_for_new("READY> ")
+    wait_until(lambda: state_of(found.group(1)) == "T")
+    assert not terminal.has_keys()
+    terminal.press("kill %1\n")
+    terminal.wait_for_new("READY> ")
+    wait_until(lambda: state_of(found.group(1)) in ("Z", "gone"))
+    assert not terminal.has_keys()
 
 
 @pytest.mark.parametrize("verb", ["top --interval 20ms", "watch piccolo1.adc --plot"])

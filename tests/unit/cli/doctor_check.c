@@ -89,6 +89,9 @@ TEST(doctor_check, the_first_rule_that_holds_decides)
 	put("a3", "slo");
 	run(&check);
 	expect(FINDING_OK, "slo", "");
+	put("a3", "lower");
+	run(&check);
+	expect(FINDING_OK, "lower", "");
 	put("a3", "y [x]");
 	run(&check);
 	expect(FINDING_WARN, "has it", "");
@@ -188,6 +191,11 @@ TEST(doctor_check, what_a_check_needs_is_looked_for_first)
 	run(&core);
 	expect(FINDING_OK, "on it", "");
 	target.cpu = -1;
+	check.needs = 0;
+	check.rules[0].text = "core {core}";
+	run(&check);
+	expect(FINDING_OK, "core 0", "");
+	check = all;
 	run(&core);
 	expect(FINDING_SKIP, "the cycle has no core of its own (cycle.cpu)", "");
 	run(&check);
