@@ -3,10 +3,10 @@
 #include <stdio.h>
 
 #include "cli/cli.h"
-#include "cli/json.h"
 #include "cli/source.h"
 #include "image/image.h"
 #include "program/args.h"
+#include "program/json.h"
 
 static void show(const struct channel *ch)
 {

@@ -9,10 +9,10 @@
 #include "base/clock.h"
 #include "base/event.h"
 #include "cli/cli.h"
-#include "cli/json.h"
 #include "cli/screen.h"
 #include "cli/text.h"
 #include "program/args.h"
+#include "program/json.h"
 #include "reader/feed.h"
 #include "reader/reader.h"
 

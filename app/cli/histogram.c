@@ -9,11 +9,11 @@
 
 #include "cli/bars.h"
 #include "cli/cli.h"
-#include "cli/json.h"
 #include "cli/screen.h"
 #include "cli/source.h"
 #include "cli/text.h"
 #include "program/args.h"
+#include "program/json.h"
 
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
 

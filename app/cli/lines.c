@@ -4,9 +4,9 @@
 #include <inttypes.h>
 #include <stdio.h>
 
-#include "cli/json.h"
 #include "cli/text.h"
 #include "image/image.h"
+#include "program/json.h"
 #include "reader/table.h"
 
 static const struct channel *chosen(const struct lines *lines, unsigned i)

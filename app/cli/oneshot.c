@@ -9,11 +9,11 @@
 #include "cli/admin_client.h"
 #include "cli/cli.h"
 #include "cli/follow.h"
-#include "cli/json.h"
 #include "cli/screen.h"
 #include "cli/text.h"
 #include "image/image.h"
 #include "program/args.h"
+#include "program/json.h"
 #include "reader/table.h"
 
 /* Entries of the FB1111-Piccolo. */

@@ -8,6 +8,7 @@
 #include "base/clock.h"
 #include "base/event.h"
 #include "base/sync0.h"
+#include "cli/running.h"
 #include "cli/source.h"
 #include "cli/sync0_source.h"
 #include "cli/text.h"
@@ -21,12 +22,12 @@ void report_gather(struct cli *cli, const struct status_page *page,
 	struct report report = { .page = page, .record = record };
 	struct samples samples;
 
-	report.is_running = source_is_alive(page->pid);
-	report.is_recorder_running = record != NULL && source_is_alive(record->pid);
+	report.is_running = running_is_alive(page->pid);
+	report.is_recorder_running = record != NULL && running_is_alive(record->pid);
 	report.dds = source_dds(cli);
-	report.is_dds_running = report.dds != NULL && source_is_alive(report.dds->pid);
+	report.is_dds_running = report.dds != NULL && running_is_alive(report.dds->pid);
 	report.sync0 = sync0_source_try(cli);
-	report.is_sync0_running = report.sync0 != NULL && source_is_alive(report.sync0->pid);
+	report.is_sync0_running = report.sync0 != NULL && running_is_alive(report.sync0->pid);
 	if (samples_try(cli, &samples) == 0) {
 		if (samples.meta->session == page->session && reader_read_newest(samples.reader)) {
 			struct sample_header header = samples_header(&samples);

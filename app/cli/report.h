@@ -7,7 +7,7 @@
 
 #include "base/status.h"
 #include "base/sync0.h"
-#include "cli/json.h"
+#include "program/json.h"
 
 struct report {
 	const struct status_page *page;

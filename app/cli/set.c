@@ -9,10 +9,10 @@
 #include "cli/admin_client.h"
 #include "cli/choose.h"
 #include "cli/cli.h"
-#include "cli/json.h"
 #include "cli/source.h"
 #include "image/image.h"
 #include "program/args.h"
+#include "program/json.h"
 
 struct setting {
 	struct cli *cli;

@@ -2,7 +2,6 @@
 #include "cli/source.h"
 
 #include <errno.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -86,11 +85,6 @@ void source_record_close(const struct record_status *record)
 void source_dds_close(const struct dds_status *dds)
 {
 	free((void *)(uintptr_t)dds);
-}
-
-int source_is_alive(int64_t pid)
-{
-	return pid > 0 && (kill((pid_t)pid, 0) == 0 || errno == EPERM);
 }
 
 const struct dds_status *source_dds(struct cli *cli)

@@ -26,9 +26,6 @@ void source_status_close(const struct status_page *page);
 void source_record_close(const struct record_status *record);
 void source_dds_close(const struct dds_status *dds);
 
-/** Is the process that wrote a page still there? */
-int source_is_alive(int64_t pid);
-
 /* The sample ring with its own description. */
 struct samples {
 	struct reader *reader;

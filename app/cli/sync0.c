@@ -10,11 +10,12 @@
 
 #include "cli/bars.h"
 #include "cli/cli.h"
-#include "cli/json.h"
+#include "cli/running.h"
 #include "cli/source.h"
 #include "cli/sync0_source.h"
 #include "cli/text.h"
 #include "program/args.h"
+#include "program/json.h"
 #include "reader/feed.h"
 
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
@@ -284,7 +285,7 @@ static enum exit_code show(struct cli *cli, int is_json, int is_histogram)
 	if (result != EXIT_CODE_OK) {
 		return result;
 	}
-	view.is_running = source_is_alive(view.page->pid);
+	view.is_running = running_is_alive(view.page->pid);
 	view.lines = sync0_source_lines(view.page);
 	read_results(cli, &view);
 	if (is_json) {

@@ -8,8 +8,8 @@
 #include <time.h>
 
 #include "base/clock.h"
-#include "cli/json.h"
 #include "image/image.h"
+#include "program/json.h"
 
 const char *text_ns(int64_t ns, char buf[TEXT_BYTES])
 {

@@ -10,6 +10,7 @@
 #include "base/clock.h"
 #include "cli/cli.h"
 #include "cli/report.h"
+#include "cli/running.h"
 #include "cli/screen.h"
 #include "cli/source.h"
 #include "cli/text.h"
@@ -190,7 +191,7 @@ static int is_worth_waiting(struct top *top)
 	if (r < 0) {
 		return r == -ENOENT;
 	}
-	is_alive = source_is_alive(page->pid);
+	is_alive = running_is_alive(page->pid);
 	source_status_close(page);
 	return !is_alive;
 }

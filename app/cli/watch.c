@@ -12,12 +12,12 @@
 #include "cli/choose.h"
 #include "cli/cli.h"
 #include "cli/follow.h"
-#include "cli/json.h"
 #include "cli/lines.h"
 #include "cli/plot.h"
 #include "cli/screen.h"
 #include "image/image.h"
 #include "program/args.h"
+#include "program/json.h"
 
 #define DRAW_PERIOD_NS (NS_PER_S / 15)
 

@@ -10,10 +10,11 @@
 #include "cli/cli.h"
 #include "cli/doctor/check.h"
 #include "cli/doctor/resolve.h"
-#include "cli/json.h"
 #include "cli/source.h"
 #include "cli/text.h"
 #include "program/args.h"
+#include "program/json.h"
+#include "cli/running.h"
 
 #define CYCLE_THREAD "ecdaqd-cycle"
 
@@ -51,7 +52,7 @@ static enum exit_code find_daemon(struct doctor *d)
 	if (r < 0 && r != -ENOENT) {
 		t->page_err = r;
 		t->pid = resolve_find_daemon(&t->probe);
-	} else if (r == 0 && source_is_alive(page->pid)) {
+	} else if (r == 0 && running_is_alive(page->pid)) {
 		t->page = page;
 		t->pid = page->pid;
 	} else if (r == 0) {

@@ -3,8 +3,8 @@
 #include <inttypes.h>
 #include <string.h>
 
+#include "program/json.h"
 #include "record/columns_internal.h"
-#include "record/json.h"
 
 /* As RFC 4180 has it. */
 static void put_csv_text(FILE *out, const char *text)
@@ -38,9 +38,9 @@ static void put_real(const struct columns *c, double value, FILE *out)
 	char text[40];
 
 	if (c->format == LOG_JSON) {
-		json_real(out, value);
+		json_put_real(out, value);
 	} else {
-		real_format(value, text, sizeof(text));
+		json_real_format(value, text, sizeof(text));
 		fputs(text, out);
 	}
 }
@@ -74,7 +74,7 @@ static void put_json_row(const struct columns *c, FILE *out)
 	}
 	for (size_t i = 0; i < c->column_count; i++) {
 		fputc(',', out);
-		json_string(out, c->column[i].name);
+		json_put_text(out, c->column[i].name);
 		fputc(':', out);
 		if (c->topic[c->column[i].topic].is_fresh) {
 			put_value(c, &c->column[i], out);

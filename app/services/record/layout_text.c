@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "record/json.h"
+#include "program/json.h"
 #include "record/layout.h"
 #include "record/messages.h"
 #include "record/names.h"
@@ -33,8 +33,8 @@ static void put_comment(FILE *out, const struct layout_field *f)
 
 	name_make_comment(ch->name, name, sizeof(name));
 	name_make_comment(ch->unit, unit, sizeof(unit));
-	real_format(ch->scale, scale, sizeof(scale));
-	real_format(ch->offset, offset, sizeof(offset));
+	json_real_format(ch->scale, scale, sizeof(scale));
+	json_real_format(ch->offset, offset, sizeof(offset));
 	fprintf(out, "%s, %s 0x%04x:%02x, %u bit", name,
 		ch->direction == CHANNEL_OUTPUT ? "output" : "input", ch->index, ch->subindex,
 		ch->bit_len);
@@ -137,30 +137,30 @@ static void put_json_channel(FILE *out, const struct layout_topic *topic,
 	const struct channel *ch = f->channel;
 
 	fprintf(out, "{\"name\":");
-	json_string(out, ch->name);
+	json_put_text(out, ch->name);
 	fprintf(out, ",\"topic\":");
-	json_string(out, topic->topic);
+	json_put_text(out, topic->topic);
 	fprintf(out, ",\"field\":");
-	json_string(out, f->name);
+	json_put_text(out, f->name);
 	fprintf(out,
 		",\"slave\":%u,\"index\":%u,\"subindex\":%u,\"type\":\"%s\","
 		"\"direction\":\"%s\",\"bit_len\":%u,\"bit_offset\":%" PRIu32 ",\"unit\":",
 		ch->slave_pos, ch->index, ch->subindex, type_to_str(ch->type),
 		ch->direction == CHANNEL_OUTPUT ? "output" : "input", ch->bit_len, ch->bit_offset);
-	json_string(out, ch->unit);
+	json_put_text(out, ch->unit);
 	fprintf(out, ",\"scale\":");
-	json_real(out, ch->scale);
+	json_put_real(out, ch->scale);
 	fprintf(out, ",\"offset\":");
-	json_real(out, ch->offset);
+	json_put_real(out, ch->offset);
 	fputc('}', out);
 }
 
 static void put_json_slave(FILE *out, const struct slave_info *s)
 {
 	fprintf(out, "{\"name\":");
-	json_string(out, s->name);
+	json_put_text(out, s->name);
 	fprintf(out, ",\"device\":");
-	json_string(out, s->device);
+	json_put_text(out, s->device);
 	fprintf(out,
 		",\"position\":%u,\"vendor\":%" PRIu32 ",\"product\":%" PRIu32
 		",\"revision\":%" PRIu32 ",\"serial\":%" PRIu32 ",\"has_dc\":%s,"

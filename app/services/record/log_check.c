@@ -7,7 +7,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include "record/json.h"
+#include "program/json.h"
 #include "record/log_common.h"
 #include "record/store.h"
 
@@ -200,7 +200,7 @@ static void put_json(FILE *out, const struct checked *c, uint64_t between)
 	const struct track *t = &c->track;
 
 	fprintf(out, "{\"file\":");
-	json_string(out, c->path);
+	json_put_text(out, c->path);
 	fprintf(out,
 		",\"readable\":%s,\"damaged\":%s,\"state\":\"%s\",\"session\":\"%" PRIu64
 		"\",\"cycles\":%" PRIu64 ",\"first_cycle\":%" PRIu64 ",\"last_cycle\":%" PRIu64

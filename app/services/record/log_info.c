@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "record/json.h"
+#include "program/json.h"
 #include "record/log_common.h"
 
 struct topic {
@@ -136,7 +136,7 @@ static void put_metadata(struct info *in, const struct mcap_item *item)
 
 	if (in->format == LOG_JSON) {
 		fprintf(in->out, "%s{\"name\":", in->comma);
-		json_string_n(in->out, item->name.at, item->name.len);
+		json_put_text_n(in->out, item->name.at, item->name.len);
 		fprintf(in->out, ",\"values\":{");
 	} else {
 		fprintf(in->out, "metadata %.*s\n", (int)item->name.len, item->name.at);
@@ -144,9 +144,9 @@ static void put_metadata(struct info *in, const struct mcap_item *item)
 	while (mcap_pairs_next(item->data, item->data_len, &at, &key, &value) > 0) {
 		if (in->format == LOG_JSON) {
 			fputs(comma, in->out);
-			json_string_n(in->out, key.at, key.len);
+			json_put_text_n(in->out, key.at, key.len);
 			fputc(':', in->out);
-			json_string_n(in->out, value.at, value.len);
+			json_put_text_n(in->out, value.at, value.len);
 			comma = ",";
 		} else {
 			fprintf(in->out, "  %.*s: ", (int)key.len, key.at);
@@ -201,11 +201,11 @@ static void put_topics(const struct info *in)
 
 		if (in->format == LOG_JSON) {
 			fprintf(in->out, "%s{\"topic\":", i > 0 ? "," : "");
-			json_string(in->out, t->name != NULL ? t->name : "");
+			json_put_text(in->out, t->name != NULL ? t->name : "");
 			fprintf(in->out, ",\"messages\":%" PRIu64 ",\"schema\":", t->messages);
-			json_string(in->out, name);
+			json_put_text(in->out, name);
 			fprintf(in->out, ",\"definition\":");
-			json_string(in->out, s != NULL && s->text != NULL ? s->text : "");
+			json_put_text(in->out, s != NULL && s->text != NULL ? s->text : "");
 			fputc('}', in->out);
 		} else {
 			fprintf(in->out, "topic %s: %" PRIu64 " messages, %s\n",
@@ -281,7 +281,7 @@ int log_info(const char *path, enum log_format format, FILE *out, FILE *err)
 	track_init(&in.track);
 	if (format == LOG_JSON) {
 		fprintf(out, "{\"file\":");
-		json_string(out, path);
+		json_put_text(out, path);
 		fprintf(out, ",\"bytes\":%" PRIu64 ",\"metadata\":[", file.source.bytes);
 	} else {
 		fprintf(out, "%s: %" PRIu64 " bytes\n", path, file.source.bytes);

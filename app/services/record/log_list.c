@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "record/json.h"
+#include "program/json.h"
 #include "record/log_common.h"
 #include "record/mcap_reader.h"
 #include "record/messages.h"
@@ -108,7 +108,7 @@ static void put_row(FILE *out, const struct row *row)
 static void put_json_row(FILE *out, const struct row *row)
 {
 	fprintf(out, "{\"file\":");
-	json_string(out, row->name);
+	json_put_text(out, row->name);
 	fprintf(out,
 		",\"state\":\"%s\",\"bytes\":%" PRIu64 ",\"start_ns\":%" PRIu64
 		",\"end_ns\":%" PRIu64 ",\"cycles\":%" PRIu64 "}",

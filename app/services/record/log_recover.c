@@ -6,7 +6,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "record/json.h"
+#include "program/json.h"
 #include "record/log_common.h"
 #include "record/recover_file.h"
 
@@ -30,7 +30,7 @@ static void put_result(FILE *out, const char *path, const struct recover_outcome
 {
 	if (format == LOG_JSON) {
 		fprintf(out, "{\"file\":");
-		json_string(out, path);
+		json_put_text(out, path);
 		fprintf(out,
 			",\"result\":\"%s\",\"cycles\":%" PRIu64 ",\"last_cycle\":%" PRIu64
 			",\"chunks\":%" PRIu64 ",\"messages\":%" PRIu64 ",\"lost_bytes\":%" PRIu64

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "record/json.h"
+#include "program/json.h"
 
 enum { PAIRS_PER_FIELD = 4, NUMBERS = 20, NUMBER_BYTES = 24 };
 
@@ -92,8 +92,8 @@ static void add_field_pairs(struct field_pairs *p, const struct layout_field *f)
 	char *scale = next_text(p);
 	char *offset = next_text(p);
 
-	real_format(f->channel->scale, scale, sizeof(p->text[0]));
-	real_format(f->channel->offset, offset, sizeof(p->text[0]));
+	json_real_format(f->channel->scale, scale, sizeof(p->text[0]));
+	json_real_format(f->channel->offset, offset, sizeof(p->text[0]));
 	add_key(p, f->name, "channel", f->channel->name);
 	add_key(p, f->name, "unit", f->channel->unit);
 	add_key(p, f->name, "scale", scale);

@@ -3,6 +3,8 @@
 
 #include <inttypes.h>
 
+#include "program/json.h"
+
 void print_result(const struct sync0_result *r, FILE *out)
 {
 	char text[512];
@@ -13,32 +15,44 @@ void print_result(const struct sync0_result *r, FILE *out)
 
 void print_result_json(const struct sync0_result *r, FILE *out)
 {
-	fprintf(out,
-		"{\"sync0\":\"%s\",\"source\":\"%s\",\"slave\":%u,\"line\":%u,\"verdict\":\"%s\",",
-		r->kind == SYNC0_SHOT ? "shot" : "window", sync0_source_to_str(r->source),
-		r->slave_pos, r->line + 1u, sync0_verdict_to_str(r->verdict));
+	struct json js;
+
+	json_init(&js, out);
+	json_object_begin(&js, NULL);
+	json_text(&js, "sync0", r->kind == SYNC0_SHOT ? "shot" : "window");
+	json_text(&js, "source", sync0_source_to_str(r->source));
+	json_u64(&js, "slave", r->slave_pos);
+	json_u64(&js, "line", r->line + 1u);
+	json_text(&js, "verdict", sync0_verdict_to_str(r->verdict));
 	for (unsigned i = 0; i < SYNC0_CHECKS; i++) {
-		fprintf(out, "\"%s\":\"%s\",", sync0_check_to_str(i),
-			sync0_verdict_to_str(r->check[i]));
+		json_text(&js, sync0_check_to_str(i), sync0_verdict_to_str(r->check[i]));
 	}
-	fprintf(out,
-		"\"first_cycle\":%" PRIu64 ",\"cycles\":%" PRIu64 ",\"edges\":%" PRIu64
-		",\"missing\":%" PRIu64 ",\"extra\":%" PRIu64 ",\"overflow\":%" PRIu64
-		",\"step_ns\":%" PRId64 ",\"disturbed\":%s,",
-		r->first_cycle, r->cycles, r->edges, r->missing, r->extra, r->overflow, r->step_ns,
-		r->is_disturbed ? "true" : "false");
-	fprintf(out,
-		"\"period_ns\":%.3f,\"period_sd_ns\":%.1f,\"jitter_p99_ns\":%" PRId64
-		",\"jitter_max_ns\":%" PRId64 ",\"drift_ppb\":%.1f,\"drift_error_ppb\":%.1f,"
-		"\"rate_ppb\":%.1f,\"rate_error_ppb\":%.1f,",
-		r->period_ns, r->period_sd_ns, r->jitter_p99_ns, r->jitter_max_ns, r->drift_ppb,
-		r->drift_error_ppb, r->rate_ppb, r->rate_error_ppb);
-	fprintf(out,
-		"\"phase_ns\":%" PRId64 ",\"phase_error_ns\":%" PRId64 ",\"frame_ns\":%" PRId64
-		",\"skew_ns\":%" PRId64 ",\"skew_error_ns\":%" PRId64 ",\"dc_diff_ns\":%" PRId64
-		",\"has\":%u,\"resolved\":%u}\n",
-		r->phase_ns, r->phase_error_ns, r->frame_ns, r->skew_ns, r->skew_error_ns,
-		r->dc_diff_ns, r->has, r->is_resolved);
+	json_u64(&js, "first_cycle", r->first_cycle);
+	json_u64(&js, "cycles", r->cycles);
+	json_u64(&js, "edges", r->edges);
+	json_u64(&js, "missing", r->missing);
+	json_u64(&js, "extra", r->extra);
+	json_u64(&js, "overflow", r->overflow);
+	json_i64(&js, "step_ns", r->step_ns);
+	json_truth(&js, "disturbed", r->is_disturbed);
+	json_fixed(&js, "period_ns", r->period_ns, 3);
+	json_fixed(&js, "period_sd_ns", r->period_sd_ns, 1);
+	json_i64(&js, "jitter_p99_ns", r->jitter_p99_ns);
+	json_i64(&js, "jitter_max_ns", r->jitter_max_ns);
+	json_fixed(&js, "drift_ppb", r->drift_ppb, 1);
+	json_fixed(&js, "drift_error_ppb", r->drift_error_ppb, 1);
+	json_fixed(&js, "rate_ppb", r->rate_ppb, 1);
+	json_fixed(&js, "rate_error_ppb", r->rate_error_ppb, 1);
+	json_i64(&js, "phase_ns", r->phase_ns);
+	json_i64(&js, "phase_error_ns", r->phase_error_ns);
+	json_i64(&js, "frame_ns", r->frame_ns);
+	json_i64(&js, "skew_ns", r->skew_ns);
+	json_i64(&js, "skew_error_ns", r->skew_error_ns);
+	json_i64(&js, "dc_diff_ns", r->dc_diff_ns);
+	json_u64(&js, "has", r->has);
+	json_u64(&js, "resolved", r->is_resolved);
+	json_object_end(&js);
+	json_end_line(&js);
 }
 
 void print_event(const struct event *ev, FILE *out)
@@ -51,15 +65,23 @@ void print_event(const struct event *ev, FILE *out)
 
 void print_event_json(const struct event *ev, FILE *out)
 {
+	struct json js;
 	char text[256];
 
-	/* Its text holds no character that JSON escapes. */
 	event_format(ev, text, sizeof(text));
-	fprintf(out,
-		"{\"event\":\"%s\",\"slave\":%d,\"line\":%u,\"value\":%" PRId64
-		",\"arg\":[%d,%d],\"text\":\"%s\"}\n",
-		event_name(ev->id), ev->slave_pos == EVENT_NO_SLAVE ? -1 : (int)ev->slave_pos,
-		ev->line, ev->value, ev->arg[0], ev->arg[1], text);
+	json_init(&js, out);
+	json_object_begin(&js, NULL);
+	json_text(&js, "event", event_name(ev->id));
+	json_i64(&js, "slave", ev->slave_pos == EVENT_NO_SLAVE ? -1 : (int)ev->slave_pos);
+	json_u64(&js, "line", ev->line);
+	json_i64(&js, "value", ev->value);
+	json_array_begin(&js, "arg");
+	json_i64(&js, NULL, ev->arg[0]);
+	json_i64(&js, NULL, ev->arg[1]);
+	json_array_end(&js);
+	json_text(&js, "text", text);
+	json_object_end(&js);
+	json_end_line(&js);
 }
 
 void print_calibration(const struct calibration *c, FILE *out)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "cli/json.h"
+#include "program/json.h"
 
 #include <math.h>
 
@@ -57,7 +57,7 @@ TEST(json, text_is_escaped)
 {
 	text_is("", "\"\"");
 	text_is("a\"b\\c", "\"a\\\"b\\\\c\"");
-	text_is("a\nb\tc", "\"a\\nb\\tc\"");
+	text_is("a\nb\tc", "\"a\\u000ab\\u0009c\"");
 	text_is("\x01\x1f\x7f", "\"\\u0001\\u001f\\u007f\"");
 	text_is("/", "\"/\"");
 }
@@ -67,13 +67,15 @@ TEST(json, utf8_goes_through_and_what_is_none_is_replaced)
 	text_is("\xc2\xb5s", "\"\xc2\xb5s\"");
 	text_is("\xe2\x82\xac", "\"\xe2\x82\xac\"");
 	text_is("\xf0\x9f\x98\x80", "\"\xf0\x9f\x98\x80\"");
-	text_is("\xb5s", "\"\\ufffds\"");                                /* Latin-1 */
-	text_is("\xc3", "\"\\ufffd\"");                                  /* cut short */
-	text_is("\xe2\x82", "\"\\ufffd\\ufffd\"");                       /* cut short */
-	text_is("\xc0\xaf", "\"\\ufffd\\ufffd\"");                       /* overlong */
-	text_is("\xe0\x80\xaf", "\"\\ufffd\\ufffd\\ufffd\"");            /* overlong */
-	text_is("\xed\xa0\x80", "\"\\ufffd\\ufffd\\ufffd\"");            /* surrogate */
-	text_is("\xf4\x90\x80\x80", "\"\\ufffd\\ufffd\\ufffd\\ufffd\""); /* beyond U+10FFFF */
+	text_is("\xb5s", "\"\xef\xbf\xbds\"");                               /* Latin-1 */
+	text_is("\xc3", "\"\xef\xbf\xbd\"");                                 /* cut short */
+	text_is("\xe2\x82", "\"\xef\xbf\xbd\xef\xbf\xbd\"");                 /* cut short */
+	text_is("\xc0\xaf", "\"\xef\xbf\xbd\xef\xbf\xbd\"");                 /* overlong */
+	text_is("\xe0\x80\xaf", "\"\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd\""); /* overlong */
+	text_is("\xed\xa0\x80", "\"\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd\""); /* surrogate */
+	text_is("\xf4\x90\x80\x80", "\"\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd\""); /* beyond
+												U+10FFFF
+											      */
 }
 
 TEST(json, floats_are_short_and_read_back_the_same)
@@ -128,4 +130,31 @@ static void write_nested(struct json *js)
 TEST(json, commas_stand_between_values_only)
 {
 	CHECK_STR(written(write_nested), "{\"a\":{},\"b\":[1,{\"k\\\"\":\"v\"}],\"c\":3},[]");
+}
+
+static void write_fixed(struct json *js)
+{
+	json_fixed(js, NULL, double_in, 1);
+}
+
+TEST(json, a_figure_has_the_decimals_asked_for)
+{
+	double_in = 2.25;
+	CHECK_STR(written(write_fixed), "2.2");
+	double_in = -0.96;
+	CHECK_STR(written(write_fixed), "-1.0");
+	double_in = NAN;
+	CHECK_STR(written(write_fixed), "null");
+}
+
+TEST(json, a_part_of_a_text_ends_at_its_length_or_at_a_zero)
+{
+	char text[64];
+	FILE *out = fmemopen(text, sizeof(text), "w");
+
+	CHECK(out != NULL);
+	json_put_text_n(out, "a\xe2\x82\xac", 3);
+	json_put_text_n(out, "a\0b", 3);
+	fclose(out);
+	CHECK_STR(text, "\"a\xef\xbf\xbd\xef\xbf\xbd\"\"a\"");
 }
