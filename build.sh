@@ -18,6 +18,7 @@ usage: ./build.sh VERB [OPTION...]
   sim      run the simulated segment alone, on a network interface
   fuzz     search for inputs that break a parser
   lint     formatting, static analysis, shell and Python checks
+  measure  measure on this machine and write the pages of app/doc/results/
   clean    remove what was built
   image    build the disk image of the SBC, or of the QEMU machine
   boot     boot that image in QEMU
@@ -124,6 +125,11 @@ Runs tests/tidy: clang-format, clang-tidy, ruff, shellcheck and the rules of the
 
   --fix   first let clang-format and ruff fix what they can
 USAGE
+}
+
+help_measure()
+{
+	"$root/app/tools/measure.py" --help
 }
 
 help_clean()
@@ -245,6 +251,16 @@ do_clean()
 	esac
 }
 
+do_measure()
+{
+	if python=$(find_python); then
+		"$python" "$root/app/tools/measure.py" --check "$@"
+	fi
+	prepare_tests run dds
+	build_flavour release
+	exec "$PYTHON" "$root/app/tools/measure.py" "$@"
+}
+
 # BitBake's library has an environment of its own: it needs Python, but none of the tests' packages.
 do_image()
 {
@@ -262,11 +278,11 @@ do_boot()
 	exec "$root/app/tools/image/boot.sh" "$@"
 }
 
-verbs="run test build sim fuzz lint clean image boot"
+verbs="run test build sim fuzz lint measure clean image boot"
 verb=${1:-help}
 [ $# -eq 0 ] || shift
 case $verb in
-build | test | run | sim | fuzz | lint | clean | image | boot)
+build | test | run | sim | fuzz | lint | measure | clean | image | boot)
 	for argument in "$@"; do
 		if [ "$argument" = --help ] && [ "$verb" != sim ]; then
 			"help_$verb"
@@ -277,7 +293,7 @@ build | test | run | sim | fuzz | lint | clean | image | boot)
 	;;
 help | --help | -h)
 	case ${1:-help} in
-	build | test | run | sim | fuzz | lint | clean | image | boot | help) "help_${1:-help}" ;;
+	build | test | run | sim | fuzz | lint | measure | clean | image | boot | help) "help_${1:-help}" ;;
 	*) usage_error "no verb '$1'; there are: $verbs help" ;;
 	esac
 	;;

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What DDS costs and how long it takes, measured: app/tools/measure-dds.sh prints it all.
+"""What DDS costs and how long it takes, measured: ./build.sh measure dds writes it all to a page.
 
 Times of SYNC0 edges are those of the simulated slaves (ecdaq-sim --edges): DC time beside
 CLOCK_MONOTONIC, which the subscribers on the same machine read when they take.

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from project import ROOT
 
-VERBS = ["run", "test", "build", "sim", "fuzz", "lint", "clean", "image", "boot", "help"]
+VERBS = ["run", "test", "build", "sim", "fuzz", "lint", "measure", "clean", "image", "boot", "help"]
 
 
 def build_sh(*arguments: str, **env: str) -> subprocess.CompletedProcess[str]:
@@ -77,6 +77,7 @@ def test_every_variable_is_documented() -> None:
         (["run", "--fast"], "unknown option '--fast'"),
         (["test", "units"], "no group 'units'"),
         (["build", "quick"], "no flavour 'quick'"),
+        (["measure", "speed"], "no subject 'speed'"),
         (["lint", "--all"], "unknown option '--all'"),
         (["clean", "everything"], "unknown option 'everything'"),
         (["fuzz", "nothing"], "no target 'nothing'"),

@@ -214,6 +214,13 @@ def test_an_unexpected_skip_is_a_failure_in_ci(own_build: Path) -> None:
     ]
 
 
+def wait_for_lines(paths: list[Path]) -> None:
+    end = time.monotonic() + 60
+    while not all(path.exists() and path.read_text().strip() for path in paths):
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
 def test_a_signal_ends_everything_that_was_started(own_build: Path) -> None:
     """A process that has left the process group of its suite, too."""
     program = f"""
@@ -228,10 +235,7 @@ run_tests.run_logged(["sh", "-c", script], run_tests.ROOT / "log", {{"PATH": "/u
 """
     runner = subprocess.Popen([sys.executable, "-c", program], cwd=own_build)
     pids = [own_build / "hidden", own_build / "visible"]
-    end = time.monotonic() + 60
-    while not all(path.exists() and path.read_text().strip() for path in pids):
-        assert time.monotonic() < end
-        time.sleep(0.01)
+    wait_for_lines(pids)
     runner.terminate()
     assert runner.wait(60) == 143
     assert not [path.name for path in pids if Path(f"/proc/{path.read_text().strip()}").exists()]

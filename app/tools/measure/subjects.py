@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: MIT
+"""What `./build.sh measure` can measure: mostly commands whose output is the page."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from measure import tests_run, tree
+from measure.page import NotMeasuredError, Subject
+
+SCENARIOS = "build/release/tests/sim/scenarios"
+LOCK_TEST = "sim_clocks.lock_phase_and_sync0_hold_from_a_hundred_starts"
+SECONDS = os.environ.get("ECDAQ_DDS_SECONDS", "60")
+CUTS = os.environ.get("ECDAQ_POWER_CUTS", "3")
+
+
+def run(command: list[str], keep: str, root: Path) -> list[str]:
+    """Run @command in the tree; the lines of its output that match @keep."""
+    env = os.environ | {
+        "ECDAQ_BUILD": str(root / "build/release"),
+        "ECDAQ_BIN_DIR": str(root / "build/stage/bin"),
+        "ECDAQ_STAGE": str(root / "build/stage"),
+        "ECDAQ_FLAVOUR": "release",
+        "ECDAQ_DDS_SECONDS": SECONDS,
+        "ECDAQ_POWER_CUTS": CUTS,
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
+    result = subprocess.run(
+        command, cwd=root, env=env, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
+    if result.returncode != 0:
+        last = "\n".join(result.stdout.splitlines()[-10:])
+        raise NotMeasuredError(f"{command[0]} ended with {result.returncode}:\n{last}")
+    # The dots of pytest come before the first word of a line of ours.
+    lines = [re.sub(r"^(\d+: )|^\.[.sF]*(?=[^.])", "", line) for line in result.stdout.splitlines()]
+    return [line.rstrip() for line in lines if re.search(keep, line)]
+
+
+def program(*words: str, keep: str = ".") -> tuple[str, Callable[[Path], list[str]]]:
+    return " ".join(words), partial(run, list(words), keep)
+
+
+def pytest(*words: str, keep: str) -> tuple[str, Callable[[Path], list[str]]]:
+    command = [sys.executable, "-m", "pytest", "-q", "-s", "-p", "no:cacheprovider", *words]
+    return " ".join(["pytest", "-s", *words]), partial(run, command, keep)
+
+
+def subject(
+    name: str,
+    title: str,
+    how: tuple[str, Callable[[Path], list[str]]],
+    is_quick: bool = False,
+) -> Subject:
+    return Subject(name, title, (how[0],), how[1], is_quick)
+
+
+# What pytest itself prints is not of the subject.
+NOT_PYTEST = r"^(?!\s*$|[.sF]*\s*(\[ *\d+%\])?$|=+ |\d+ passed|SKIPPED|-- |\s*$)"
+ALL = (
+    subject(
+        "run",
+        "1.5 hours of bus time, two slaves at +-100 ppm",
+        program(f"{SCENARIOS}/sim_long_run", "5400000", "1"),
+        is_quick=True,
+    ),
+    subject(
+        "lock",
+        "Distributed clocks from 100 starts",
+        program(f"{SCENARIOS}/sim_clocks", LOCK_TEST, keep="worst of"),
+        is_quick=True,
+    ),
+    subject(
+        "replay",
+        "Captures of real buses against the simulated segment",
+        program(
+            *("ctest", "--test-dir", "build/release", "-L", "^replay$", "-V"),
+            keep=r"frames, \d+ datagrams|not explained|frame back at port",
+        ),
+        is_quick=True,
+    ),
+    subject(
+        "live",
+        "A minute at 1 ms over a veth pair",
+        pytest("tests/live/test_run.py", "-k", "minute", keep=r"^\.?\{|frames lost"),
+        is_quick=True,
+    ),
+    subject(
+        "dds",
+        f"DDS, {SECONDS} s each (ECDAQ_DDS_SECONDS)",
+        pytest(
+            *(f"tests/dds/test_{n}.py" for n in ("foreign", "figures", "hostile")), keep=NOT_PYTEST
+        ),
+    ),
+    subject(
+        "image",
+        "The image in QEMU, in guest time",
+        pytest("tests/boot/test_20_segment.py", keep=NOT_PYTEST),
+    ),
+    subject(
+        "power-cuts",
+        f"{CUTS} power cuts of the image in QEMU (ECDAQ_POWER_CUTS)",
+        pytest("tests/boot/test_50_power_cut.py", keep=NOT_PYTEST),
+    ),
+    Subject(
+        "ci",
+        "Time of the last ./build.sh test",
+        ("./build.sh test",),
+        tests_run.measure,
+        is_quick=True,
+    ),
+    Subject(
+        "tree",
+        "Size of the source tree",
+        ("./build.sh measure tree",),
+        tree.measure,
+        is_quick=True,
+    ),
+)
+SUBJECTS = {s.name: s for s in ALL}
