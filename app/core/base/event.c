@@ -293,11 +293,10 @@ int event_format(const struct event *ev, char *buf, size_t buf_len)
 				a[0]);
 	case EVENT_FRAME_LATE:
 		return snprintf(buf, buf_len,
-				"cycle %" PRId64 ": frame came %" PRId32
-				" cycles late, thrown away",
+				"cycle %" PRId64 ": frame came %" PRId32 " cycles late, discarded",
 				ev->value, a[0]);
 	case EVENT_FRAME_DOUBLED:
-		return snprintf(buf, buf_len, "cycle %" PRId64 ": frame came twice", ev->value);
+		return snprintf(buf, buf_len, "cycle %" PRId64 ": duplicate frame", ev->value);
 	case EVENT_WKC_LOW:
 		return snprintf(buf, buf_len,
 				"cycle %" PRId64 ": WKC %" PRId32 ", expected %" PRId32, ev->value,
@@ -313,7 +312,8 @@ int event_format(const struct event *ev, char *buf, size_t buf_len)
 				ev->value, a[0], a[1]);
 	case EVENT_NUMBERING_JUMP:
 		return snprintf(buf, buf_len,
-				"cycle numbers go on at %" PRId64 ", %" PRId32 " have no sample",
+				"cycle numbers continue at %" PRId64 ", %" PRId32
+				" without a sample",
 				ev->value, a[0]);
 	case EVENT_DC_LOCKED:
 		return snprintf(buf, buf_len, "DC locked, phase error %" PRId32 " ns", a[0]);

@@ -81,8 +81,8 @@ struct sync0_result {
 	int64_t frame_ns;       /* from the edge to the cycle's frame: median */
 	int64_t skew_ns;        /* edge after the first line's: median, calibrated */
 	int64_t skew_error_ns;
-	int64_t dc_diff_ns;   /* largest |0x092C| that any slave said in the window; -1: not read */
-	int64_t shot_dc_ns;   /* commanded DC time of the shot */
+	int64_t dc_diff_ns; /* largest |0x092C| reported by any slave in the window; -1: not read */
+	int64_t shot_dc_ns; /* commanded DC time of the shot */
 	int64_t shot_late_ns; /* edge after it */
 	uint64_t session;     /* of the master; 0: none */
 	uint32_t has;         /* enum sync0_figure */

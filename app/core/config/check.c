@@ -16,7 +16,7 @@ struct relation {
 	const char *subject;
 	const char *other;
 	int holds;
-	const char *why;
+	const char *reason;
 };
 
 static int line_of(const struct option_lines *lines, const char *name)
@@ -27,7 +27,7 @@ static int line_of(const struct option_lines *lines, const char *name)
 }
 
 static int check_relations(const struct config *cfg, const struct option_lines *lines,
-			   const char **ret_key, int *ret_line, char *why)
+			   const char **ret_key, int *ret_line, char *reason)
 {
 	const struct relation relations[] = {
 		{ "bus.watchdog", "cycle.period",
@@ -35,7 +35,7 @@ static int check_relations(const struct config *cfg, const struct option_lines *
 		  "must be 0s or at least three times cycle.period" },
 		{ "bus.presence", "bus.presence",
 		  cfg->bus_presence != CONFIG_EXACT_SLAVES || cfg->slave_count > 0,
-		  "exact wants slaves to be listed" },
+		  "exact requires a slaves list" },
 		{ "dc.unlock_limit", "dc.lock_limit",
 		  cfg->dc_unlock_limit_ns >= cfg->dc_lock_limit_ns,
 		  "must not be below dc.lock_limit" },
@@ -78,7 +78,7 @@ static int check_relations(const struct config *cfg, const struct option_lines *
 			if (*ret_line == 0) {
 				*ret_line = line_of(lines, relations[i].other);
 			}
-			snprintf(why, OPTION_WHY_BYTES, "%s", relations[i].why);
+			snprintf(reason, OPTION_WHY_BYTES, "%s", relations[i].reason);
 			return -EINVAL;
 		}
 	}
@@ -91,7 +91,7 @@ static int is_made_of(const char *text, const char *chars)
 }
 
 static int check_dds(const struct config *cfg, const struct option_lines *lines,
-		     const char **ret_key, int *ret_line, char *why)
+		     const char **ret_key, int *ret_line, char *reason)
 {
 	const char *fault = NULL;
 
@@ -119,11 +119,11 @@ static int check_dds(const struct config *cfg, const struct option_lines *lines,
 	if (*ret_line == 0 && cfg->dds_interface[0] == '\0') {
 		*ret_line = line_of(lines, "dds.enable");
 	}
-	snprintf(why, OPTION_WHY_BYTES, "%s", fault);
+	snprintf(reason, OPTION_WHY_BYTES, "%s", fault);
 	return -EINVAL;
 }
 
-static int check_slaves(const struct config *cfg, const char **ret_key, int *ret_line, char *why)
+static int check_slaves(const struct config *cfg, const char **ret_key, int *ret_line, char *reason)
 {
 	for (size_t i = 0; i < cfg->slave_count; i++) {
 		const struct config_slave *slave = &cfg->slave[i];
@@ -132,20 +132,21 @@ static int check_slaves(const struct config *cfg, const char **ret_key, int *ret
 		if (slave->sync0_shift_ns <= -cfg->cycle_period_ns ||
 		    slave->sync0_shift_ns >= cfg->cycle_period_ns) {
 			*ret_key = "slaves[].sync0_shift";
-			snprintf(why, OPTION_WHY_BYTES, "must be less than one cycle.period");
+			snprintf(reason, OPTION_WHY_BYTES, "must be less than one cycle.period");
 			return -EINVAL;
 		}
 		for (size_t j = 0; j < i && slave->sync0_line[0] != '\0'; j++) {
 			if (strcmp(slave->sync0_line, cfg->slave[j].sync0_line) == 0) {
 				*ret_key = "slaves[].sync0_line";
-				snprintf(why, OPTION_WHY_BYTES, "is that of slave %zu already", j);
+				snprintf(reason, OPTION_WHY_BYTES, "is that of slave %zu already",
+					 j);
 				return -EINVAL;
 			}
 		}
 		for (size_t j = 0; j < i && slave->name[0] != '\0'; j++) {
 			if (strcmp(slave->name, cfg->slave[j].name) == 0) {
 				*ret_key = "slaves[].name";
-				snprintf(why, OPTION_WHY_BYTES,
+				snprintf(reason, OPTION_WHY_BYTES,
 					 "slaves %zu and %zu are both called %s", j, i,
 					 slave->name);
 				return -EINVAL;
@@ -183,14 +184,15 @@ static const char *output_fault(const struct config *cfg, size_t i, const char *
 	return NULL;
 }
 
-static int check_outputs(const struct config *cfg, const char **ret_key, int *ret_line, char *why)
+static int check_outputs(const struct config *cfg, const char **ret_key, int *ret_line,
+			 char *reason)
 {
 	for (size_t i = 0; i < cfg->output_count; i++) {
 		const char *fault = output_fault(cfg, i, ret_key);
 
 		if (fault != NULL) {
 			*ret_line = cfg->output[i].line;
-			snprintf(why, OPTION_WHY_BYTES, "%s", fault);
+			snprintf(reason, OPTION_WHY_BYTES, "%s", fault);
 			return -EINVAL;
 		}
 	}
@@ -198,32 +200,32 @@ static int check_outputs(const struct config *cfg, const char **ret_key, int *re
 }
 
 int option_cross_check(const struct config *cfg, const struct option_lines *lines,
-		       const char **ret_key, int *ret_line, char *why)
+		       const char **ret_key, int *ret_line, char *reason)
 {
-	int r = check_relations(cfg, lines, ret_key, ret_line, why);
+	int r = check_relations(cfg, lines, ret_key, ret_line, reason);
 
 	if (r == 0) {
-		r = check_dds(cfg, lines, ret_key, ret_line, why);
+		r = check_dds(cfg, lines, ret_key, ret_line, reason);
 	}
 	if (r == 0) {
-		r = check_slaves(cfg, ret_key, ret_line, why);
+		r = check_slaves(cfg, ret_key, ret_line, reason);
 	}
-	return r < 0 ? r : check_outputs(cfg, ret_key, ret_line, why);
+	return r < 0 ? r : check_outputs(cfg, ret_key, ret_line, reason);
 }
 
-int option_sdo_finish(const struct option_sdo *item, struct config_sdo *ret_sdo, char *why)
+int option_sdo_finish(const struct option_sdo *item, struct config_sdo *ret_sdo, char *reason)
 {
 	enum sdo_type type = (enum sdo_type)item->type;
 	uint64_t bits;
 	int r = sdo_value_parse(type, item->value, &bits);
 
 	if (r == -ERANGE) {
-		snprintf(why, OPTION_WHY_BYTES, "%.40s does not fit into %s", item->value,
+		snprintf(reason, OPTION_WHY_BYTES, "%.40s does not fit into %s", item->value,
 			 sdo_type_to_str(type));
 		return r;
 	}
 	if (r < 0) {
-		snprintf(why, OPTION_WHY_BYTES, "\"%.40s\" is no %s", item->value,
+		snprintf(reason, OPTION_WHY_BYTES, "\"%.40s\" is no %s", item->value,
 			 sdo_type_to_str(type));
 		return r;
 	}

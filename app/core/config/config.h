@@ -153,7 +153,7 @@ struct config {
 void config_defaults(struct config *cfg);
 
 /**
- * Read @path over the defaults. 0; or -EINVAL with one line "FILE:LINE: what: why" in @error, or
+ * Read @path over the defaults. 0; or -EINVAL with one line "FILE:LINE: what: reason" in @error, or
  * another -errno with a line. @cfg is untouched on failure. Context: blocking.
  */
 int config_load(const char *path, struct config *cfg, char *error, size_t error_bytes);
@@ -184,9 +184,10 @@ enum { CONFIG_WHY_BYTES = 192 };
 
 /**
  * A duration as the file has it ("500us", "1.5s"; a plain number is in s), for the command lines of
- * the programs. 0, or -EINVAL or -ERANGE with the reason in @why (CONFIG_WHY_BYTES), ret untouched.
+ * the programs. 0, or -EINVAL or -ERANGE with the reason in @reason (CONFIG_WHY_BYTES), ret
+ * untouched.
  */
-int config_parse_duration(const char *text, int64_t *ret_ns, char *why);
+int config_parse_duration(const char *text, int64_t *ret_ns, char *reason);
 
 /* What stands in the run directory. */
 #define CONFIG_RUN_SAMPLES "samples"                 /* ring of samples */

@@ -59,21 +59,22 @@ static const struct unit *units_of(const struct option *option)
 	return unit_find(size_units, option->unit) != NULL ? size_units : NULL;
 }
 
-static int fail_unit(const struct option *option, const char *suffix, char *why)
+static int fail_unit(const struct option *option, const char *suffix, char *reason)
 {
 	const struct unit *units = units_of(option);
 
 	if (units == time_units) {
-		snprintf(why, OPTION_WHY_BYTES,
+		snprintf(reason, OPTION_WHY_BYTES,
 			 "unknown unit \"%.16s\": ns, us, ms, s, min, h or d", suffix);
 	} else if (units == size_units) {
-		snprintf(why, OPTION_WHY_BYTES,
+		snprintf(reason, OPTION_WHY_BYTES,
 			 "unknown unit \"%.16s\": B, KiB, MiB, GiB, TiB, kB, MB, GB or TB", suffix);
 	} else if (option->unit[0] != '\0') {
-		snprintf(why, OPTION_WHY_BYTES, "unknown unit \"%.16s\": only %s", suffix,
+		snprintf(reason, OPTION_WHY_BYTES, "unknown unit \"%.16s\": only %s", suffix,
 			 option->unit);
 	} else {
-		snprintf(why, OPTION_WHY_BYTES, "wants a plain number, without \"%.16s\"", suffix);
+		snprintf(reason, OPTION_WHY_BYTES, "expected a plain number, without \"%.16s\"",
+			 suffix);
 	}
 	return -EINVAL;
 }
@@ -156,7 +157,7 @@ static int hex_parse(const char *text, struct decimal *ret)
 	return 0;
 }
 
-static int fail_number(const struct option *option, const char *text, char *why)
+static int fail_number(const struct option *option, const char *text, char *reason)
 {
 	const struct unit *units = units_of(option);
 	const char *what = "a whole number";
@@ -168,18 +169,18 @@ static int fail_number(const struct option *option, const char *text, char *why)
 	} else if (option->type == OPTION_NUMBER) {
 		what = option->unit[0] == '%' ? "a share such as 50%" : "a number";
 	}
-	snprintf(why, OPTION_WHY_BYTES, "wants %s, not \"%.32s\"", what, text);
+	snprintf(reason, OPTION_WHY_BYTES, "expected %s, not \"%.32s\"", what, text);
 	return -EINVAL;
 }
 
-static int fail_range(const struct option *option, const char *text, char *why)
+static int fail_range(const struct option *option, const char *text, char *reason)
 {
-	snprintf(why, OPTION_WHY_BYTES, "%.32s is out of range: %s to %s", text, option->min,
+	snprintf(reason, OPTION_WHY_BYTES, "%.32s is out of range: %s to %s", text, option->min,
 		 option->max);
 	return -ERANGE;
 }
 
-static int fail_whole(const struct option *option, const char *text, char *why)
+static int fail_whole(const struct option *option, const char *text, char *reason)
 {
 	const char *step = option->unit;
 
@@ -188,14 +189,14 @@ static int fail_whole(const struct option *option, const char *text, char *why)
 	} else if (option->type == OPTION_SIZE) {
 		step = "bytes";
 	} else if (step[0] == '\0') {
-		return fail_number(option, text, why);
+		return fail_number(option, text, reason);
 	}
-	snprintf(why, OPTION_WHY_BYTES, "%.32s is not a whole number of %s", text, step);
+	snprintf(reason, OPTION_WHY_BYTES, "%.32s is not a whole number of %s", text, step);
 	return -EINVAL;
 }
 
 /* Text to a whole number of the field's steps. */
-static int whole_parse(const struct option *option, const char *text, wide_t *ret, char *why)
+static int whole_parse(const struct option *option, const char *text, wide_t *ret, char *reason)
 {
 	int is_hex = text[0] == '0' && (text[1] == 'x' || text[1] == 'X');
 	struct decimal d;
@@ -204,47 +205,47 @@ static int whole_parse(const struct option *option, const char *text, wide_t *re
 	int r = is_hex ? hex_parse(text, &d) : decimal_parse(text, &d);
 
 	if (r < 0) {
-		return r == -ERANGE ? fail_range(option, text, why)
-				    : fail_number(option, text, why);
+		return r == -ERANGE ? fail_range(option, text, reason)
+				    : fail_number(option, text, reason);
 	}
 	while (*d.rest == ' ') {
 		d.rest++;
 	}
 	scale = scale_of(option, d.rest);
 	if (scale == 0) {
-		return fail_unit(option, d.rest, why);
+		return fail_unit(option, d.rest, reason);
 	}
 	step = d.divisor * field_scale(option);
 	/* |digits| <= 2^66 and scale < 2^47 */
 	if (d.digits * scale % step != 0) {
-		return fail_whole(option, text, why);
+		return fail_whole(option, text, reason);
 	}
 	*ret = d.digits * scale / step;
 	return 0;
 }
 
-int number_parse_whole(const struct option *option, const char *text, void *base, char *why)
+int number_parse_whole(const struct option *option, const char *text, void *base, char *reason)
 {
 	wide_t value;
 	wide_t min;
 	wide_t max;
-	int r = whole_parse(option, text, &value, why);
+	int r = whole_parse(option, text, &value, reason);
 
 	if (r < 0) {
 		return r;
 	}
-	if (whole_parse(option, option->min, &min, why) < 0 ||
-	    whole_parse(option, option->max, &max, why) < 0) {
+	if (whole_parse(option, option->min, &min, reason) < 0 ||
+	    whole_parse(option, option->max, &max, reason) < 0) {
 		return -EINVAL; /* a fault of the table; its test would have seen it */
 	}
 	if (value < min || value > max) {
-		return fail_range(option, text, why);
+		return fail_range(option, text, reason);
 	}
 	option_store(option, (uint64_t)value, base);
 	return 0;
 }
 
-static int real_parse(const struct option *option, const char *text, double *ret, char *why)
+static int real_parse(const struct option *option, const char *text, double *ret, char *reason)
 {
 	const char *digits = text + (text[0] == '-' || text[0] == '+');
 	char *end = NULL;
@@ -257,38 +258,38 @@ static int real_parse(const struct option *option, const char *text, double *ret
 	/* strtod also takes "nan", "infinity" and hex floats; a file does not. */
 	if (strchr("0123456789.", *digits) == NULL || *digits == '\0' ||
 	    strpbrk(text, "xX") != NULL) {
-		return fail_number(option, text, why);
+		return fail_number(option, text, reason);
 	}
 	value = strtod(text, &end);
 	if (end == text || (end == digits && *digits == '.')) {
-		return fail_number(option, text, why);
+		return fail_number(option, text, reason);
 	}
 	while (*end == ' ') {
 		end++;
 	}
 	if (*end != '\0' && (option->unit[0] == '\0' || strcmp(end, option->unit) != 0)) {
-		return fail_unit(option, end, why);
+		return fail_unit(option, end, reason);
 	}
 	*ret = value;
 	return 0;
 }
 
-int number_parse_real(const struct option *option, const char *text, void *base, char *why)
+int number_parse_real(const struct option *option, const char *text, void *base, char *reason)
 {
 	double value;
 	double min;
 	double max;
-	int r = real_parse(option, text, &value, why);
+	int r = real_parse(option, text, &value, reason);
 
 	if (r < 0) {
 		return r;
 	}
-	if (real_parse(option, option->min, &min, why) < 0 ||
-	    real_parse(option, option->max, &max, why) < 0) {
+	if (real_parse(option, option->min, &min, reason) < 0 ||
+	    real_parse(option, option->max, &max, reason) < 0) {
 		return -EINVAL; /* a fault of the table; its test would have seen it */
 	}
 	if (!(value >= min && value <= max)) {
-		return fail_range(option, text, why);
+		return fail_range(option, text, reason);
 	}
 	memcpy((char *)base + option->offset, &value, sizeof(value));
 	return 0;

@@ -6,7 +6,7 @@
 #include "config/option.h"
 
 /* As option_parse(), for the types that are whole numbers of something, and for OPTION_NUMBER. */
-int number_parse_whole(const struct option *option, const char *text, void *base, char *why);
-int number_parse_real(const struct option *option, const char *text, void *base, char *why);
+int number_parse_whole(const struct option *option, const char *text, void *base, char *reason);
+int number_parse_real(const struct option *option, const char *text, void *base, char *reason);
 
 #endif

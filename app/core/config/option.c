@@ -27,13 +27,13 @@ static int is_under(const struct option *option, const char *prefix)
 
 void option_fill_defaults(const char *prefix, void *base)
 {
-	char why[OPTION_WHY_BYTES];
+	char reason[OPTION_WHY_BYTES];
 
 	for (size_t i = 0; i < option_count; i++) {
 		const struct option *option = &option_table[i];
 
 		if (is_under(option, prefix) && option->default_value != NULL) {
-			int r = option_parse(option, option->default_value, base, why);
+			int r = option_parse(option, option->default_value, base, reason);
 
 			assert(r == 0);
 			(void)r;
@@ -93,7 +93,7 @@ static void *item_at(struct config *cfg, const char *pattern, size_t index)
 	return &cfg->output[index];
 }
 
-static int set_value(struct config *cfg, const char *name, const char *value, char *why)
+static int set_value(struct config *cfg, const char *name, const char *value, char *reason)
 {
 	char pattern[OPTION_KEY_BYTES];
 	const struct option *option = option_find(name);
@@ -105,7 +105,7 @@ static int set_value(struct config *cfg, const char *name, const char *value, ch
 		option = option_find(pattern);
 		base = option == NULL ? NULL : item_at(cfg, pattern, index);
 		if (base == NULL && option != NULL) {
-			snprintf(why, OPTION_WHY_BYTES,
+			snprintf(reason, OPTION_WHY_BYTES,
 				 "item %zu would leave a hole or is beyond the limit", index);
 			return -EINVAL;
 		}
@@ -114,32 +114,32 @@ static int set_value(struct config *cfg, const char *name, const char *value, ch
 	}
 	if (option == NULL) {
 		guess = option_suggest(name);
-		snprintf(why, OPTION_WHY_BYTES, "unknown option%s%s%s",
+		snprintf(reason, OPTION_WHY_BYTES, "unknown option%s%s%s",
 			 guess == NULL ? "" : "; did you mean ", guess == NULL ? "" : guess,
 			 guess == NULL ? "" : "?");
 		return -EINVAL;
 	}
-	return option_parse(option, value, base, why);
+	return option_parse(option, value, base, reason);
 }
 
 int config_set(struct config *cfg, const char *assignment, char *error, size_t error_bytes)
 {
 	const char *equals = strchr(assignment, '=');
-	char why[OPTION_WHY_BYTES] = "";
+	char reason[OPTION_WHY_BYTES] = "";
 	char name[OPTION_KEY_BYTES];
 	struct config work = *cfg;
 	int r;
 
 	if (equals == NULL || equals == assignment ||
 	    (size_t)(equals - assignment) >= sizeof(name)) {
-		snprintf(error, error_bytes, "%.64s: wants OPTION=VALUE", assignment);
+		snprintf(error, error_bytes, "%.64s: expected OPTION=VALUE", assignment);
 		option_make_plain(error);
 		return -EINVAL;
 	}
 	snprintf(name, sizeof(name), "%.*s", (int)(equals - assignment), assignment);
-	r = set_value(&work, name, equals + 1, why);
+	r = set_value(&work, name, equals + 1, reason);
 	if (r < 0) {
-		snprintf(error, error_bytes, "%s: %s", name, why);
+		snprintf(error, error_bytes, "%s: %s", name, reason);
 		option_make_plain(error);
 		return -EINVAL;
 	}
@@ -147,7 +147,7 @@ int config_set(struct config *cfg, const char *assignment, char *error, size_t e
 	return 0;
 }
 
-int config_parse_duration(const char *text, int64_t *ret_ns, char *why)
+int config_parse_duration(const char *text, int64_t *ret_ns, char *reason)
 {
 	static const struct option duration = {
 		.name = "",
@@ -159,22 +159,22 @@ int config_parse_duration(const char *text, int64_t *ret_ns, char *why)
 		.unit = "s",
 	};
 
-	return option_parse(&duration, text, ret_ns, why);
+	return option_parse(&duration, text, ret_ns, reason);
 }
 
 int config_check(const struct config *cfg, char *error, size_t error_bytes)
 {
-	char why[OPTION_WHY_BYTES] = "";
+	char reason[OPTION_WHY_BYTES] = "";
 	const char *key;
 	int line;
 
-	if (option_cross_check(cfg, NULL, &key, &line, why) == 0) {
+	if (option_cross_check(cfg, NULL, &key, &line, reason) == 0) {
 		return 0;
 	}
 	if (line > 0 && cfg->path[0] != '\0') {
-		snprintf(error, error_bytes, "%s:%d: %s: %s", cfg->path, line, key, why);
+		snprintf(error, error_bytes, "%s:%d: %s: %s", cfg->path, line, key, reason);
 	} else {
-		snprintf(error, error_bytes, "%s: %s", key, why);
+		snprintf(error, error_bytes, "%s: %s", key, reason);
 	}
 	return -EINVAL;
 }

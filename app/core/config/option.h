@@ -78,9 +78,9 @@ const struct option *option_find(const char *name);
 
 /**
  * Read @text into @option's field of the struct at @base. 0; -EINVAL or -ERANGE with the reason in
- * @why (OPTION_WHY_BYTES), field untouched.
+ * @reason (OPTION_WHY_BYTES), field untouched.
  */
-int option_parse(const struct option *option, const char *text, void *base, char *why);
+int option_parse(const struct option *option, const char *text, void *base, char *reason);
 
 /** Put @value into @option's field, as wide as that is. */
 void option_store(const struct option *option, uint64_t value, void *base);
@@ -107,12 +107,12 @@ struct option_lines {
 
 /**
  * Do the options fit to each other? 0, or -EINVAL with the option's name in @ret_key, the reason in
- * @why and the line to blame in @ret_line (0 if none is known). @lines may be NULL.
+ * @reason and the line to blame in @ret_line (0 if none is known). @lines may be NULL.
  */
 int option_cross_check(const struct config *cfg, const struct option_lines *lines,
-		       const char **ret_key, int *ret_line, char *why);
+		       const char **ret_key, int *ret_line, char *reason);
 
-/** Turn a whole item of slaves[].sdo[] into @ret_sdo. 0, or -EINVAL or -ERANGE with @why. */
-int option_sdo_finish(const struct option_sdo *item, struct config_sdo *ret_sdo, char *why);
+/** Turn a whole item of slaves[].sdo[] into @ret_sdo. 0, or -EINVAL or -ERANGE with @reason. */
+int option_sdo_finish(const struct option_sdo *item, struct config_sdo *ret_sdo, char *reason);
 
 #endif

@@ -18,8 +18,8 @@
 	.bytes = sizeof(((struct config_output *)0)->member)
 
 const struct option_section option_sections[] = {
-	{ "runtime", "Where programs meet." },
-	{ "bus", "The EtherCAT segment: its NIC and what is expected of it." },
+	{ "runtime", "Run directory and access." },
+	{ "bus", "The EtherCAT segment: interface, supervision, recovery." },
 	{ "cycle", "The real-time loop." },
 	{ "dc", "Distributed clocks: how the master follows the reference clock." },
 	{ "control", "Your own program in the cycle (control.md)." },
@@ -33,16 +33,13 @@ const size_t option_section_count = sizeof(option_sections) / sizeof(option_sect
 
 const struct option_list option_lists[OPTION_LISTS] = {
 	[OPTION_LIST_SLAVES] = { "slaves", LIMIT_SLAVES, "LIMIT_SLAVES",
-				 "What is expected at each position of the segment, first slave "
-				 "first. "
-				 "Leave it out to take whatever is there." },
+				 "Expected slave at each position of the segment, in order. "
+				 "Without it, any slaves are accepted." },
 	[OPTION_LIST_SDOS] = { "slaves[].sdo", CONFIG_LIMIT_SDOS, "CONFIG_LIMIT_SDOS",
 			       "Objects written to this slave in PRE-OP, in this order." },
 	[OPTION_LIST_OUTPUTS] = { "outputs", CONFIG_LIMIT_OUTPUTS, "CONFIG_LIMIT_OUTPUTS",
-				  "Output channels that need more than the standard rules: who may "
-				  "write "
-				  "them, within which limits, and what they hold when nobody "
-				  "does." },
+				  "Output channels with rules other than the defaults: owner, "
+				  "limits, fail-safe value, timeout." },
 };
 
 const struct option option_table[] = {
@@ -59,8 +56,8 @@ const struct option option_table[] = {
 	  FIELD(group),
 	  .default_value = "",
 	  .unit = "",
-	  .prose = "Group that may read the rings and command the daemon through the admin socket. "
-		   "Empty: the daemon's own group." },
+	  .prose = "Group that may read the rings and command the daemon through the admin "
+		   "socket. Empty: the daemon's own group." },
 	/* bus */
 	{ .name = "bus.interface",
 	  .type = OPTION_TEXT,
@@ -76,7 +73,7 @@ const struct option option_table[] = {
 	  .min = "100ms",
 	  .max = "5min",
 	  .unit = "s",
-	  .prose = "How long to look for slaves and wait for all of them to reach PRE-OP." },
+	  .prose = "Time to search for slaves and to wait until all reach PRE-OP." },
 	{ .name = "bus.op_timeout",
 	  .type = OPTION_DURATION,
 	  FIELD(bus_op_timeout_ns),
@@ -84,7 +81,7 @@ const struct option option_table[] = {
 	  .min = "100ms",
 	  .max = "5min",
 	  .unit = "s",
-	  .prose = "How long all slaves may take for each step from PRE-OP to OP." },
+	  .prose = "Timeout for all slaves, for each step from PRE-OP to OP." },
 	{ .name = "bus.frame_timeout",
 	  .type = OPTION_DURATION,
 	  FIELD(bus_frame_timeout_ns),
@@ -92,9 +89,9 @@ const struct option option_table[] = {
 	  .min = "100us",
 	  .max = "100ms",
 	  .unit = "ms",
-	  .prose = "How long a frame of bring-up and service may take to come back; it is sent "
-		   "again, then with 5 and with 25 times as long. The cycle's own frame has "
-		   "cycle.receive. Longer where the wire or the machine is an emulated one." },
+	  .prose = "Timeout of a frame of bring-up and service. It is sent again, then with 5 "
+		   "and with 25 times this timeout. The cyclic frame has cycle.receive. Raise "
+		   "it where the wire or the machine is emulated." },
 	{ .name = "bus.watchdog",
 	  .type = OPTION_DURATION,
 	  FIELD(bus_watchdog_ns),
@@ -102,9 +99,8 @@ const struct option option_table[] = {
 	  .min = "0s",
 	  .max = "6500ms",
 	  .unit = "ms",
-	  .prose = "SyncManager watchdog of the slaves: without outputs for so long, a slave drops "
-		   "to "
-		   "SAFE-OP by itself. 0s leaves what the slave has." },
+	  .prose = "SyncManager watchdog of the slaves: without outputs for this long, a slave "
+		   "drops to SAFE-OP by itself. 0s: keep the slave's own setting." },
 	{ .name = "bus.wkc_miss_limit",
 	  .type = OPTION_UINT,
 	  FIELD(bus_wkc_miss_limit_cycles),
@@ -119,8 +115,7 @@ const struct option option_table[] = {
 	  .default_value = "on",
 	  .unit = "",
 	  .prose = "Read the AL status of all slaves and the largest system time difference "
-		   "(0x092C) in "
-		   "every cycle, by two broadcast datagrams that ride in the cyclic frame." },
+		   "(0x092C) in every cycle, with two broadcast datagrams in the cyclic frame." },
 	{ .name = "bus.presence",
 	  .type = OPTION_WORD,
 	  FIELD(bus_presence),
@@ -128,21 +123,18 @@ const struct option option_table[] = {
 	  .unit = "",
 	  .words = "any|exact",
 	  .otherwise = "`exact` in a file that lists slaves",
-	  .prose = "any: slaves behind those listed are welcome. exact: as many as listed, none "
-		   "more." },
+	  .prose = "any: more slaves than listed are accepted. exact: exactly the listed ones." },
 	{ .name = "bus.datagrams",
 	  .type = OPTION_WORD,
 	  FIELD(bus_datagrams),
 	  .default_value = "one",
 	  .unit = "",
 	  .words = "one|per_slave",
-	  .prose = "one: a single LRW for all process data; when one slave is lost, no data is "
-		   "taken and "
-		   "all outputs go to fail-safe until it is back. per_slave: a datagram for what "
-		   "each "
-		   "slave has in one place; when one is lost, the others go on while the reference "
-		   "clock "
-		   "is among them. Costs 12 bytes a datagram." },
+	  .prose = "one: a single LRW for all process data; if a slave is lost, no data is "
+		   "accepted and all outputs go to fail-safe until it is back. per_slave: one "
+		   "datagram per contiguous area of a slave; if one is lost, the others "
+		   "continue while the reference clock is among them. Costs 12 bytes a "
+		   "datagram." },
 	/* cycle */
 	{ .name = "cycle.period",
 	  .type = OPTION_DURATION,
@@ -159,9 +151,8 @@ const struct option option_table[] = {
 	  .min = "5%",
 	  .max = "95%",
 	  .unit = "%",
-	  .prose = "Set point of the DC servo: how long after SYNC0 the frame passes the reference "
-		   "clock, "
-		   "as a share of the period." },
+	  .prose = "Set point of the DC servo: how long after SYNC0 the frame passes the "
+		   "reference clock, as a share of the period." },
 	{ .name = "cycle.receive",
 	  .type = OPTION_NUMBER,
 	  FIELD(cycle_receive_percent),
@@ -169,9 +160,8 @@ const struct option option_table[] = {
 	  .min = "1%",
 	  .max = "95%",
 	  .unit = "%",
-	  .prose = "Receive deadline after the wake, as a share of the period: a frame that is not "
-		   "back "
-		   "by then is lost." },
+	  .prose = "Receive deadline after the wake-up, as a share of the period: a frame that "
+		   "is not back by then is lost." },
 	{ .name = "cycle.cpu",
 	  .type = OPTION_INT,
 	  FIELD(cycle_cpu),
@@ -194,18 +184,17 @@ const struct option option_table[] = {
 	  .default_value = "auto",
 	  .unit = "",
 	  .words = "auto|spin|sleep",
-	  .prose = "How to wait for the frame. spin: poll the NIC without pause (own core). sleep: "
-		   "wait in "
-		   "the kernel. auto: spin if the thread is pinned to an isolated core." },
+	  .prose = "How to wait for the frame. spin: poll the NIC without pause (own core). "
+		   "sleep: wait in the kernel. auto: spin if the thread is pinned to an "
+		   "isolated core." },
 	{ .name = "cycle.overrun",
 	  .type = OPTION_WORD,
 	  FIELD(cycle_overrun),
 	  .default_value = "count",
 	  .unit = "",
 	  .words = "count|fail_safe|stop",
-	  .prose = "What an overrun leads to: it is counted, or the outputs go to fail-safe, too, "
-		   "or the "
-		   "bus is stopped in order." },
+	  .prose = "Reaction to an overrun: count it only, set the outputs to fail-safe, or "
+		   "stop the bus." },
 	{ .name = "cycle.lock_memory",
 	  .type = OPTION_SWITCH,
 	  FIELD(cycle_lock_memory),
@@ -219,9 +208,8 @@ const struct option option_table[] = {
 	  .min = "-1us",
 	  .max = "1s",
 	  .unit = "us",
-	  .prose = "Longest wake-up latency that idle states of the CPU may have "
-		   "(/dev/cpu_dma_latency). "
-		   "-1us: leave it alone." },
+	  .prose = "Longest wake-up latency that CPU idle states may have "
+		   "(/dev/cpu_dma_latency). -1us: unchanged." },
 	/* dc */
 	{ .name = "dc.enable",
 	  .type = OPTION_SWITCH,
@@ -244,7 +232,8 @@ const struct option option_table[] = {
 	  .min = "1",
 	  .max = "100000",
 	  .unit = "cycles",
-	  .prose = "How many cycles in a row the phase error has to be below dc.lock_limit." },
+	  .prose = "Number of cycles in a row in which the phase error must be below "
+		   "dc.lock_limit." },
 	{ .name = "dc.unlock_limit",
 	  .type = OPTION_DURATION,
 	  FIELD(dc_unlock_limit_ns),
@@ -284,9 +273,8 @@ const struct option option_table[] = {
 	  .min = "10ns",
 	  .max = "1ms",
 	  .unit = "ns",
-	  .prose = "System time difference (0x092C) that every slave has to be below before SYNC0 "
-		   "is "
-		   "started." },
+	  .prose = "SYNC0 is started when the system time difference (0x092C) of every slave "
+		   "is below this." },
 	{ .name = "dc.lock_timeout",
 	  .type = OPTION_DURATION,
 	  FIELD(dc_lock_timeout_ns),
@@ -294,7 +282,7 @@ const struct option option_table[] = {
 	  .min = "100ms",
 	  .max = "10min",
 	  .unit = "s",
-	  .prose = "How long lock may take; OP is not asked for without it." },
+	  .prose = "Timeout for the lock; OP is not requested without it." },
 	{ .name = "dc.burst_frames",
 	  .type = OPTION_UINT,
 	  FIELD(dc_burst_frames),
@@ -310,9 +298,8 @@ const struct option option_table[] = {
 	  .min = "0s",
 	  .max = "1ms",
 	  .unit = "us",
-	  .prose = "Length of the SYNC0 pulse as the slaves' SII sets it, for documentation and "
-		   "checks. "
-		   "0s: not stated." },
+	  .prose = "Length of the SYNC0 pulse as the slaves' SII sets it, for documentation "
+		   "and checks. 0s: not stated." },
 	/* control */
 	{ .name = "control.program",
 	  .type = OPTION_TEXT,
@@ -325,8 +312,8 @@ const struct option option_table[] = {
 	  FIELD(control_options),
 	  .default_value = "",
 	  .unit = "",
-	  .prose = "What the program is told: KEY=VALUE with commas between. Which keys there are "
-		   "is the program's matter; one it does not know is refused." },
+	  .prose = "Arguments of the program: KEY=VALUE, separated by commas. The program "
+		   "defines the keys; an unknown key is an error." },
 	{ .name = "control.budget",
 	  .type = OPTION_DURATION,
 	  FIELD(control_budget_ns),
@@ -334,16 +321,15 @@ const struct option option_table[] = {
 	  .min = "1us",
 	  .max = "10ms",
 	  .unit = "us",
-	  .prose = "How long one call of the program may take." },
+	  .prose = "Time that one call of the program may take." },
 	{ .name = "control.overrun",
 	  .type = OPTION_WORD,
 	  FIELD(control_overrun),
 	  .default_value = "count",
 	  .unit = "",
 	  .words = "count|fail_safe|stop",
-	  .prose = "What a call beyond the budget leads to: it is counted, or the program's "
-		   "outputs go to fail-safe until the bus comes to OP anew, too, or the bus is "
-		   "stopped in order." },
+	  .prose = "Reaction to a call over budget: count it only, set the program's outputs "
+		   "to fail-safe until the bus enters OP again, or stop the bus." },
 	{ .name = "control.stuck",
 	  .type = OPTION_DURATION,
 	  FIELD(control_stuck_ns),
@@ -351,8 +337,8 @@ const struct option option_table[] = {
 	  .min = "10ms",
 	  .max = "10s",
 	  .unit = "ms",
-	  .prose = "A call that has not come back after so long never will: ecdaqd ends at once, "
-		   "and the slaves' watchdogs keep the outputs safe." },
+	  .prose = "Timeout of a call that does not return: ecdaqd ends at once, and the "
+		   "slaves' watchdogs keep the outputs safe." },
 	/* ring */
 	{ .name = "ring.depth",
 	  .type = OPTION_DURATION,
@@ -361,9 +347,8 @@ const struct option option_table[] = {
 	  .min = "1s",
 	  .max = "1h",
 	  .unit = "s",
-	  .prose = "How far back the sample ring reaches: so long a reader may be dead without "
-		   "losing a "
-		   "sample. Rounded up to a power of two of cycles; it is locked memory." },
+	  .prose = "Depth of the sample ring: a reader may be stopped this long without losing "
+		   "a sample. Rounded up to a power of two of cycles; it is locked memory." },
 	{ .name = "ring.event_depth",
 	  .type = OPTION_UINT,
 	  FIELD(event_depth),
@@ -392,7 +377,7 @@ const struct option option_table[] = {
 	  .min = "10ms",
 	  .max = "10s",
 	  .unit = "ms",
-	  .prose = "A chunk of the file is closed and written at the latest after this." },
+	  .prose = "A chunk of the file is closed and written after at most this time." },
 	{ .name = "record.sync_period",
 	  .type = OPTION_DURATION,
 	  FIELD(record_sync_period_ns),
@@ -400,7 +385,7 @@ const struct option option_table[] = {
 	  .min = "10ms",
 	  .max = "1min",
 	  .unit = "s",
-	  .prose = "fdatasync at the latest after this: what a power cut may cost." },
+	  .prose = "fdatasync after at most this time: what a power cut may cost." },
 	{ .name = "record.rotate_period",
 	  .type = OPTION_DURATION,
 	  FIELD(record_rotate_period_ns),
@@ -408,7 +393,7 @@ const struct option option_table[] = {
 	  .min = "1s",
 	  .max = "7d",
 	  .unit = "min",
-	  .prose = "A new file is begun after this." },
+	  .prose = "Start a new file after this time." },
 	{ .name = "record.rotate_size",
 	  .type = OPTION_SIZE,
 	  FIELD(record_rotate_bytes),
@@ -416,7 +401,7 @@ const struct option option_table[] = {
 	  .min = "64KiB",
 	  .max = "1TiB",
 	  .unit = "MiB",
-	  .prose = "A new file is begun at this size." },
+	  .prose = "Start a new file at this size." },
 	{ .name = "record.budget",
 	  .type = OPTION_SIZE,
 	  FIELD(record_budget_bytes),
@@ -442,7 +427,7 @@ const struct option option_table[] = {
 	  .min = "0",
 	  .max = "19",
 	  .unit = "",
-	  .prose = "Level of zstd. 0: not compressed." },
+	  .prose = "Compression level of zstd. 0: not compressed." },
 	/* dds */
 	{ .name = "dds.enable",
 	  .type = OPTION_SWITCH,
@@ -455,9 +440,8 @@ const struct option option_table[] = {
 	  FIELD(dds_interface),
 	  .default_value = "",
 	  .unit = "",
-	  .prose = "Network interface for DDS; ecdaq-dds needs it and uses no other. That of the "
-		   "EtherCAT "
-		   "segment is refused. lo: this machine only." },
+	  .prose = "Network interface for DDS; required by ecdaq-dds, which uses no other. The "
+		   "interface of the EtherCAT segment is rejected. lo: this machine only." },
 	{ .name = "dds.domain",
 	  .type = OPTION_UINT,
 	  FIELD(dds_domain),
@@ -471,21 +455,21 @@ const struct option option_table[] = {
 	  FIELD(dds_tag),
 	  .default_value = "",
 	  .unit = "",
-	  .prose = "Discovery tag: participants with another tag in the same domain are not seen. "
-		   "Empty: none." },
+	  .prose = "Discovery tag: participants with another tag in the same domain are not "
+		   "seen. Empty: none." },
 	{ .name = "dds.multicast",
 	  .type = OPTION_SWITCH,
 	  FIELD(dds_multicast),
 	  .default_value = "on",
 	  .unit = "",
-	  .prose = "Use multicast, for discovery too. off: peers are found through dds.peers "
+	  .prose = "Use multicast, also for discovery. off: peers are found through dds.peers "
 		   "only." },
 	{ .name = "dds.peers",
 	  .type = OPTION_TEXT,
 	  FIELD(dds_peers),
 	  .default_value = "",
 	  .unit = "",
-	  .prose = "Addresses or host names to look for participants at, with commas between." },
+	  .prose = "Addresses or host names of participants to discover, separated by commas." },
 	{ .name = "dds.block_cycles",
 	  .type = OPTION_UINT,
 	  FIELD(dds_block_cycles),
@@ -499,9 +483,8 @@ const struct option option_table[] = {
 	  FIELD(dds_allow_insecure_commands),
 	  .default_value = "off",
 	  .unit = "",
-	  .prose = "Take commands although DDS Security is not in use: whoever reaches the network "
-		   "may then "
-		   "write the outputs that outputs[].owner gives to remote." },
+	  .prose = "Accept commands without DDS Security: anyone on the network can then write "
+		   "the outputs that outputs[].owner assigns to remote." },
 	{ .name = "dds.command_rate",
 	  .type = OPTION_UINT,
 	  FIELD(dds_command_rate),
@@ -509,7 +492,7 @@ const struct option option_table[] = {
 	  .min = "1",
 	  .max = "10000",
 	  .unit = "commands/s",
-	  .prose = "Commands that one commander may send in a second; those above are refused." },
+	  .prose = "Commands per second accepted from one commander; those above are rejected." },
 	{ .name = "dds.security",
 	  .type = OPTION_TEXT,
 	  FIELD(dds_security),
@@ -537,7 +520,7 @@ const struct option option_table[] = {
 	  FIELD(sync0_edges),
 	  .default_value = "",
 	  .unit = "",
-	  .prose = "Edge file of ecdaq-sim (--edges), followed instead of GPIO lines: results are "
+	  .prose = "Edge file of ecdaq-sim (--edges), read instead of GPIO lines: results are "
 		   "marked as simulated. Empty: GPIO." },
 	{ .name = "sync0.window",
 	  .type = OPTION_DURATION,
@@ -546,7 +529,8 @@ const struct option option_table[] = {
 	  .min = "100ms",
 	  .max = "1min",
 	  .unit = "s",
-	  .prose = "Time over which figures are made. A skew below a few us wants 10000 pulses." },
+	  .prose = "Window over which results are computed. A skew below a few us requires "
+		   "10000 pulses." },
 	{ .name = "sync0.lost",
 	  .type = OPTION_DURATION,
 	  FIELD(sync0_lost_ns),
@@ -554,7 +538,7 @@ const struct option option_table[] = {
 	  .min = "2ms",
 	  .max = "1min",
 	  .unit = "ms",
-	  .prose = "So long without an edge: SYNC0 lost." },
+	  .prose = "SYNC0 is lost after this time without an edge." },
 	{ .name = "sync0.buffer",
 	  .type = OPTION_UINT,
 	  FIELD(sync0_buffer),
@@ -562,16 +546,15 @@ const struct option option_table[] = {
 	  .min = "16",
 	  .max = "1024",
 	  .unit = "events",
-	  .prose = "Edges that the kernel keeps for ecdaq-sync0, per chip. The kernel takes 1024 "
-		   "at most." },
+	  .prose = "Edges that the kernel buffers for ecdaq-sync0, per chip; at most 1024." },
 	{ .name = "sync0.clock",
 	  .type = OPTION_WORD,
 	  FIELD(sync0_clock),
 	  .default_value = "auto",
 	  .unit = "",
 	  .words = "auto|monotonic|hte",
-	  .prose = "Clock of the edges: the hardware timestamp engine (hte), CLOCK_MONOTONIC read "
-		   "in the interrupt (monotonic), or hte where there is one (auto)." },
+	  .prose = "Clock of the edges: the hardware timestamp engine (hte), CLOCK_MONOTONIC "
+		   "read in the interrupt (monotonic), or hte if present (auto)." },
 	{ .name = "sync0.cpu",
 	  .type = OPTION_INT,
 	  FIELD(sync0_cpu),
@@ -602,8 +585,8 @@ const struct option option_table[] = {
 	  .min = "0",
 	  .max = "10000",
 	  .unit = "ppm",
-	  .prose = "Limit of the SYNC0 period's error against DC time as the master reads it. 0: "
-		   "not judged." },
+	  .prose = "Limit of the SYNC0 period's error against DC time as the master reads it. "
+		   "0: not judged." },
 	{ .name = "sync0.jitter_limit",
 	  .type = OPTION_DURATION,
 	  FIELD(sync0_jitter_limit_ns),
@@ -634,9 +617,8 @@ const struct option option_table[] = {
 	  SLAVE(name),
 	  .default_value = "",
 	  .unit = "",
-	  .prose = "Name of the slave and first part of its channels' names. Empty: made from the "
-		   "device "
-		   "name and the position." },
+	  .prose = "Name of the slave and first part of its channels' names. Empty: made from "
+		   "the device name and the position." },
 	{ .name = "slaves[].vendor",
 	  .type = OPTION_HEX,
 	  SLAVE(vendor),
@@ -644,7 +626,7 @@ const struct option option_table[] = {
 	  .min = "0",
 	  .max = "0xffffffff",
 	  .unit = "",
-	  .prose = "Vendor id that is expected. 0: any." },
+	  .prose = "Expected vendor id. 0: any." },
 	{ .name = "slaves[].product",
 	  .type = OPTION_HEX,
 	  SLAVE(product),
@@ -652,7 +634,7 @@ const struct option option_table[] = {
 	  .min = "0",
 	  .max = "0xffffffff",
 	  .unit = "",
-	  .prose = "Product code that is expected. 0: any." },
+	  .prose = "Expected product code. 0: any." },
 	{ .name = "slaves[].revision",
 	  .type = OPTION_HEX,
 	  SLAVE(revision),
@@ -660,7 +642,7 @@ const struct option option_table[] = {
 	  .min = "0",
 	  .max = "0xffffffff",
 	  .unit = "",
-	  .prose = "Revision that is expected. 0: any." },
+	  .prose = "Expected revision. 0: any." },
 	{ .name = "slaves[].alias",
 	  .type = OPTION_HEX,
 	  SLAVE(alias),
@@ -668,16 +650,15 @@ const struct option option_table[] = {
 	  .min = "0",
 	  .max = "0xffff",
 	  .unit = "",
-	  .prose = "Station alias (0x0012) that is expected. 0: any." },
+	  .prose = "Expected station alias (0x0012). 0: any." },
 	{ .name = "slaves[].mode",
 	  .type = OPTION_WORD,
 	  SLAVE(mode),
 	  .default_value = "unset",
 	  .unit = "",
 	  .words = "unset|periodic|oneshot",
-	  .prose = "FB1111-Piccolo: conversion at every SYNC0, or at one SYNC0 on command (`ecdaq "
-		   "oneshot`). "
-		   "unset: the slave is left as it is." },
+	  .prose = "FB1111-Piccolo: conversion at every SYNC0, or at one SYNC0 on command "
+		   "(`ecdaq oneshot`). unset: the slave's own setting." },
 	{ .name = "slaves[].sync0_shift",
 	  .type = OPTION_DURATION,
 	  SLAVE(sync0_shift_ns),
@@ -685,7 +666,7 @@ const struct option option_table[] = {
 	  .min = "-10ms",
 	  .max = "10ms",
 	  .unit = "us",
-	  .prose = "This slave's SYNC0 against the common grid." },
+	  .prose = "Shift of this slave's SYNC0 against the common grid." },
 	{ .name = "slaves[].sync0_line",
 	  .type = OPTION_TEXT,
 	  SLAVE(sync0_line),
@@ -700,9 +681,8 @@ const struct option option_table[] = {
 	  .min = "0",
 	  .max = "0xffff",
 	  .unit = "",
-	  .prose = "AssignActivate word of the vendor's ESI (0x0980, 0x0981). 0: 0x0300 for slaves "
-		   "with "
-		   "DC, SYNC0 on." },
+	  .prose = "AssignActivate word of the vendor's ESI (0x0980, 0x0981). 0: 0x0300 for "
+		   "slaves with DC, SYNC0 on." },
 	/* slaves[].sdo[] */
 	{ .name = "slaves[].sdo[].index",
 	  .type = OPTION_HEX,
@@ -726,15 +706,14 @@ const struct option option_table[] = {
 	  .default_value = NULL,
 	  .unit = "",
 	  .words = SDO_TYPE_WORDS,
-	  .prose = "Data type of the object: it gives the length." },
+	  .prose = "Data type of the object; it determines the length." },
 	{ .name = "slaves[].sdo[].value",
 	  .type = OPTION_TEXT,
 	  SDO(value),
 	  .default_value = NULL,
 	  .unit = "",
 	  .prose = "Value: a number in decimal or 0x hex, a float for REAL and LREAL, true or "
-		   "false for "
-		   "BOOL." },
+		   "false for BOOL." },
 	/* outputs[] */
 	{ .name = "outputs[].channel",
 	  .type = OPTION_TEXT,
@@ -757,8 +736,7 @@ const struct option option_table[] = {
 	  .min = "-1e300",
 	  .max = "1e300",
 	  .unit = "",
-	  .prose = "Physical value that it holds when the bus is not in OP, or its owner is "
-		   "silent." },
+	  .prose = "Physical value while the bus is not in OP or its owner is silent." },
 	{ .name = "outputs[].min",
 	  .type = OPTION_NUMBER,
 	  OUTPUT(min),
@@ -782,8 +760,8 @@ const struct option option_table[] = {
 	  .min = "0s",
 	  .max = "1h",
 	  .unit = "ms",
-	  .prose = "Remote owners only: without a sign of life for so long, the output goes to its "
-		   "fail-safe value. 0s: never." },
+	  .prose = "Remote owners only: after this time without a sign of life, the output "
+		   "goes to its fail-safe value. 0s: never." },
 };
 
 const size_t option_count = sizeof(option_table) / sizeof(option_table[0]);

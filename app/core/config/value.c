@@ -34,7 +34,7 @@ void option_store(const struct option *option, uint64_t value, void *base)
 	}
 }
 
-static int parse_switch(const struct option *option, const char *text, void *base, char *why)
+static int parse_switch(const struct option *option, const char *text, void *base, char *reason)
 {
 	static const char *const words[2][4] = { { "off", "false", "no", "0" },
 						 { "on", "true", "yes", "1" } };
@@ -47,11 +47,11 @@ static int parse_switch(const struct option *option, const char *text, void *bas
 			}
 		}
 	}
-	snprintf(why, OPTION_WHY_BYTES, "wants on or off, not \"%.32s\"", text);
+	snprintf(reason, OPTION_WHY_BYTES, "expected on or off, not \"%.32s\"", text);
 	return -EINVAL;
 }
 
-static int parse_word(const struct option *option, const char *text, void *base, char *why)
+static int parse_word(const struct option *option, const char *text, void *base, char *reason)
 {
 	size_t text_len = strlen(text);
 	const char *word = option->words;
@@ -67,27 +67,28 @@ static int parse_word(const struct option *option, const char *text, void *base,
 		word += len + (word[len] == '|');
 		value++;
 	}
-	snprintf(why, OPTION_WHY_BYTES, "wants one of %s, not \"%.32s\"", option->words, text);
+	snprintf(reason, OPTION_WHY_BYTES, "expected one of %s, not \"%.32s\"", option->words,
+		 text);
 	return -EINVAL;
 }
 
-static int parse_text(const struct option *option, const char *text, void *base, char *why)
+static int parse_text(const struct option *option, const char *text, void *base, char *reason)
 {
 	static const char name_chars[] =
 		"abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-";
 
 	if (strlen(text) >= option->bytes) {
-		snprintf(why, OPTION_WHY_BYTES, "is longer than %zu bytes", option->bytes - 1);
+		snprintf(reason, OPTION_WHY_BYTES, "is longer than %zu bytes", option->bytes - 1);
 		return -ERANGE;
 	}
 	if (option->type == OPTION_NAME && text[strspn(text, name_chars)] != '\0') {
-		snprintf(why, OPTION_WHY_BYTES,
-			 "wants letters, digits, _ and - only, not \"%.32s\"", text);
+		snprintf(reason, OPTION_WHY_BYTES,
+			 "expected letters, digits, _ and - only, not \"%.32s\"", text);
 		return -EINVAL;
 	}
 	for (const char *p = text; *p != '\0'; p++) {
 		if ((unsigned char)*p < 0x20 || *p == 0x7f) {
-			snprintf(why, OPTION_WHY_BYTES, "has a control character in it");
+			snprintf(reason, OPTION_WHY_BYTES, "has a control character in it");
 			return -EINVAL;
 		}
 	}
@@ -96,7 +97,7 @@ static int parse_text(const struct option *option, const char *text, void *base,
 	return 0;
 }
 
-int option_parse(const struct option *option, const char *text, void *base, char *why)
+int option_parse(const struct option *option, const char *text, void *base, char *reason)
 {
 	switch (option->type) {
 	case OPTION_DURATION:
@@ -104,16 +105,16 @@ int option_parse(const struct option *option, const char *text, void *base, char
 	case OPTION_INT:
 	case OPTION_UINT:
 	case OPTION_HEX:
-		return number_parse_whole(option, text, base, why);
+		return number_parse_whole(option, text, base, reason);
 	case OPTION_NUMBER:
-		return number_parse_real(option, text, base, why);
+		return number_parse_real(option, text, base, reason);
 	case OPTION_SWITCH:
-		return parse_switch(option, text, base, why);
+		return parse_switch(option, text, base, reason);
 	case OPTION_WORD:
-		return parse_word(option, text, base, why);
+		return parse_word(option, text, base, reason);
 	case OPTION_TEXT:
 	case OPTION_NAME:
-		return parse_text(option, text, base, why);
+		return parse_text(option, text, base, reason);
 	}
 	return -EINVAL;
 }

@@ -14,11 +14,11 @@ struct scope {
 	unsigned slave;      /* in slaves[].: which */
 };
 
-int walk_fail(struct walk *walk, int line, const char *key, const char *why)
+int walk_fail(struct walk *walk, int line, const char *key, const char *reason)
 {
 	char text[OPTION_KEY_BYTES + OPTION_WHY_BYTES + 8];
 
-	snprintf(text, sizeof(text), "%s%s%s", key, key[0] == '\0' ? "" : ": ", why);
+	snprintf(text, sizeof(text), "%s%s%s", key, key[0] == '\0' ? "" : ": ", reason);
 	option_make_plain(text);
 	snprintf(walk->error, walk->error_bytes, "%s:%d: %s", walk->name, line, text);
 	return -EINVAL;
@@ -49,17 +49,18 @@ static int is_null(const yaml_node_t *node)
 static int read_scalar(struct walk *walk, const struct scope *scope, const struct option *option,
 		       const char *shown, const yaml_node_t *node)
 {
-	char why[OPTION_WHY_BYTES] = "";
+	char reason[OPTION_WHY_BYTES] = "";
 	int *line = &walk->lines.line[option - option_table];
 
 	if (scope->base == walk->cfg && *line != 0) {
-		snprintf(why, sizeof(why), "is set already in line %d", *line);
-		return walk_fail(walk, line_of(node), shown, why);
+		snprintf(reason, sizeof(reason), "is set already in line %d", *line);
+		return walk_fail(walk, line_of(node), shown, reason);
 	}
 	if (node->type != YAML_SCALAR_NODE) {
 		return walk_fail(walk, line_of(node), shown,
-				 node->type == YAML_SEQUENCE_NODE ? "wants one value, not a list"
-								  : "wants a value, not a section");
+				 node->type == YAML_SEQUENCE_NODE
+					 ? "expected one value, not a list"
+					 : "expected a value, not a section");
 	}
 	if (is_null(node)) {
 		return walk_fail(walk, line_of(node), shown, "has no value");
@@ -67,8 +68,8 @@ static int read_scalar(struct walk *walk, const struct scope *scope, const struc
 	if (strlen(text_of(node)) != node->data.scalar.length) {
 		return walk_fail(walk, line_of(node), shown, "has a control character in it");
 	}
-	if (option_parse(option, text_of(node), scope->base, why) < 0) {
-		return walk_fail(walk, line_of(node), shown, why);
+	if (option_parse(option, text_of(node), scope->base, reason) < 0) {
+		return walk_fail(walk, line_of(node), shown, reason);
 	}
 	*line = line_of(node);
 	return 0;
@@ -111,7 +112,7 @@ static int read_item(struct walk *walk, const struct scope *scope, const yaml_no
 		char key[OPTION_KEY_BYTES];
 
 		snprintf(key, sizeof(key), "%.*s", (int)strlen(scope->shown) - 1, scope->shown);
-		return walk_fail(walk, line_of(node), key, "wants key: value pairs");
+		return walk_fail(walk, line_of(node), key, "expected key: value pairs");
 	}
 	option_fill_defaults(scope->pattern, scope->base);
 	r = read_mapping(walk, scope, node);
@@ -137,7 +138,7 @@ static int read_sdo(struct walk *walk, const yaml_node_t *node, unsigned slave, 
 {
 	struct option_sdo item = { .value_line = 0 };
 	struct config_sdo *sdo = &walk->cfg->sdo[walk->cfg->sdo_count];
-	char why[OPTION_WHY_BYTES] = "";
+	char reason[OPTION_WHY_BYTES] = "";
 	char shown[48];
 	struct scope scope = { .pattern = "slaves[].sdo[].", .shown = shown, .base = &item };
 	int r;
@@ -149,12 +150,12 @@ static int read_sdo(struct walk *walk, const yaml_node_t *node, unsigned slave, 
 	}
 	sdo->slave_pos = (uint16_t)slave;
 	sdo->line = line_of(node);
-	if (option_sdo_finish(&item, sdo, why) < 0) {
+	if (option_sdo_finish(&item, sdo, reason) < 0) {
 		const struct option *value = option_find("slaves[].sdo[].value");
 		char key[64];
 
 		snprintf(key, sizeof(key), "%svalue", shown);
-		return walk_fail(walk, walk->lines.line[value - option_table], key, why);
+		return walk_fail(walk, walk->lines.line[value - option_table], key, reason);
 	}
 	walk->cfg->sdo_count++;
 	return 0;
@@ -177,7 +178,7 @@ static int read_list(struct walk *walk, const struct scope *scope, enum option_l
 		     const char *shown, const yaml_node_t *node)
 {
 	const struct option_list *list = &option_lists[id];
-	char why[OPTION_WHY_BYTES];
+	char reason[OPTION_WHY_BYTES];
 	unsigned index = 0;
 	int r = 0;
 
@@ -186,7 +187,7 @@ static int read_list(struct walk *walk, const struct scope *scope, enum option_l
 	}
 	if (node->type != YAML_SEQUENCE_NODE) {
 		return walk_fail(walk, line_of(node), shown,
-				 "wants a list: lines that start with \"- \"");
+				 "expected a list: lines that start with \"- \"");
 	}
 	for (yaml_node_item_t *i = node->data.sequence.items.start;
 	     r == 0 && i < node->data.sequence.items.top; i++, index++) {
@@ -194,9 +195,9 @@ static int read_list(struct walk *walk, const struct scope *scope, enum option_l
 		size_t used = id == OPTION_LIST_SDOS ? walk->cfg->sdo_count : index;
 
 		if (used >= list->limit) {
-			snprintf(why, sizeof(why), "more than %s = %zu items", list->limit_name,
-				 list->limit);
-			return walk_fail(walk, line_of(item), shown, why);
+			snprintf(reason, sizeof(reason), "more than %s = %zu items",
+				 list->limit_name, list->limit);
+			return walk_fail(walk, line_of(item), shown, reason);
 		}
 		switch (id) {
 		case OPTION_LIST_SLAVES:
@@ -224,7 +225,8 @@ static int read_section(struct walk *walk, const char *name, const yaml_node_t *
 		return 0; /* a section whose options are all commented out */
 	}
 	if (node->type != YAML_MAPPING_NODE) {
-		return walk_fail(walk, line_of(node), name, "is a section: wants key: value pairs");
+		return walk_fail(walk, line_of(node), name,
+				 "is a section: expected key: value pairs");
 	}
 	snprintf(prefix, sizeof(prefix), "%s.", name);
 	return read_mapping(walk, &scope, node);
@@ -233,13 +235,13 @@ static int read_section(struct walk *walk, const char *name, const yaml_node_t *
 static int fail_unknown(struct walk *walk, int line, const char *pattern, const char *shown)
 {
 	const char *guess = option_suggest(pattern);
-	char why[OPTION_WHY_BYTES];
+	char reason[OPTION_WHY_BYTES];
 
 	if (guess == NULL) {
 		return walk_fail(walk, line, shown, "unknown option");
 	}
-	snprintf(why, sizeof(why), "unknown option; did you mean %s?", guess);
-	return walk_fail(walk, line, shown, why);
+	snprintf(reason, sizeof(reason), "unknown option; did you mean %s?", guess);
+	return walk_fail(walk, line, shown, reason);
 }
 
 static int check_key(struct walk *walk, const struct scope *scope, const yaml_node_t *map,
@@ -248,7 +250,7 @@ static int check_key(struct walk *walk, const struct scope *scope, const yaml_no
 	const yaml_node_t *key = yaml_document_get_node(walk->doc, pair->key);
 	const yaml_node_t *other;
 	char shown[OPTION_KEY_BYTES];
-	char why[OPTION_WHY_BYTES];
+	char reason[OPTION_WHY_BYTES];
 
 	if (key->type != YAML_SCALAR_NODE) {
 		return walk_fail(walk, line_of(key), scope->shown, "a key must be a word");
@@ -257,8 +259,9 @@ static int check_key(struct walk *walk, const struct scope *scope, const yaml_no
 		other = yaml_document_get_node(walk->doc, p->key);
 		if (strcmp(text_of(other), text_of(key)) == 0) {
 			snprintf(shown, sizeof(shown), "%s%.40s", scope->shown, text_of(key));
-			snprintf(why, sizeof(why), "is set already in line %d", line_of(other));
-			return walk_fail(walk, line_of(key), shown, why);
+			snprintf(reason, sizeof(reason), "is set already in line %d",
+				 line_of(other));
+			return walk_fail(walk, line_of(key), shown, reason);
 		}
 	}
 	return 0;
@@ -334,7 +337,7 @@ static int read_root(struct walk *walk)
 	}
 	if (root->type != YAML_MAPPING_NODE) {
 		return walk_fail(walk, line_of(root), "",
-				 "wants sections: lines such as \"cycle:\"");
+				 "expected sections: lines such as \"cycle:\"");
 	}
 	return read_mapping(walk, &scope, root);
 }
@@ -342,7 +345,7 @@ static int read_root(struct walk *walk)
 int walk_document(struct walk *walk)
 {
 	const struct option *presence = option_find("bus.presence");
-	char why[OPTION_WHY_BYTES] = "";
+	char reason[OPTION_WHY_BYTES] = "";
 	const char *key = "";
 	int line = 0;
 	int r = read_root(walk);
@@ -355,12 +358,12 @@ int walk_document(struct walk *walk)
 		r = config_set(walk->cfg, walk->set[i], walk->error, walk->error_bytes);
 		forget_line(walk, walk->set[i]);
 	}
-	if (r == 0 && option_cross_check(walk->cfg, &walk->lines, &key, &line, why) < 0) {
+	if (r == 0 && option_cross_check(walk->cfg, &walk->lines, &key, &line, reason) < 0) {
 		r = -EINVAL;
 		if (line > 0) {
-			walk_fail(walk, line, key, why);
+			walk_fail(walk, line, key, reason);
 		} else {
-			snprintf(walk->error, walk->error_bytes, "%s: %s", key, why);
+			snprintf(walk->error, walk->error_bytes, "%s: %s", key, reason);
 		}
 	}
 	return r;

@@ -24,7 +24,7 @@ struct walk {
  * the line in @walk->error. */
 int walk_document(struct walk *walk);
 
-/** Put "NAME:LINE: key: why" into @walk->error. Returns -EINVAL. */
-int walk_fail(struct walk *walk, int line, const char *key, const char *why);
+/** Put "NAME:LINE: key: reason" into @walk->error. Returns -EINVAL. */
+int walk_fail(struct walk *walk, int line, const char *key, const char *reason);
 
 #endif

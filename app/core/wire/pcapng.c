@@ -237,7 +237,7 @@ size_t pcapng_write_head(uint8_t *buf)
 	put_le32(section + 4, SECTION_MIN_BYTES);
 	put_le32(section + 8, BYTE_ORDER_MAGIC);
 	put_le16(section + 12, 1);          /* version 1.0 */
-	put_le64(section + 16, UINT64_MAX); /* length of the section: not said */
+	put_le64(section + 16, UINT64_MAX); /* length of the section: unspecified */
 	put_le32(section + 24, SECTION_MIN_BYTES);
 	put_le32(interface, BLOCK_INTERFACE);
 	put_le32(interface + 4, (uint32_t)interface_bytes);

@@ -222,7 +222,7 @@ static int place_oneshots(const struct admin_target *t, const struct admin_reque
 		if (is_all ? find_oneshot(t, pos) < 0 : pos != rq->slave_pos) {
 			continue;
 		}
-		/* The time last: what can never be armed is said first. */
+		/* The time last: report first what can never be armed. */
 		if (place_oneshot(t, pos, 0, &ret_placed[count], reply) < 0) {
 			return reply->result;
 		}

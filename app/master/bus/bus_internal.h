@@ -182,7 +182,7 @@ int bus_sdo_value(struct bus *bus, size_t pos, uint16_t index, uint8_t subindex,
 /** Mode and configured start-up SDOs of one slave, in PRE-OP. */
 int bus_startup_sdos(struct bus *bus, size_t pos);
 /** Take what lies in the mailbox of a slave unasked: emergencies. */
-void bus_take_mail(struct bus *bus, size_t pos);
+void bus_read_mail(struct bus *bus, size_t pos);
 
 /* --- map_sm.c --- */
 

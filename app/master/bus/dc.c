@@ -51,7 +51,7 @@ static int clear_clocks(struct bus *bus)
 	if (r >= 0) {
 		r = register_broadcast(bus, ESC_REG_DC_SPEED_COUNTER_START, start, sizeof(start));
 	}
-	return r < 0 ? bus_fail(bus, -EIO, "no frame comes back while the clocks are cleared") : 0;
+	return r < 0 ? bus_fail(bus, -EIO, "no frame returns while the clocks are cleared") : 0;
 }
 
 /* Time of the DC epoch at this moment. A board without a clock of its own starts at 2000 (T39). */
@@ -119,10 +119,10 @@ static int solve(struct bus *bus)
 	}
 	if (bus->reference == -EPROTO) {
 		bus->reference = -1;
-		return bus_fail(
-			bus, -EPROTO,
-			"the open ports of the slaves (0x0110) make no tree: a cable in a wrong "
-			"port, or a slave that came or went during the scan");
+		return bus_fail(bus, -EPROTO,
+				"the open ports of the slaves (0x0110) do not form a tree: a cable "
+				"in a wrong "
+				"port, or a slave added or removed during the scan");
 	}
 	return 0;
 }
@@ -147,8 +147,7 @@ static int set_clocks(struct bus *bus)
 		}
 		r = bus_clock_write(bus, i, latched_ns + sl->clock.delay_ns - (int64_t)local_ns[i]);
 		if (r < 0) {
-			return bus_fail_slave(bus, i, -EIO,
-					      "its clock does not take offset and delay");
+			return bus_fail_slave(bus, i, -EIO, "its clock rejects offset and delay");
 		}
 	}
 	return r;
@@ -161,7 +160,7 @@ static int64_t silence_ms(const struct bus *bus)
 	int64_t ns = 0;
 
 	for (unsigned i = 0; i < LINE_TRIES; i++) {
-		ns += line_patience(bus->line, i).ns;
+		ns += line_timeout(bus->line, i).ns;
 	}
 	return SILENT_FRAMES_MAX * ns / NS_PER_MS;
 }
@@ -187,13 +186,12 @@ static int burst(struct bus *bus, uint32_t frames)
 					"no frame has come back for %" PRId64
 					" ms during drift compensation (bus.frame_timeout is "
 					"%" PRId64 " us)",
-					silence_ms(bus),
-					line_patience(bus->line, 0).ns / NS_PER_US);
+					silence_ms(bus), line_timeout(bus->line, 0).ns / NS_PER_US);
 		}
 		silent = 0;
 		if (access.wkc == 0) {
 			return bus_fail_slave(bus, (size_t)bus->reference, -EIO,
-					      "the reference clock does not answer any more");
+					      "the reference clock no longer answers");
 		}
 	}
 	return 0;

@@ -73,7 +73,7 @@ static int check_request(const struct bus *bus, size_t pos)
 }
 
 /* While the bus mends itself, a dead mailbox must not hold up the rest. */
-static int patience_us(const struct bus *bus, size_t pos)
+static int timeout_us(const struct bus *bus, size_t pos)
 {
 	return bus->slave[pos].step != RECOVERY_NONE ? FAST_US : EC_TIMEOUTRXM;
 }
@@ -109,7 +109,7 @@ static int read_sdo(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t
 		int size = (int)*len;
 
 		if (ecx_SDOread(&bus->context, soem_index(slave_pos), index, subindex, FALSE, &size,
-				ret_data, patience_us(bus, slave_pos)) > 0) {
+				ret_data, timeout_us(bus, slave_pos)) > 0) {
 			*len = (size_t)size;
 			take_errors(bus, index, &abort);
 			return 0;
@@ -146,7 +146,7 @@ int bus_sdo_write(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t s
 	take_errors(bus, index, &abort);
 	for (int i = 0; i < TRIES && r == -ETIMEDOUT; i++) {
 		if (ecx_SDOwrite(&bus->context, soem_index(slave_pos), index, subindex, FALSE,
-				 (int)len, data, patience_us(bus, slave_pos)) > 0) {
+				 (int)len, data, timeout_us(bus, slave_pos)) > 0) {
 			take_errors(bus, index, &abort);
 			return 0;
 		}
@@ -158,7 +158,7 @@ int bus_sdo_write(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t s
 	return r;
 }
 
-void bus_take_mail(struct bus *bus, size_t pos)
+void bus_read_mail(struct bus *bus, size_t pos)
 {
 	ec_mbxbuft mail = { 0 };
 	uint32_t abort;
@@ -197,7 +197,7 @@ static int write_startup(struct bus *bus, size_t pos, const struct config_sdo *s
 	if (r == -EREMOTEIO) {
 		return bus_fail_slave(bus, pos, -EPROTO,
 				      "start-up SDO 0x%04x:%02x = 0x%" PRIx64
-				      " (%s:%d) is refused: abort "
+				      " (%s:%d) rejected: abort "
 				      "0x%08x, %s",
 				      sdo->index, sdo->subindex, sdo->value, bus->cfg->path,
 				      sdo->line, abort, abort_text(abort));

@@ -163,8 +163,7 @@ static int build_channels(struct bus *bus, struct layout *lay)
 		r = channels_add(&sl->info, &bus->pdo[sl->pdo_first], sl->pdo_count, &place,
 				 &table);
 		if (r < 0) {
-			return bus_fail_slave(bus, i, r,
-					      "more channels than LIMIT_CHANNELS (%d) with it",
+			return bus_fail_slave(bus, i, r, "more channels than LIMIT_CHANNELS (%d)",
 					      LIMIT_CHANNELS);
 		}
 	}
@@ -196,7 +195,7 @@ static int build_plan(struct bus *bus, const struct plan_area *area, size_t area
 		}
 		return bus_fail_slave(
 			bus, area[blocked].slave_pos, -E2BIG,
-			"SM%u has %u bytes: more than one frame holds, and it must not be split",
+			"SM%u has %u bytes: they do not fit in one frame and must not be split",
 			area[blocked].sm, area[blocked].end - area[blocked].start);
 	}
 	bus->plan.dc_reference = 0;

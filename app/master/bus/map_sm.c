@@ -158,7 +158,7 @@ int bus_map_sm(struct bus *bus, size_t pos, uint32_t *total_bytes)
 	*total_bytes += bytes_of(out) + bytes_of(in);
 	if (*total_bytes > LIMIT_IMAGE_BYTES) {
 		return bus_fail_slave(bus, pos, -E2BIG,
-				      "the process image grows past LIMIT_IMAGE_BYTES (%d) with it",
+				      "the process image exceeds LIMIT_IMAGE_BYTES (%d)",
 				      LIMIT_IMAGE_BYTES);
 	}
 	soem->Obits = (uint16)out;

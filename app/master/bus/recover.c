@@ -18,11 +18,11 @@ enum { SII_WORD_VENDOR = 0x08, SII_WORD_PRODUCT = 0x0a, EEPROM_TIMEOUT_US = 2000
 static void enter(struct bus *bus, size_t pos, enum recovery_step step)
 {
 	struct bus_slave *sl = &bus->slave[pos];
-	int64_t patience_ns =
+	int64_t timeout_ns =
 		step == RECOVERY_SETTLE ? bus->cfg->dc_lock_timeout_ns : STEP_TIMEOUT_NS;
 
 	sl->step = step;
-	sl->step_deadline = mono_add(bus_now(bus), (span_t){ patience_ns });
+	sl->step_deadline = mono_add(bus_now(bus), (span_t){ timeout_ns });
 }
 
 static void start_over(struct bus *bus, size_t pos)
@@ -190,7 +190,7 @@ static void set_up(struct bus *bus, size_t pos)
 
 /* --- clock --- */
 
-/* Nothing can be said of a follower while the reference itself is not set. */
+/* A follower cannot be judged while the reference itself is not set. */
 static int is_reference_set(const struct bus *bus)
 {
 	const struct bus_slave *reference = &bus->slave[bus->reference];

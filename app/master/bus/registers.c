@@ -67,7 +67,7 @@ int registers_run(struct bus *bus, struct access *access, size_t count)
 				return -EMSGSIZE;
 			}
 			r = line_transact(bus->line, frame, ecat_frame_end(&fb), answer,
-					  sizeof(answer), line_patience(bus->line, i));
+					  sizeof(answer), line_timeout(bus->line, i));
 		}
 		if (r < 0) {
 			return r;

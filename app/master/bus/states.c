@@ -174,7 +174,7 @@ static int wait_for(struct bus *bus, enum al_state state, mono_t give_up)
 			}
 		}
 		if (bus_now(bus).ns >= give_up.ns) {
-			return r < 0 ? bus_fail(bus, -EIO, "no frame comes back on the way to %s",
+			return r < 0 ? bus_fail(bus, -EIO, "no frame returns on the way to %s",
 						al_state_to_str((uint16_t)state))
 				     : say_why(bus, (size_t)culprit, &al[culprit], state);
 		}
@@ -218,7 +218,7 @@ int bus_stop(struct bus *bus, char *error)
 	}
 	if (is_line_dead(bus)) {
 		return bus_fail(bus, -EIO,
-				"no frame comes back: the slaves are left to their watchdogs");
+				"no frame returns: the slaves are left to their watchdogs");
 	}
 	if (bus->target == AL_OP) {
 		r = step_down(bus, AL_SAFEOP, r, error);

@@ -228,8 +228,9 @@ static int give_to_pdi(struct bus *bus)
 		}
 		register_write(bus, i, ESC_REG_DC_ACTIVATION, &off, 1);
 		if (register_write(bus, i, ESC_REG_DC_CYCLIC_CONTROL, &control, 1) < 0) {
-			return bus_fail_slave(bus, i, -EIO,
-					      "its SYNC unit (0x0980) cannot be given to it");
+			return bus_fail_slave(
+				bus, i, -EIO,
+				"its SYNC unit (0x0980) cannot be assigned to its controller");
 		}
 	}
 	return 0;

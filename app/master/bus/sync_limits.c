@@ -30,7 +30,7 @@ static int read_value(struct bus *bus, size_t pos, uint16_t index, uint8_t subin
 		return 0;
 	}
 	if (r < 0) {
-		return bus_fail_slave(bus, pos, r, "0x%04x:%02x is not answered", index, subindex);
+		return bus_fail_slave(bus, pos, r, "no answer for 0x%04x:%02x", index, subindex);
 	}
 	return 0;
 }

@@ -257,7 +257,7 @@ int bus_watch(struct bus *bus, struct status_page *page,
 			count_errors(bus, i, &look[i]);
 		}
 		if (has_mail(bus, i, &look[i])) {
-			bus_take_mail(bus, i);
+			bus_read_mail(bus, i);
 		}
 		if (page != NULL) {
 			show(&bus->slave[i], &look[i], &page->slave[i]);

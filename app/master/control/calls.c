@@ -17,8 +17,8 @@
 
 static int trouble(struct control *ctl, int r, const char *name, const char *why)
 {
-	if (ctl->trouble[0] == '\0') {
-		snprintf(ctl->trouble, sizeof(ctl->trouble), "%.63s: %s", name, why);
+	if (ctl->first_error[0] == '\0') {
+		snprintf(ctl->first_error, sizeof(ctl->first_error), "%.63s: %s", name, why);
 	}
 	return r;
 }
@@ -80,7 +80,7 @@ static void say(void *host, const char *text)
 {
 	struct control *ctl = host;
 
-	snprintf(ctl->said, sizeof(ctl->said), "%s", text);
+	snprintf(ctl->message, sizeof(ctl->message), "%s", text);
 }
 
 /* --- in cycle() --- */

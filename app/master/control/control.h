@@ -162,7 +162,7 @@ static inline int ecdaq_option_number(const struct ecdaq_init *in, const char *k
 	return in->calls->option_number(in->host, key, ret_value);
 }
 
-/** Why init() is about to fail, one line; the last one said counts. */
+/** The reason why init() is about to fail, one line; the last call counts. */
 static inline void ecdaq_say(const struct ecdaq_init *in, const char *text)
 {
 	in->calls->say(in->host, text);

@@ -32,8 +32,8 @@ struct control {
 	int has_begun;
 	struct control_spec spec;
 	struct arguments arguments;
-	char said[CONTROL_TEXT_BYTES];    /* by the program */
-	char trouble[CONTROL_TEXT_BYTES]; /* of the first of our calls that failed */
+	char message[CONTROL_TEXT_BYTES];     /* of the program */
+	char first_error[CONTROL_TEXT_BYTES]; /* of the first of our calls that failed */
 	/* the cycle's */
 	const uint8_t *image;
 	struct ecdaq_cycle now;

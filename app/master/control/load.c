@@ -71,7 +71,7 @@ static int check_file(const struct complaint *to, const char *path)
 	return 0;
 }
 
-/* What dlopen() says begins with the path, which has been said. */
+/* The text of dlopen() begins with the path, which is in the message already. */
 static const char *dl_reason(const char *path)
 {
 	const char *text = dlerror();
@@ -110,15 +110,15 @@ static int check_program(const struct complaint *to, const struct ecdaq_program 
 static int load(struct control *ctl, const struct complaint *to)
 {
 	const char *path = ctl->cfg->control_program;
-	char why[128];
+	char reason[128];
 	int r = check_file(to, path);
 
 	if (r < 0) {
 		return r;
 	}
-	r = arguments_parse(&ctl->arguments, ctl->cfg->control_options, why, sizeof(why));
+	r = arguments_parse(&ctl->arguments, ctl->cfg->control_options, reason, sizeof(reason));
 	if (r < 0) {
-		return complain(to, r, "control.options: %s", why);
+		return complain(to, r, "control.options: %s", reason);
 	}
 	dlerror();
 	ctl->object = dlopen(path, RTLD_NOW | RTLD_LOCAL);
@@ -191,19 +191,18 @@ static int call_init(struct control *ctl, const struct complaint *to)
 	int r = ctl->program->init(&in, &ctl->state);
 
 	if (r != 0) {
-		const char *why = ctl->said[0] != '\0' ? ctl->said : ctl->trouble;
+		const char *reason = ctl->message[0] != '\0' ? ctl->message : ctl->first_error;
 
-		if (why[0] == '\0') {
-			why = r < 0 && strerrordesc_np(-r) != NULL ? strerrordesc_np(-r)
-								   : "no reason given";
+		if (reason[0] == '\0') {
+			reason = r < 0 && strerrordesc_np(-r) != NULL ? strerrordesc_np(-r)
+								      : "no reason given";
 		}
-		return complain(to, -EINVAL, "init() failed: %s", why);
+		return complain(to, -EINVAL, "init() failed: %s", reason);
 	}
 	ctl->has_begun = 1;
 	unasked = arguments_unused(&ctl->arguments);
 	if (unasked != NULL) {
-		return complain(to, -EINVAL,
-				"control.options: %.40s: the program knows no such key", unasked);
+		return complain(to, -EINVAL, "control.options: %.40s: unknown key", unasked);
 	}
 	return 0;
 }

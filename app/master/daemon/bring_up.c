@@ -50,7 +50,7 @@ static int begin_control(struct session *s, struct failure *failure)
 
 /* --- the slaves --- */
 
-static void hear_bus(void *ctx, const struct event *ev)
+static void on_bus_event(void *ctx, const struct event *ev)
 {
 	session_emit(ctx, ev);
 }
@@ -70,13 +70,13 @@ static int open_line(struct session *s, struct failure *failure)
 		return failure_set(failure, EXIT_CODE_RESOURCES, r, "line: %s", strerror(-r));
 	}
 	line_bind(s->line);
-	line_patience_set(s->line, (span_t){ s->spec.cfg->bus_frame_timeout_ns });
-	line_attend(s->line, s->spec.hooks.alive, s->spec.hooks.ctx);
+	line_timeout_set(s->line, (span_t){ s->spec.cfg->bus_frame_timeout_ns });
+	line_set_keepalive(s->line, s->spec.hooks.alive, s->spec.hooks.ctx);
 	r = bus_create(s->spec.cfg, s->line, &s->bus);
 	if (r < 0) {
 		return failure_set(failure, EXIT_CODE_RESOURCES, r, "bus: %s", strerror(-r));
 	}
-	bus_listen(s->bus, hear_bus, s);
+	bus_listen(s->bus, on_bus_event, s);
 	return 0;
 }
 
@@ -101,7 +101,7 @@ static int prepare_slaves(struct session *s, struct failure *failure)
 	if (r < 0) {
 		return r;
 	}
-	session_judge_doubled(s, line_answered(s->line), line_thrown_away(s->line));
+	session_judge_doubled(s, line_answered(s->line), line_discarded(s->line));
 	show_slaves(s);
 	r = session_step(s, bus_compare(s->bus, error), EXIT_CODE_SLAVES, error, failure);
 	if (r < 0) {
@@ -264,7 +264,7 @@ static void arrive(struct session *s)
 	s->lost_seen = atomic_load_explicit(&s->run.page->cycle.frames_lost, memory_order_relaxed);
 	s->next_watch = session_now(s);
 	session_state_set(s, BUS_OP);
-	session_say(s, "");
+	session_set_message(s, "");
 	session_emit(s, &ev);
 }
 
@@ -305,7 +305,7 @@ int session_bring_up(struct session *session, struct failure *failure)
 	s->run.page->session = (uint64_t)s->spec.platform.tai_ns(s->spec.platform.ctx);
 	r = climb(s, failure);
 	if (r < 0) {
-		session_say(s, failure->text);
+		session_set_message(s, failure->text);
 		if (failure->code == EXIT_CODE_INTERFACE || failure->code == EXIT_CODE_NO_SLAVE) {
 			session_drop(s); /* nobody there to lead back */
 		} else {

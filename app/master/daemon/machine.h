@@ -29,8 +29,8 @@ struct program {
 	int interface_claim;
 	int has_been_up;
 	int is_ready;                          /* READY=1 was sent */
-	char link_warning[PACKET_ERROR_BYTES]; /* said already */
-	enum exit_code waiting_for;            /* said already */
+	char link_warning[PACKET_ERROR_BYTES]; /* last one printed */
+	enum exit_code waiting_for;            /* last one printed */
 	uint64_t cycles_before;                /* of earlier sessions, in OP */
 	uint64_t cycles_at_op;
 	mono_t op_since;

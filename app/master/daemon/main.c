@@ -93,7 +93,7 @@ static void sleep_a_pass(const struct program *pg)
 	}
 }
 
-/* In OP until there is news: an enum session_news, or -errno with @failure. */
+/* Serve in OP until the session ends: an enum session_result, or -errno with @failure. */
 static int serve(struct program *pg, struct failure *failure)
 {
 	int r;

@@ -128,7 +128,7 @@ int session_cancelled(const struct session *s, struct failure *failure)
 {
 	return session_is_stop_asked(s)
 		       ? failure_set(failure, EXIT_CODE_OK, -ECANCELED,
-				     "bring-up: told to stop before OP was reached")
+				     "bring-up: stop requested before OP was reached")
 		       : 0;
 }
 
@@ -164,7 +164,7 @@ void session_state_set(struct session *s, enum bus_state state)
 	atomic_store_explicit(&s->run.page->bus_state, state, memory_order_relaxed);
 }
 
-void session_say(struct session *session, const char *text)
+void session_set_message(struct session *session, const char *text)
 {
 	run_dir_set_message(&session->run, text);
 }
@@ -282,7 +282,7 @@ void session_conclude(struct session *session, const struct failure *failure)
 	atomic_store_explicit(&session->run.page->exit_code,
 			      failure != NULL ? (uint32_t)failure->code : EXIT_CODE_OK,
 			      memory_order_relaxed);
-	session_say(session, failure != NULL ? failure->text : "");
+	session_set_message(session, failure != NULL ? failure->text : "");
 	session_state_set(session, failure != NULL ? BUS_FAILED : BUS_STOPPED);
 	session_emit(session, &ev);
 }
@@ -293,7 +293,7 @@ void session_stuck(struct session *session, enum exit_code code, const char *tex
 
 	atomic_store_explicit(&page->control.state, CONTROL_STUCK, memory_order_relaxed);
 	atomic_store_explicit(&page->exit_code, (uint32_t)code, memory_order_relaxed);
-	session_say(session, text);
+	session_set_message(session, text);
 	atomic_store_explicit(&page->bus_state, BUS_FAILED, memory_order_release);
 }
 

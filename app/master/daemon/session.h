@@ -62,14 +62,14 @@ int session_create(const struct session_spec *spec, struct session **ret_session
  */
 int session_bring_up(struct session *session, struct failure *failure);
 
-enum session_news {
+enum session_result {
 	SESSION_GOES_ON,
 	SESSION_STOP_ASKED, /* by session_stop_ask() or the admin socket */
 	SESSION_LOST, /* all slaves have been lost for long: take it down and bring it up again */
 };
 
 /**
- * One pass of the service loop: admin requests, bus watch, status page. An enum session_news, or
+ * One pass of the service loop: admin requests, bus watch, status page. An enum session_result, or
  * -errno with @failure if the cycle has ended by itself. May also be called while nothing is up.
  */
 int session_service(struct session *session, struct failure *failure);
@@ -107,7 +107,7 @@ void session_degraded(struct session *session, enum event_rt which, int err);
 /** The core of the cycle thread. Context: service thread. */
 void session_cpu_set(struct session *session, uint32_t cpu);
 /** A message for the status page; "" for none. Context: service thread. */
-void session_say(struct session *session, const char *text);
+void session_set_message(struct session *session, const char *text);
 
 /** The status page; it lives as long as the session. */
 const struct status_page *session_page(const struct session *session);

@@ -43,7 +43,7 @@ struct session {
 	uint64_t wkc_low_seen;
 	uint64_t doubled_seen;  /* with doubled_since: where the window began */
 	uint64_t doubled_since; /* cycles */
-	int has_doubled_said;
+	int has_reported_doubled;
 };
 
 /** @ev goes to the event ring, stamped with the time now. */
@@ -76,7 +76,7 @@ int session_report_ended(struct session *s, struct failure *failure);
 void session_listen(struct session *s);
 /** Of @frames sent, @twice came back a second time: say it if that is nearly each of them. */
 void session_judge_doubled(struct session *s, uint64_t frames, uint64_t twice);
-/** Look after the bus; an enum session_news. */
-enum session_news session_watch(struct session *s);
+/** Look after the bus; an enum session_result. */
+enum session_result session_watch(struct session *s);
 
 #endif

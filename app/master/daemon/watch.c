@@ -127,7 +127,7 @@ static void follow_bus(struct session *s, const struct bus_watch_report *report)
 	if (report->is_all_op && s->state == BUS_RECOVERING) {
 		go_on_with(s, UINT64_MAX);
 		session_state_set(s, BUS_OP);
-		session_say(s, "");
+		session_set_message(s, "");
 	} else if (!report->is_all_op) {
 		go_on_with(s, can_go_on(s, report) ? report->op_mask : 0);
 		if (s->state == BUS_OP) {
@@ -135,7 +135,7 @@ static void follow_bus(struct session *s, const struct bus_watch_report *report)
 		}
 		snprintf(text, sizeof(text), "bus: %u of %u slaves in OP, %u lost",
 			 report->slaves_op, count, report->slaves_lost);
-		session_say(s, text);
+		session_set_message(s, text);
 	}
 	if (report->slaves_lost < count) {
 		s->lost_since = (mono_t){ 0 };
@@ -183,7 +183,7 @@ void session_listen(struct session *s)
 	}
 }
 
-enum session_news session_watch(struct session *s)
+enum session_result session_watch(struct session *s)
 {
 	struct bus_watch_report report = { 0 };
 
@@ -210,14 +210,14 @@ void session_judge_doubled(struct session *s, uint64_t frames, uint64_t twice)
 		    twice <= frames + frames / 10;
 
 	if (is_so && s->state != BUS_RECOVERING) {
-		session_say(s, text);
-	} else if (!is_so && s->has_doubled_said && s->state == BUS_OP) {
-		session_say(s, "");
+		session_set_message(s, text);
+	} else if (!is_so && s->has_reported_doubled && s->state == BUS_OP) {
+		session_set_message(s, "");
 	}
-	if (is_so && !s->has_doubled_said && s->spec.hooks.warn != NULL) {
+	if (is_so && !s->has_reported_doubled && s->spec.hooks.warn != NULL) {
 		s->spec.hooks.warn(s->spec.hooks.ctx, text);
 	}
-	s->has_doubled_said = is_so;
+	s->has_reported_doubled = is_so;
 }
 
 static void watch_doubled(struct session *s)
@@ -274,7 +274,7 @@ int session_report_ended(struct session *s, struct failure *failure)
 int session_service(struct session *session, struct failure *failure)
 {
 	struct session *s = session;
-	enum session_news news = SESSION_GOES_ON;
+	enum session_result news = SESSION_GOES_ON;
 	mono_t now = session_now(s);
 
 	if (s->spec.hooks.alive != NULL) {

@@ -23,10 +23,10 @@ enum ride_state { RIDE_FREE, RIDE_WAITING, RIDE_TAKING, RIDE_OUT, RIDE_ANSWERING
  * period. */
 #define RIDE_PATIENCE_NS (100 * NS_PER_MS)
 
-#define PATIENCE_NS (2 * NS_PER_MS)
+#define DEFAULT_TIMEOUT_NS (2 * NS_PER_MS)
 
 /* A late answer to one try is not taken for the next, so that later tries wait longer. */
-static const unsigned char patience_times[LINE_TRIES] = { 1, 5, 25 };
+static const unsigned char timeout_factors[LINE_TRIES] = { 1, 5, 25 };
 
 struct frame_buffer {
 	size_t len;
@@ -37,7 +37,7 @@ struct line {
 	struct platform platform;
 	struct transport transport;
 	struct line_waiter waiter;   /* [service] */
-	span_t patience;             /* [service] */
+	span_t timeout;              /* [service] */
 	void (*attend)(void *ctx);   /* [service] */
 	void *attend_ctx;            /* [service] */
 	int is_riding;               /* [service] */
@@ -61,7 +61,7 @@ int line_create(struct platform platform, struct transport transport, struct lin
 	}
 	line->platform = platform;
 	line->transport = transport;
-	line->patience = (span_t){ PATIENCE_NS };
+	line->timeout = (span_t){ DEFAULT_TIMEOUT_NS };
 	atomic_init(&line->state, RIDE_FREE);
 	*ret_line = line;
 	return 0;
@@ -91,23 +91,23 @@ const struct transport *line_transport(const struct line *line)
 	return &line->transport;
 }
 
-uint64_t line_thrown_away(const struct line *line)
+uint64_t line_discarded(const struct line *line)
 {
 	return line->thrown_away;
 }
 
-void line_patience_set(struct line *line, span_t patience)
+void line_timeout_set(struct line *line, span_t timeout)
 {
-	line->patience = patience;
+	line->timeout = timeout;
 }
 
-span_t line_patience(const struct line *line, unsigned try)
+span_t line_timeout(const struct line *line, unsigned try)
 {
 	assert(try < LINE_TRIES);
-	return (span_t){ line->patience.ns * patience_times[try] };
+	return (span_t){ line->timeout.ns * timeout_factors[try] };
 }
 
-void line_attend(struct line *line, void (*attend)(void *ctx), void *ctx)
+void line_set_keepalive(struct line *line, void (*attend)(void *ctx), void *ctx)
 {
 	line->attend = attend;
 	line->attend_ctx = ctx;

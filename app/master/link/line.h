@@ -58,15 +58,15 @@ int line_transact(struct line *line, const uint8_t *frame, size_t frame_len, uin
  * How long the first try of a frame waits for its echo; what repeats a frame waits 5 and then 25
  * times as long. 2 ms unless set.
  */
-void line_patience_set(struct line *line, span_t patience);
+void line_timeout_set(struct line *line, span_t timeout);
 /** For try 0 to LINE_TRIES - 1. */
-span_t line_patience(const struct line *line, unsigned try);
+span_t line_timeout(const struct line *line, unsigned try);
 
 /** @attend is called whenever this thread sends or waits: a sign that it gets on. NULL: nobody. */
-void line_attend(struct line *line, void (*attend)(void *ctx), void *ctx);
+void line_set_keepalive(struct line *line, void (*attend)(void *ctx), void *ctx);
 
 /** Frames that line_transact() met and threw away in direct mode. */
-uint64_t line_thrown_away(const struct line *line);
+uint64_t line_discarded(const struct line *line);
 /** Transactions of direct mode that were answered. */
 uint64_t line_answered(const struct line *line);
 

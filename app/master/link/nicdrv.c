@@ -140,7 +140,7 @@ int ecx_srconfirm(ecx_portt *port, uint8 idx, int timeout)
 	}
 	for (unsigned i = 0; i < LINE_TRIES && port->line != NULL && wkc < 0; i++) {
 		port->retries += i > 0;
-		wkc = transact(port, idx, line_patience(port->line, i).ns);
+		wkc = transact(port, idx, line_timeout(port->line, i).ns);
 	}
 	return wkc;
 }

@@ -371,7 +371,7 @@ TEST(recovery, stop_on_a_dead_line_ends_soon_and_says_so)
 	bench_run(b, 10);
 	begun_ns = bench_now_ns(b);
 	CHECK_EQ(bench_stop(b), -EIO);
-	CHECK(strstr(b->error, "no frame comes back") != NULL);
+	CHECK(strstr(b->error, "no frame returns") != NULL);
 	CHECK(bench_now_ns(b) - begun_ns < NS_PER_S);
 	bench_destroy(b);
 }

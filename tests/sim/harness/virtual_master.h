@@ -65,7 +65,7 @@ void virtual_master_kill(struct virtual_master *vm);
 
 /** session_bring_up(); 0 or -errno with vm->failure. */
 int virtual_master_bring_up(struct virtual_master *vm);
-/** @cycles cycles with the service loop between them. An enum session_news or -errno. */
+/** @cycles cycles with the service loop between them. An enum session_result or -errno. */
 int virtual_master_run(struct virtual_master *vm, uint64_t cycles);
 /** Outputs safe, INIT; 0 or -errno with vm->failure. The samples up to there are in the result. */
 int virtual_master_stop(struct virtual_master *vm);

@@ -27,7 +27,7 @@ TEST(config, options_that_do_not_fit_to_each_other_blame_a_line_of_the_file)
 	parse_fails("bus:\n  watchdog: 2ms\n",
 		    "t.yaml:2: bus.watchdog: must be 0s or at least three times cycle.period");
 	parse_fails("bus:\n  presence: exact\n",
-		    "t.yaml:2: bus.presence: exact wants slaves to be listed");
+		    "t.yaml:2: bus.presence: exact requires a slaves list");
 	parse_fails("slaves:\n- name: a\n- name: a\n",
 		    "t.yaml:3: slaves[].name: slaves 0 and 1 are both called a");
 	parse_fails("slaves:\n- sync0_line: GPIO17\n- {}\n- sync0_line: GPIO17\n",

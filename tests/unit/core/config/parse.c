@@ -196,30 +196,33 @@ TEST(config, unknown_keys_are_named_with_a_guess)
 
 TEST(config, wrong_types_are_named)
 {
-	parse_fails("cycle: 1ms\n", "t.yaml:1: cycle: is a section: wants key: value pairs");
+	parse_fails("cycle: 1ms\n", "t.yaml:1: cycle: is a section: expected key: value pairs");
 	parse_fails("cycle:\n  period: [ 1ms ]\n",
-		    "t.yaml:2: cycle.period: wants one value, not a list");
+		    "t.yaml:2: cycle.period: expected one value, not a list");
 	parse_fails("cycle:\n  period: { a: 1 }\n",
-		    "t.yaml:2: cycle.period: wants a value, not a section");
-	parse_fails("cycle:\n  period: fast\n",
-		    "t.yaml:2: cycle.period: wants a duration such as 500us or 1ms, not \"fast\"");
+		    "t.yaml:2: cycle.period: expected a value, not a section");
+	parse_fails(
+		"cycle:\n  period: fast\n",
+		"t.yaml:2: cycle.period: expected a duration such as 500us or 1ms, not \"fast\"");
 	parse_fails("cycle:\n  period:\n", "t.yaml:2: cycle.period: has no value");
 	parse_fails("cycle:\n  cpu: 1.5\n",
-		    "t.yaml:2: cycle.cpu: wants a whole number, not \"1.5\"");
-	parse_fails("cycle:\n  cpu: 0x\n", "t.yaml:2: cycle.cpu: wants a whole number, not \"0x\"");
+		    "t.yaml:2: cycle.cpu: expected a whole number, not \"1.5\"");
+	parse_fails("cycle:\n  cpu: 0x\n",
+		    "t.yaml:2: cycle.cpu: expected a whole number, not \"0x\"");
 	parse_fails("cycle:\n  phase: half\n",
-		    "t.yaml:2: cycle.phase: wants a share such as 50%, not \"half\"");
-	parse_fails("dc:\n  kp: nan\n", "t.yaml:2: dc.kp: wants a number, not \"nan\"");
-	parse_fails("dc:\n  kp: 0x1p-3\n", "t.yaml:2: dc.kp: wants a number, not \"0x1p-3\"");
+		    "t.yaml:2: cycle.phase: expected a share such as 50%, not \"half\"");
+	parse_fails("dc:\n  kp: nan\n", "t.yaml:2: dc.kp: expected a number, not \"nan\"");
+	parse_fails("dc:\n  kp: 0x1p-3\n", "t.yaml:2: dc.kp: expected a number, not \"0x1p-3\"");
 	parse_fails("cycle:\n  lock_memory: maybe\n",
-		    "t.yaml:2: cycle.lock_memory: wants on or off, not \"maybe\"");
+		    "t.yaml:2: cycle.lock_memory: expected on or off, not \"maybe\"");
 	parse_fails("cycle:\n  poll: busy\n",
-		    "t.yaml:2: cycle.poll: wants one of auto|spin|sleep, not \"busy\"");
+		    "t.yaml:2: cycle.poll: expected one of auto|spin|sleep, not \"busy\"");
 	parse_fails("record:\n  budget: lots\n",
-		    "t.yaml:2: record.budget: wants a size such as 256MiB, not \"lots\"");
-	parse_fails("slaves: 2\n", "t.yaml:1: slaves: wants a list: lines that start with \"- \"");
-	parse_fails("slaves:\n  - piccolo0\n", "t.yaml:2: slaves[0]: wants key: value pairs");
-	parse_fails("- a\n", "t.yaml:1: wants sections: lines such as \"cycle:\"");
+		    "t.yaml:2: record.budget: expected a size such as 256MiB, not \"lots\"");
+	parse_fails("slaves: 2\n",
+		    "t.yaml:1: slaves: expected a list: lines that start with \"- \"");
+	parse_fails("slaves:\n  - piccolo0\n", "t.yaml:2: slaves[0]: expected key: value pairs");
+	parse_fails("- a\n", "t.yaml:1: expected sections: lines such as \"cycle:\"");
 	parse_fails("[ a, b ]: 1\n", "t.yaml:1: a key must be a word");
 }
 
@@ -231,7 +234,7 @@ TEST(config, wrong_units_are_named)
 		    "t.yaml:2: record.budget: unknown unit \"Gib\": B, KiB, "
 		    "MiB, GiB, TiB, kB, MB, GB or TB");
 	parse_fails("cycle:\n  cpu: 3cores\n",
-		    "t.yaml:2: cycle.cpu: wants a plain number, without \"cores\"");
+		    "t.yaml:2: cycle.cpu: expected a plain number, without \"cores\"");
 	parse_fails("dc:\n  lock_cycles: 200ms\n",
 		    "t.yaml:2: dc.lock_cycles: unknown unit \"ms\": only cycles");
 	parse_fails("cycle:\n  phase: 50ms\n",
@@ -266,7 +269,7 @@ TEST(config, values_out_of_range_are_named_with_the_range)
 	parse_fails("slaves:\n- name: a234567890123456789012345678901x\n",
 		    "t.yaml:2: slaves[0].name: is longer than 31 bytes");
 	parse_fails("slaves:\n- name: a.b\n",
-		    "t.yaml:2: slaves[0].name: wants letters, digits, _ and - "
+		    "t.yaml:2: slaves[0].name: expected letters, digits, _ and - "
 		    "only, not \"a.b\"");
 	parse_fails("record:\n  dir: \"/a\\nb\"\n",
 		    "t.yaml:2: record.dir: has a control character in it");
@@ -309,7 +312,7 @@ TEST(config, objects_must_be_whole_and_fit_their_type)
 	parse_fails("slaves:\n- sdo:\n  - { index: 0x8000, type: UINT, value: x }\n",
 		    "t.yaml:3: slaves[0].sdo[0].value: \"x\" is no UINT");
 	parse_fails("slaves:\n- sdo:\n  - { index: 0x8000, type: WORD, value: 1 }\n",
-		    "t.yaml:3: slaves[0].sdo[0].type: wants one of "
+		    "t.yaml:3: slaves[0].sdo[0].type: expected one of "
 		    "BOOL|SINT|INT|DINT|LINT|USINT|UINT|UDINT|ULINT|REAL|LREAL, not \"WORD\"");
 	parse_fails("outputs:\n- owner: local\n", "t.yaml:2: outputs[0].channel: is missing");
 }

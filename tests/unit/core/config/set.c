@@ -41,8 +41,8 @@ TEST(config, set_takes_what_the_file_takes)
 
 TEST(config, set_refuses_with_one_line)
 {
-	set_fails("cycle.period", "cycle.period: wants OPTION=VALUE");
-	set_fails("=1", "=1: wants OPTION=VALUE");
+	set_fails("cycle.period", "cycle.period: expected OPTION=VALUE");
+	set_fails("=1", "=1: expected OPTION=VALUE");
 	set_fails("cycle.perid=1ms", "cycle.perid: unknown option; did you mean cycle.period?");
 	set_fails("cycle.period=20ms", "cycle.period: 20ms is out of range: 250us to 10ms");
 	set_fails("cycle=1", "cycle: unknown option; did you mean cycle?");

@@ -226,7 +226,7 @@ TEST(control, options_that_cannot_be_meant_are_refused)
 			      "init() failed: kp: the value in control.options is no number");
 	check_options_refused("word=12345678",
 			      "init() failed: word: the value in control.options is too long");
-	check_options_refused("kb=2", "control.options: kb: the program knows no such key");
+	check_options_refused("kb=2", "control.options: kb: unknown key");
 	check_options_refused("kp", "control.options: \"kp\" is not KEY=VALUE");
 	check_options_refused("=3", "control.options: \"=3\" has no key");
 	check_options_refused("kp=1,kp=2", "control.options: kp is given twice");

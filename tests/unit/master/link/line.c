@@ -46,7 +46,7 @@ TEST(line, direct_transaction_returns_the_echo)
 	CHECK_EQ(ask_status(line, answer), 60);
 	CHECK_EQ(answer[28], 1);
 	CHECK_EQ(wire.now_ns, FAKE_TRAVEL_NS);
-	CHECK_EQ(line_thrown_away(line), 0);
+	CHECK_EQ(line_discarded(line), 0);
 	CHECK_EQ(line_answered(line), 1);
 	line_destroy(line);
 }
@@ -78,7 +78,7 @@ TEST(line, answer_to_an_earlier_index_is_thrown_away)
 	fake_queue(&wire, stale, len, 0);
 	CHECK_EQ(ask_status(line, answer), len);
 	CHECK_EQ(answer[17], 7);
-	CHECK_EQ(line_thrown_away(line), 1);
+	CHECK_EQ(line_discarded(line), 1);
 	line_destroy(line);
 }
 
@@ -90,7 +90,7 @@ TEST(line, flood_of_foreign_frames_costs_the_timeout_and_no_more)
 
 	CHECK_EQ(ask_status(line, answer), -ETIMEDOUT);
 	CHECK(wire.now_ns >= 2000000 && wire.now_ns <= 2003000);
-	CHECK_EQ(line_thrown_away(line), wire.flooded);
+	CHECK_EQ(line_discarded(line), wire.flooded);
 	CHECK_EQ(ask_status(line, answer), 60);
 	line_destroy(line);
 }
@@ -123,7 +123,7 @@ static void check_refused(void (*answer_fn)(struct fake_wire *, uint8_t *, size_
 	uint8_t answer[LIMIT_FRAME_BYTES];
 
 	CHECK_EQ(ask_status(line, answer), -ETIMEDOUT);
-	CHECK_EQ(line_thrown_away(line), 1);
+	CHECK_EQ(line_discarded(line), 1);
 	line_destroy(line);
 }
 
@@ -372,11 +372,11 @@ TEST(line, each_try_waits_longer_than_the_one_before)
 	struct fake_wire wire = { 0 };
 	struct line *line = line_on(&wire);
 
-	CHECK_EQ(line_patience(line, 0).ns, 2 * NS_PER_MS);
-	line_patience_set(line, (span_t){ 20 * NS_PER_MS });
-	CHECK_EQ(line_patience(line, 0).ns, 20 * NS_PER_MS);
-	CHECK_EQ(line_patience(line, 1).ns, 100 * NS_PER_MS);
-	CHECK_EQ(line_patience(line, LINE_TRIES - 1).ns, 500 * NS_PER_MS);
+	CHECK_EQ(line_timeout(line, 0).ns, 2 * NS_PER_MS);
+	line_timeout_set(line, (span_t){ 20 * NS_PER_MS });
+	CHECK_EQ(line_timeout(line, 0).ns, 20 * NS_PER_MS);
+	CHECK_EQ(line_timeout(line, 1).ns, 100 * NS_PER_MS);
+	CHECK_EQ(line_timeout(line, LINE_TRIES - 1).ns, 500 * NS_PER_MS);
 	line_destroy(line);
 }
 
@@ -394,13 +394,13 @@ TEST(line, who_attends_hears_of_every_frame_and_every_pause_even_on_a_dead_wire)
 	size_t len = make_frame(frame, ECAT_CMD_BRD, 0, 0, 0);
 	unsigned calls = 0;
 
-	line_attend(line, count_call, &calls);
+	line_set_keepalive(line, count_call, &calls);
 	CHECK_EQ(line_transact(line, frame, len, answer, sizeof(answer), (span_t){ NS_PER_MS }),
 		 -ETIMEDOUT);
 	CHECK_EQ(calls, 1);
 	line_sleep(line, (span_t){ NS_PER_MS });
 	CHECK_EQ(calls, 2);
-	line_attend(line, NULL, NULL);
+	line_set_keepalive(line, NULL, NULL);
 	line_sleep(line, (span_t){ NS_PER_MS });
 	CHECK_EQ(calls, 2);
 	line_destroy(line);

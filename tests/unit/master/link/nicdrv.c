@@ -148,7 +148,7 @@ TEST(nicdrv, a_slow_wire_is_waited_for_as_long_as_the_line_says)
 	struct nic *nic = nic_create();
 	uint16 value = 0;
 
-	line_patience_set(nic->line, (span_t){ 20 * NS_PER_MS });
+	line_timeout_set(nic->line, (span_t){ 20 * NS_PER_MS });
 	nic->wire.travel_ns = 15 * NS_PER_MS;
 	CHECK_EQ(ecx_FPRD(&nic->port, 0x1001, ESC_REG_AL_STATUS, 2, &value, EC_TIMEOUTRET), 1);
 	CHECK_EQ(nic->port.retries, 0);
