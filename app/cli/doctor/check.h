@@ -11,7 +11,6 @@
 
 #include "base/status.h"
 #include "cli/doctor/probe.h"
-#include "cli/doctor/thread.h"
 #include "config/config.h"
 
 enum finding_level {
@@ -41,6 +40,16 @@ void finding_unread(struct finding *f, const char *what, int err);
 
 /** "OK", "WARN", "FAIL", "SKIP". */
 const char *finding_level_to_str(enum finding_level level);
+
+struct thread {
+	int64_t pid;
+	int64_t tid; /* 0: none */
+	char name[32];
+	int is_kernel;
+	int policy;
+	int priority;                 /* of FIFO and RR */
+	char cores[PROBE_TEXT_BYTES]; /* where it may run: "0-2" */
+};
 
 struct target {
 	struct probe probe;

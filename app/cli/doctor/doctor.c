@@ -10,11 +10,12 @@
 #include "cli/cli.h"
 #include "cli/doctor/check.h"
 #include "cli/doctor/resolve.h"
+#include "cli/doctor/thread.h"
+#include "cli/running.h"
 #include "cli/source.h"
 #include "cli/text.h"
 #include "program/args.h"
 #include "program/json.h"
-#include "cli/running.h"
 
 #define CYCLE_THREAD "ecdaqd-cycle"
 

@@ -9,6 +9,7 @@
 
 #include "base/cpu_list.h"
 #include "cli/doctor/check.h"
+#include "cli/doctor/thread.h"
 
 int irq_parse(const char *line, struct irq *ret)
 {

@@ -5,19 +5,9 @@
 
 #include <stdint.h>
 
-#include "cli/doctor/probe.h"
+#include "cli/doctor/check.h"
 
 enum { THREAD_FIFO = 1, THREAD_RR = 2 }; /* SCHED_ of sched.h */
-
-struct thread {
-	int64_t pid;
-	int64_t tid; /* 0: none */
-	char name[32];
-	int is_kernel;
-	int policy;
-	int priority;                 /* of FIFO and RR */
-	char cores[PROBE_TEXT_BYTES]; /* where it may run: "0-2" */
-};
 
 /** One line of /proc/PID/task/TID/stat. 0 or -EBADMSG. All but pid and cores is filled. */
 int thread_parse_stat(const char *line, struct thread *ret);

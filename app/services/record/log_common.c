@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "program/exit_code.h"
 #include "record/file_io.h"
 #include "record/store.h"
 

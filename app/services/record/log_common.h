@@ -3,7 +3,9 @@
 #ifndef RECORD_LOG_COMMON_H
 #define RECORD_LOG_COMMON_H
 
-#include "record/log.h"
+#include <stdint.h>
+#include <stdio.h>
+
 #include "record/mcap_recover.h"
 #include "record/track.h"
 

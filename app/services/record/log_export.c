@@ -7,7 +7,9 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "program/exit_code.h"
 #include "record/columns.h"
+#include "record/log.h"
 #include "record/log_common.h"
 #include "record/store.h"
 

@@ -5,7 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "program/exit_code.h"
 #include "program/json.h"
+#include "record/log.h"
 #include "record/log_common.h"
 
 struct topic {

@@ -6,7 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "program/exit_code.h"
 #include "program/json.h"
+#include "record/log.h"
 #include "record/log_common.h"
 #include "record/mcap_reader.h"
 #include "record/messages.h"

@@ -8,6 +8,7 @@
 #include <zlib.h>
 
 #include "base/bytes.h"
+#include "record/mcap.h"
 
 /* A place in a record; what does not fit sets error and reads as zero. */
 struct cursor {

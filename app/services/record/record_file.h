@@ -14,32 +14,10 @@
 #include "record/layout.h"
 #include "record/mcap.h"
 #include "record/messages.h"
+#include "record/record_spec.h"
 #include "record/store.h"
 
 struct record_file;
-
-/* A test's way to count and fail what is done to a file. */
-struct record_seam {
-	/** Replace calls of @io, which writes the file at @path. */
-	void (*wrap)(void *ctx, const char *path, struct mcap_io *io);
-	/** Free bytes in @dir. NULL: read from the file system. */
-	int (*free_bytes)(void *ctx, const char *dir, uint64_t *ret_bytes);
-	void *ctx;
-};
-
-struct record_file_spec {
-	const char *dir;
-	const char *name;            /* without suffix */
-	const struct layout *layout; /* kept */
-	int zstd_level;
-	const struct store_state *before; /* what was recorded of the session so far */
-	uint64_t file_sequence;
-	uint64_t start_utc_ns; /* log times start here */
-	const struct timemap_state *timemap;
-	const char *config_path; /* "" where there is none */
-	const char *config_text;
-	const struct record_seam *seam; /* NULL: none */
-};
 
 /** Make the file with all that goes before the first sample. 0 or -errno: then nothing is left
  * behind. */
@@ -62,13 +40,6 @@ int record_file_timemap(struct record_file *f, const struct timemap_state *state
 int record_file_close_chunk(struct record_file *f);
 /** Make durable what is written. */
 int record_file_sync(struct record_file *f);
-
-struct record_file_end {
-	const char *reason; /* "rotated", "producer ended", ... */
-	uint64_t events_lost;
-	const struct store_state *after; /* what was recorded of the session with this file */
-	const struct timemap_state *timemap;
-};
 
 /** Note the end, write the summary, sync. 0 or -errno: the file is as before, try again. */
 int record_file_finish(struct record_file *f, const struct record_file_end *end);

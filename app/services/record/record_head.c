@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "program/json.h"
+#include "record/messages.h"
 
 enum { PAIRS_PER_FIELD = 4, NUMBERS = 20, NUMBER_BYTES = 24 };
 

@@ -5,7 +5,7 @@
 #define RECORD_RECORD_HEAD_H
 
 #include "record/mcap_writer.h"
-#include "record/record_file.h"
+#include "record/record_spec.h"
 
 /**
  * Header, schemas, channels (MESSAGE_CYCLE.. first, then one for each topic of the layout, in this

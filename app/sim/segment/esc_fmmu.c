@@ -7,24 +7,6 @@
 
 enum { FMMU_READ = 1, FMMU_WRITE = 2, LOGICAL_BYTES_MAX = ECAT_DATAGRAM_MAX_BYTES };
 
-void esc_fmmu_configure(struct esc *esc, unsigned n)
-{
-	const uint8_t *r = &esc->reg[ESC_REG_FMMU + n * ESC_FMMU_BYTES];
-	struct esc_fmmu *f = &esc->fmmu[n];
-
-	f->logical_start = get_le32(r);
-	f->len = get_le16(r + 4);
-	f->logical_start_bit = r[6] & 7;
-	f->logical_end_bit = r[7] & 7;
-	f->physical_start = get_le16(r + 8);
-	f->physical_start_bit = r[10] & 7;
-	f->type = r[11] & 3;
-	f->is_active = (r[12] & 1) && f->len > 0 &&
-		       (f->len > 1 || f->logical_end_bit >= f->logical_start_bit);
-	f->is_bytewise =
-		f->logical_start_bit == 0 && f->logical_end_bit == 7 && f->physical_start_bit == 0;
-}
-
 /* Registers can be mapped, too (mailbox status); so a read may do what reading a register does. */
 static int read_physical(struct esc *esc, int64_t t_ns, uint16_t addr, uint8_t *buf, size_t len)
 {

@@ -29,7 +29,6 @@ const uint8_t *esc_ram_last_written(struct esc *esc, uint16_t addr);
 
 /* --- esc_fmmu.c --- */
 
-void esc_fmmu_configure(struct esc *esc, unsigned n);
 /** A logical datagram; adds to the working counter. */
 void esc_fmmu_access(struct esc *esc, const struct esc_frame *frame, struct ecat_datagram *dg);
 

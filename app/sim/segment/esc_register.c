@@ -188,11 +188,29 @@ static void clear_counters(struct esc *esc, uint16_t addr, size_t len)
 	}
 }
 
+static void configure_fmmu(struct esc *esc, unsigned n)
+{
+	const uint8_t *r = &esc->reg[ESC_REG_FMMU + n * ESC_FMMU_BYTES];
+	struct esc_fmmu *f = &esc->fmmu[n];
+
+	f->logical_start = get_le32(r);
+	f->len = get_le16(r + 4);
+	f->logical_start_bit = r[6] & 7;
+	f->logical_end_bit = r[7] & 7;
+	f->physical_start = get_le16(r + 8);
+	f->physical_start_bit = r[10] & 7;
+	f->type = r[11] & 3;
+	f->is_active = (r[12] & 1) && f->len > 0 &&
+		       (f->len > 1 || f->logical_end_bit >= f->logical_start_bit);
+	f->is_bytewise =
+		f->logical_start_bit == 0 && f->logical_end_bit == 7 && f->physical_start_bit == 0;
+}
+
 static void units_written(struct esc *esc, uint16_t addr, size_t len)
 {
 	for (unsigned n = 0; n < esc->features.fmmu_count; n++) {
 		if (esc_touches(addr, len, ESC_REG_FMMU + n * ESC_FMMU_BYTES, ESC_FMMU_BYTES)) {
-			esc_fmmu_configure(esc, n);
+			configure_fmmu(esc, n);
 		}
 	}
 	for (unsigned n = 0; n < esc->features.sm_count; n++) {

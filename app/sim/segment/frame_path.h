@@ -9,9 +9,11 @@
 #include <stdint.h>
 
 #include "base/limits.h"
-#include "segment/segment.h"
+#include "segment/esc.h"
 
 enum { PATH_PORTS = 4, PATH_NOWHERE = -1 };
+
+enum segment_port { SEGMENT_PRIMARY, SEGMENT_SECONDARY, SEGMENT_PORTS };
 
 /* What is at the other end of a port's cable: slave and port, or PATH_NOWHERE; or the
  * master. */

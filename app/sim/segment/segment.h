@@ -13,6 +13,7 @@
 #include "base/limits.h"
 #include "segment/device.h"
 #include "segment/esc.h"
+#include "segment/frame_path.h"
 #include "segment/signal.h"
 
 enum { SEGMENT_SII_BYTES = 65536 };
@@ -52,8 +53,6 @@ int segment_close_ring(struct segment *segment, size_t slave, unsigned port, int
 void segment_advance(struct segment *segment, int64_t t_ns);
 /** True time of the next event of anything; INT64_MAX: none. */
 int64_t segment_next_event_ns(const struct segment *segment);
-
-enum segment_port { SEGMENT_PRIMARY, SEGMENT_SECONDARY, SEGMENT_PORTS };
 
 /* Where and when the start of a frame comes back to the master. */
 struct segment_return {
