@@ -69,10 +69,10 @@ def test_series_of_one_slave_becomes_columns() -> None:
     assert frame.index[1] == pandas.Timestamp(2, unit="ns", tz="UTC")
 
 
-def test_keys_are_used_where_they_are_there_and_the_library_can(
+def test_keys_are_used_if_present_and_supported_by_the_library(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with pytest.raises(ecdaq.LinkError, match=r"identity_ca.cert.pem: not there"):
+    with pytest.raises(ecdaq.LinkError, match=r"identity_ca.cert.pem: no such file"):
         ecdaq.connect("lo", security=tmp_path)
     for name in keys.KEY_FILES:
         (tmp_path / name).touch()
@@ -82,7 +82,7 @@ def test_keys_are_used_where_they_are_there_and_the_library_can(
     assert 'path="/plugins/libdds_security_ac.so" initFunction="init_access_control"' in config
 
 
-def test_a_library_without_security_is_said(tmp_path: Path) -> None:
+def test_a_library_without_security_is_reported(tmp_path: Path) -> None:
     for name in keys.KEY_FILES:
         (tmp_path / name).touch()
     with pytest.raises(ecdaq.LinkError, match="built without DDS Security"):
@@ -186,7 +186,7 @@ def test_progress_is_shown_on_a_terminal_and_only_there(
     assert shown.endswith("\r\033[K")  # the line is cleared at the end
 
 
-def test_remote_tool_watches_records_sets_and_tells_status(
+def test_remote_tool_watches_records_sets_and_shows_status(
     make_bench: Callable[..., Bench],
 ) -> None:
     bench = make_bench(**{"outputs[0].channel": "piccolo0.led", "outputs[0].owner": "remote"})
@@ -220,21 +220,21 @@ def test_remote_tool_watches_records_sets_and_tells_status(
     assert (frame["cycle"].diff().dropna() == 1).all()
     bench.segment.stop("daemon")
     assert bench.segment.stop("recorder") == 0
-    equals_the_appliances(bench, folder)
+    equals_the_recording_of_the_appliance(bench, folder)
 
 
-def equals_the_appliances(bench: Bench, folder: Path) -> None:
+def equals_the_recording_of_the_appliance(bench: Bench, folder: Path) -> None:
     """`ecdaq log check` takes it, and it says the same as what was recorded on the appliance."""
     (file,) = folder.glob("*.mcap")
     checked = bench.segment.ecdaq("log", "check", "--json", str(file))
-    told = json.loads(checked.stdout)
-    assert told["clean"] is True
-    assert told["cycles"] > 300
+    checked_file = json.loads(checked.stdout)
+    assert checked_file["clean"] is True
+    assert checked_file["cycles"] > 300
     for slave in ("piccolo0", "piccolo1"):
         topic = f"/ecdaq/{slave}"
         local = {m.cycle: fields(m) for m in live.recorded(bench.segment.record_dir, topic)}
         remote = {m.cycle: fields(m) for m in live.recorded(folder, topic)}
-        assert len(remote) >= told["cycles"]
+        assert len(remote) >= checked_file["cycles"]
         assert {cycle: local[cycle] for cycle in remote} == remote
     assert list(live.recorded(folder, "/ecdaq/timemap"))
     exported = bench.segment.ecdaq("log", "export", str(file))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""DDS Security, with the keys that `ecdaq security` makes."""
+"""DDS Security with the keys that `ecdaq security` creates."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ecdaq.errors import LinkError
 
-# As app/services/keystore makes them.
+# As app/services/keystore names them.
 KEY_FILES = (
     "identity_ca.cert.pem",
     "cert.pem",
@@ -20,7 +20,7 @@ KEY_FILES = (
 
 
 def plugin_folder() -> Path:
-    """Where the DDS Security plug-ins of the libddsc that we have loaded are."""
+    """The directory of the DDS Security plug-ins of the loaded libddsc."""
     maps = Path("/proc/self/maps").read_text()
     for library in dict.fromkeys(re.findall(r"(/\S*/libddsc[^/\s]*)$", maps, re.MULTILINE)):
         folder = Path(library).parent
@@ -28,19 +28,19 @@ def plugin_folder() -> Path:
             if (found / "libdds_security_auth.so").exists():
                 return found
     raise LinkError(
-        "this cyclonedds was built without DDS Security, as that of PyPI is; a program in C with "
-        "Debian's Cyclone DDS can join (app/doc/reference/dds.md)"
+        "this cyclonedds was built without DDS Security, like that of PyPI: use a C program with "
+        "Debian's Cyclone DDS (app/doc/reference/dds.md)"
     )
 
 
 def security_config(keys: Path) -> str:
-    """Use the keys in a folder that `ecdaq security` made."""
+    """The XML that uses the keys in a directory created by `ecdaq security`."""
     folder = keys.resolve()
     missing = [name for name in KEY_FILES if not (folder / name).is_file()]
     if missing:
-        raise LinkError(f"{folder / missing[0]}: not there: is this a folder of a participant?")
+        raise LinkError(f"{folder / missing[0]}: no such file: is this a participant's directory?")
     if re.search(r"[<>&\"'${}]", str(folder)):
-        raise ValueError(f"{folder}: a path without < > & $ {{ }} and quotes is wanted")
+        raise ValueError(f"{folder}: the path must not contain < > & $ {{ }} or quotes")
     plugins = plugin_folder()
 
     def library(file: str, function: str) -> str:

@@ -58,7 +58,7 @@ class Channel:
     unit: str
     type: str
     slave: int
-    place: int  # in values and raw of the slave's samples
+    place: int  # index in values and raw of the slave's samples
     is_output: bool
     scale: float
     offset: float
@@ -127,7 +127,7 @@ class Channels:
 
 
 def domain_config(interface: str, multicast: bool, peers: list[str], tag: str) -> str:
-    """The same configuration as ecdaq-dds makes for itself, but for security."""
+    """The same configuration as that of ecdaq-dds, without security."""
     for word in [interface, tag, *peers]:
         if not re.fullmatch(r"[A-Za-z0-9._:-]*", word):
             raise ValueError(f"{word!r}: invalid character: allowed are letters, digits, . _ : -")
@@ -173,7 +173,7 @@ def connect(
 
 
 class Link:
-    """A participant of our own; readers of what ecdaq-dds publishes are made when asked for."""
+    """A DDS participant. Readers are created when they are first used."""
 
     def __init__(self, domain: int, config: str, commander: str = "") -> None:
         try:
@@ -205,7 +205,7 @@ class Link:
         self.close()
 
     def close(self) -> None:
-        """Leave the domain. What a commander of ours set goes back to fail-safe."""
+        """Leave the domain. Outputs that we have set go fail-safe if they have a timeout."""
         self._readers.clear()
         self._writer = None
         del self.participant
@@ -232,7 +232,7 @@ class Link:
         return self._readers[topic]
 
     def _take(self, reader: DataReader, seconds: float) -> list:
-        """What is there, or comes first, within @seconds; invalid (disposed) ones left out."""
+        """Take what is there, else wait up to @seconds for the first; without invalid samples."""
         waitset = WaitSet(self.participant)
         condition = ReadCondition(reader, ANY)
         waitset.attach(condition)
@@ -259,7 +259,7 @@ class Link:
             waitset.wait(duration(seconds=left))
 
     def channels(self, seconds: float = 10) -> Channels:
-        """The channel table of the master that runs now."""
+        """The channel table of the running master."""
         message = self._newest(ChannelsV1, seconds)
         if self._channels is None or self._channels.session != message.session:
             self._channels = Channels(message)
@@ -272,13 +272,13 @@ class Link:
         return self._newest(TimeMapV1, seconds)
 
     def idl(self, seconds: float = 10) -> str:
-        """The IDL text of what is published."""
+        """The text of ecdaq.idl as published."""
         return self._newest(IdlV1, seconds).text
 
     def subscribe(
         self, seconds: float | None = None, slave: int | None = None
     ) -> Iterator[SampleV1]:
-        """Samples as they come, gaps counted in .gaps; for @seconds, or for ever."""
+        """Samples as they arrive, for @seconds or without end; gaps are counted in .gaps."""
         reader = self.reader(SampleV1)
         end = None if seconds is None else time.monotonic() + seconds
         while not self._is_stopped and (end is None or time.monotonic() < end):
@@ -292,7 +292,7 @@ class Link:
                     return
 
     def blocks(self, seconds: float | None = None) -> Iterator[BlockV1]:
-        """Blocks as they come; gaps are not counted."""
+        """Blocks as they arrive; gaps are not counted."""
         reader = self.reader(BlockV1)
         end = None if seconds is None else time.monotonic() + seconds
         while not self._is_stopped and (end is None or time.monotonic() < end):
@@ -300,7 +300,7 @@ class Link:
             yield from self._take(reader, left)
 
     def events(self, seconds: float) -> list[EventV1]:
-        """Events that came since the last call, or come first within @seconds."""
+        """Events since the last call; if there are none, wait up to @seconds for the first."""
         return self._take(self.reader(EventV1), seconds)
 
     # Commands
@@ -335,7 +335,7 @@ class Link:
         session: int = 0,
         message_id: int | None = None,
     ) -> int:
-        """Send a command and do not wait for its answer; the command's id."""
+        """Send a command without waiting for its reply. Returns the command's id."""
         bits = [int(v) for v in values.values()] if raw else []
         if any(not 0 <= b < 1 << 64 for b in bits):
             raise ValueError(f"{bits}: a raw value is 0 to 2**64 - 1")
@@ -358,7 +358,7 @@ class Link:
         return message_id
 
     def replies(self, seconds: float) -> list[ReplyV1]:
-        """Answers to our commands that came, or come first within @seconds."""
+        """Replies to our commands; if there are none, wait up to @seconds for the first."""
         taken = self._take(self.reader(ReplyV1), seconds)
         return [r for r in taken if r.commander == self.commander]
 
@@ -371,10 +371,10 @@ class Link:
         session: int = 0,
         seconds: float = 2,
     ) -> int:
-        """Set outputs, all in one cycle or none; the cycle whose frame carried them.
+        """Set outputs, all in one cycle or none. Returns the cycle whose frame carried them.
 
-        What is set holds while this link lives and the appliance hears of it; then outputs with a
-        time-out go to their fail-safe values. RefusedError says why it was not taken.
+        Values hold while this link is alive and the appliance receives its liveliness; then outputs
+        with a timeout go fail-safe. Raises RefusedError with the reason if the command is rejected.
         """
         number = self.send(values, raw=raw, not_after_cycle=not_after_cycle, session=session)
         end = time.monotonic() + seconds

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What comes over DDS, as MCAP with the topics and fields of the appliance's own recordings.
+"""Records samples, events and time maps as MCAP like the appliance's own recordings.
 
 Not published, and so zero here: of /ecdaq/cycle the clocks, times and working counters, of
 /ecdaq/event mono_ns and id; sequence is 2^64-1 in every event.
@@ -21,8 +21,8 @@ from ecdaq.link import Channel, Channels
 
 PACKAGE = "ecdaq_msgs/msg"
 UNKNOWN_SEQUENCE = 2**64 - 1
-# So many cycles a slave's samples may come later than another's before they count as missing.
-PATIENCE_CYCLES = 5000
+# A slave's samples may arrive this many cycles after another's before they count as missing.
+LATE_CYCLES = 5000
 CDR_LE = b"\x00\x01\x00\x00"
 
 CYCLE = """\
@@ -81,7 +81,7 @@ def size_of(bits: int) -> int:
 
 
 def field_name(name: str) -> str:
-    """As the recorder's, but for words that some language reserves: ecdaq's own are none."""
+    """As the recorder names it, except words reserved in some language: ecdaq uses none."""
     plain = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
     return f"n_{plain}" if plain[:1].isdigit() else plain or "unnamed"
 
@@ -105,7 +105,7 @@ class Field:
         self.bytes = 1 << size
 
     def value(self, raw: int) -> int:
-        """Zero-extended bits as the field has them."""
+        """The value of the field for the zero-extended bits."""
         return raw - (1 << self.bits) if self.is_signed and raw >> (self.bits - 1) else raw
 
 
@@ -195,7 +195,7 @@ def encode_timemap(m: Any) -> bytes:
 
 
 class McapFile:
-    """The recording of one session of the master. It is NAME.mcap.part until it is closed."""
+    """The recording of one session of the master, NAME.mcap.part until it is closed."""
 
     def __init__(self, folder: Path, channels: Channels, program: str) -> None:
         folder.mkdir(parents=True, exist_ok=True)
@@ -232,7 +232,7 @@ class McapFile:
             for s in self.slaves
         ]
         self._pending: dict[int, list[int]] = {}  # cycle: dc, utc, flags, bad, samples
-        self._waiting: list[Any] = []  # until every slave was heard of
+        self._waiting: list[Any] = []  # until every slave has sent a sample
         self._first: dict[int, int] = {}
         self._put_channels()
 
@@ -252,24 +252,24 @@ class McapFile:
             for f in s.fields
         ]  # fmt: skip
         slaves = [{"name": s.name, "device": s.device, "position": s.position} for s in self.slaves]
-        told = {"period_ns": self.channels.period_ns, "slaves": slaves, "channels": listed}
-        self._writer.add_metadata("ecdaq.channels", {"json": json.dumps(told)})
+        fields = {"period_ns": self.channels.period_ns, "slaves": slaves, "channels": listed}
+        self._writer.add_metadata("ecdaq.channels", {"json": json.dumps(fields)})
 
     def _put_session(self, first_cycle: int) -> None:
-        told = {
+        fields = {
             "program": self.program, "session": self.session, "file_sequence": self.number,
             "period_ns": self.channels.period_ns, "next_cycle": first_cycle, "first_cycle": 0,
             "cycles_before": 0, "gaps_before": 0, "cycles_missing_before": 0, "event_next": 0,
             "event_mono_ns": 0, "slaves": len(self.slaves), "channels": len(self.channels),
         }  # fmt: skip
-        self._writer.add_metadata("ecdaq.session", {k: str(v) for k, v in told.items()})
+        self._writer.add_metadata("ecdaq.session", {k: str(v) for k, v in fields.items()})
 
     def _put(self, channel: int, utc_ns: int, data: bytes) -> None:
         time_ns = max(0, utc_ns)
         self._writer.add_message(channel, log_time=time_ns, publish_time=time_ns, data=data)
 
     def add(self, sample: Any) -> None:
-        """A sample of any slave. The file begins with the first cycle that all slaves have."""
+        """Add a sample of any slave. The file begins with the first cycle that all slaves have."""
         if len(self._first) < len(self.slaves):
             self._first.setdefault(sample.slave, sample.cycle)
             self._waiting.append(sample)
@@ -294,10 +294,10 @@ class McapFile:
             entry[3] |= 1 << sample.slave
         entry[4] += 1
         if entry[4] == len(self.slaves):
-            self._flush(sample.cycle - PATIENCE_CYCLES)
+            self._flush(sample.cycle - LATE_CYCLES)
 
     def _flush(self, too_old: int) -> None:
-        """Whole cycles, in order; what is missing of one that is too old does not come any more."""
+        """Write complete cycles in order, and incomplete ones up to @too_old."""
         for cycle in sorted(self._pending):
             dc, utc, flags, bad, samples = self._pending[cycle]
             if samples < len(self.slaves) and cycle > too_old:
@@ -318,18 +318,18 @@ class McapFile:
         names = (
             "dc_ns", "utc_ns", "rate_ppb", "uncertainty_ns", "step_ns", "steps", "tai_offset_s"
         )  # fmt: skip
-        told = {name: str(getattr(m, name)) for name in names}
-        self._writer.add_metadata("ecdaq.timemap", told | {"quality": m.quality})
+        fields = {name: str(getattr(m, name)) for name in names}
+        self._writer.add_metadata("ecdaq.timemap", fields | {"quality": m.quality})
 
     def close(self, reason: str) -> Path:
-        """Finish it; its path."""
+        """Complete the file. Returns its path."""
         if len(self._first) < len(self.slaves):
             self._put_session(0)
         self._flush(-1)
-        told = {
+        fields = {
             "reason": reason, "cycles": self.cycles, "last_cycle": max(0, self.last_cycle),
         }  # fmt: skip
-        self._writer.add_metadata("ecdaq.end", {k: str(v) for k, v in told.items()})
+        self._writer.add_metadata("ecdaq.end", {k: str(v) for k, v in fields.items()})
         self._writer.finish()
         self._stream.close()
         self.part.rename(self.path)

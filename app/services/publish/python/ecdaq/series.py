@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Samples kept: gaps counted, columns for numpy and pandas."""
+"""Gaps in samples, and samples as columns for numpy and pandas."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class Sampled(Protocol):
-    """What a sample of any origin has."""
+    """The members of a sample from any source."""
 
     slave: int
     session: int
@@ -30,7 +30,7 @@ class Sampled(Protocol):
 
 @dataclass
 class Gaps:
-    """Cycles that did not come, for each slave; a new session of the master is no gap."""
+    """Missing cycles of each slave. A new session of the master is not a gap."""
 
     gaps: int = 0
     missing: int = 0
@@ -39,7 +39,7 @@ class Gaps:
     newest: dict[int, tuple[int, int]] = field(default_factory=dict)
 
     def take(self, sample: Sampled) -> int:
-        """Count one sample; how many cycles are missing before it."""
+        """Count one sample. Returns how many cycles are missing before it."""
         session, cycle = self.newest.get(sample.slave, (sample.session, sample.cycle - 1))
         if session != sample.session:
             cycle = sample.cycle - 1
