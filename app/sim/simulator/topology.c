@@ -12,8 +12,8 @@
 #include "devices/catalogue.h"
 #include "devices/fb1111_piccolo.h"
 #include "devices/plant.h"
+#include "devices/wago_750_354.h"
 #include "devices/wago_node.h"
-#include "devices/wago_text.h"
 #include "wire/sii.h"
 
 enum { NAME_BYTES = 96, PATH_BYTES = 1024, LINE_BYTES = PATH_BYTES + 200 };

@@ -2,7 +2,6 @@
 #include "coupler.h"
 
 #include "devices/wago_750_354.h"
-#include "devices/wago_text.h"
 #include "harness/test.h"
 
 static double signal_hz;

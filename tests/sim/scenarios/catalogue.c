@@ -3,7 +3,7 @@
 #include "devices/catalogue.h"
 #include "base/ring.h"
 #include "devices/plant.h"
-#include "devices/wago_text.h"
+#include "devices/wago_750_354.h"
 #include "harness/test.h"
 #include "sim/harness/virtual_master.h"
 

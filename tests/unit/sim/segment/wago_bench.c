@@ -3,7 +3,6 @@
 
 #include "base/bytes.h"
 #include "devices/wago_750_354.h"
-#include "devices/wago_text.h"
 #include "harness/test.h"
 #include "wire/al.h"
 #include "wire/esc_reg.h"

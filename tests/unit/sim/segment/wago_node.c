@@ -5,7 +5,7 @@
 #include <errno.h>
 
 #include "devices/catalogue.h"
-#include "devices/wago_text.h"
+#include "devices/wago_750_354.h"
 #include "harness/test.h"
 #include "wire/sii.h"
 
