@@ -67,20 +67,21 @@ static int make_table(const struct ring_reader *ring, struct channel_table **ret
 	return r;
 }
 
-/* A ring that is of no use stays open, so that it is looked at again only when it was replaced. */
 static enum reader_result begin(struct reader *r)
 {
 	struct channel_table *table = NULL;
 
 	ring_reader_destroy(r->ring);
 	r->ring = NULL;
+	r->is_done = 0;
 	r->error = ring_reader_open(r->path, &r->ring);
 	if (r->error < 0) {
 		return READER_WAITING;
 	}
 	r->error = make_table(r->ring, &table);
-	r->is_done = r->error < 0;
 	if (r->error < 0) {
+		ring_reader_destroy(r->ring);
+		r->ring = NULL;
 		return READER_WAITING;
 	}
 	channel_table_destroy(r->table);

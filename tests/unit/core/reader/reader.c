@@ -7,9 +7,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "harness/made_ring.h"
 #include "harness/test.h"
 #include "image/image.h"
-#include "harness/made_ring.h"
 
 struct bench {
 	char path[128];
@@ -196,7 +196,11 @@ TEST(reader, a_ring_of_another_kind_or_not_consistent_is_not_begun)
 	for (int i = 0; i < 3; i++) {
 		expect(&b, READER_WAITING);
 		CHECK_EQ(reader_error(b.reader), -EPROTO);
+		reader_seek(b.reader, 0); /* there is nothing to read, and no table for it */
 	}
+	made_push(b.ring, 0, 0, 0);
+	CHECK_EQ(reader_read_newest(b.reader), 0);
+	CHECK_EQ(reader_newest(b.reader), 0);
 	ring_destroy(b.ring);
 	/* An image larger than the slots have room for. */
 	meta = made_meta();
