@@ -62,6 +62,7 @@ usage: ./build.sh test [--fail-fast | --keep-going] [--only PATTERN] [--fuzz-sec
 Without GROUP all groups run, the fast ones first:
   unit     app/, module by module; also under ASan+UBSan, and what threads share under TSan
   tidy     the rules of the source tree: include table, banned calls, sizes, formatting, lint
+  docs     links and paths of all pages
   cli      the operator's tool and the programs' command lines; also under ASan+UBSan
   replay   captures of real buses against the simulated segment
   sim      the whole master on virtual time; also under ASan+UBSan

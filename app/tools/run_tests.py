@@ -266,6 +266,7 @@ GROUPS: dict[str, list[Suite]] = {
         replace(ctest("unit", "tsan", "-R", SHARED_STATE_TESTS), run=run_shared_state),
     ],
     "tidy": [pytest("tidy", "release")],
+    "docs": [pytest("docs", "release")],
     "cli": [
         ctest("cli", "release"),
         pytest("cli", "release"),
