@@ -70,6 +70,7 @@ Without GROUP all groups run, the fast ones first:
   recipes  the image's recipes and layers, parsed by BitBake, held against their rules
   live     everything over a veth pair, in real time
   dds      samples and commands over DDS between two namespaces
+  docs     the commands of README and of the tutorials, in a fresh clone
   boot     the images, built and looked at, and in QEMU; skipped, and said so, where one is not root
 Only when named:
   control  of unit, sim, cli and live what is about control programs

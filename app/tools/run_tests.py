@@ -283,6 +283,7 @@ GROUPS: dict[str, list[Suite]] = {
     "recipes": [pytest("recipes", "release")],
     "live": [ctest("live", "release"), pytest("live", "release")],
     "dds": [pytest("dds", "release", "-s")],
+    "docs": [pytest("docs", "release")],
     # What unit, sim, cli and live have of control programs, together.
     "control": [
         Suite("control release", "release", run_ctest, ("-R", CONTROL_TESTS)),
