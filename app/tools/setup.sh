@@ -319,8 +319,7 @@ build_flavour()
 	fuzz) target=fuzz_targets ;;
 	release) stage=$root/build/stage ;;
 	esac
-	# Line by line, for the progress.
-	if ! run_step "compiling $1" "$build_dir/build.log" stdbuf -oL ninja -C "$build_dir" "$target"; then
+	if ! run_step "compiling $1" "$build_dir/build.log" ninja -C "$build_dir" "$target"; then
 		sed -n '/^FAILED:\|^ninja: error/,$p' "$build_dir/build.log" >&2
 		die "cannot build $1 (see above, and $build_dir/build.log)"
 	fi
