@@ -372,6 +372,9 @@ void commands_destroy(struct commands *commands)
 	if (commands->gate != NULL) {
 		revert_outputs(commands, NULL, 0);
 	}
+	if (commands->pending.command != NULL) {
+		finish(commands);
+	}
 	remote_board_close(&commands->board);
 	gate_destroy(commands->gate);
 	pthread_mutex_destroy(&commands->lock);

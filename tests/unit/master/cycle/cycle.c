@@ -146,11 +146,27 @@ static struct ring *make_ring(const char *kind, uint32_t payload_bytes, struct r
 	return ring;
 }
 
+/* What the last start() made; nothing before the first. */
+static void stop(void)
+{
+	cycle_destroy(cy);
+	ring_reader_destroy(reader);
+	ring_reader_destroy(event_reader);
+	ring_destroy(samples);
+	ring_destroy(events);
+	cy = NULL;
+	reader = NULL;
+	event_reader = NULL;
+	samples = NULL;
+	events = NULL;
+}
+
 static void start(void)
 {
 	char error[256] = "";
 	struct cycle_spec spec;
 
+	stop();
 	memset(&world, 0, sizeof(world));
 	memset(&stats, 0, sizeof(stats));
 	world.now.ns = 7000000000 + 123456;
@@ -754,5 +770,5 @@ TEST(cycle_thread, the_dc_time_read_by_another_thread_belongs_to_its_host_time)
 	/* One cycle is 1 ms: a time of one cycle with the host time of another is that far off. */
 	CHECK(llabs(atomic_load(&reads.least_ns) - world.dc_offset_ns) < PERIOD_NS / 4);
 	CHECK(llabs(atomic_load(&reads.most_ns) - world.dc_offset_ns) < PERIOD_NS / 4);
-	cycle_destroy(cy);
+	stop();
 }
