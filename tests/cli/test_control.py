@@ -40,7 +40,7 @@ def last_line(result: subprocess.CompletedProcess[str]) -> str:
     ("program", "said"),
     [
         ("/nowhere/blink.so", "No such file or directory"),
-        ("blink.so", "give its path, with a slash in it"),
+        ("blink.so", "expected a path with a slash"),
         ("/tmp", "is not a file"),
         (f"{PROGRAMS}/no_symbol.so", "has no symbol ecdaq_program"),
         (f"{PROGRAMS}/other_abi.so", "was built for version 2 of ecdaq/control.h"),

@@ -125,7 +125,7 @@ def test_overrides_come_before_the_check(program: str, tmp_path: Path) -> None:
     config = tmp_path / "ecdaq.yaml"
     config.write_text("dds:\n  enable: on\nrecord:\n  enable: off\n")
     result = run(program, "--check", "--config", str(config))
-    one_line(program, result, CONFIG, f"{config}:2: dds.interface: must be given")
+    one_line(program, result, CONFIG, f"{config}:2: dds.interface: is required")
     options = ["--set", "dds.interface=lo", "--set", "dds.multicast=off"]
     result = run(program, "--check", "--config", str(config), *options)
     assert result.returncode in (OK, DISABLED), result

@@ -159,7 +159,7 @@ def test_mistakes_on_the_command_line_are_one_line(tmp_path: Path) -> None:
     one_line(check("--replay", "x", "--dump", "y"), USAGE, "--dump: cannot be combined with")
     one_line(check("--calibrate", "--edges", "y"), USAGE, "--edges: cannot be combined with")
     same = ["--set", "slaves[0].sync0_line=A", "--set", "slaves[1].sync0_line=A"]
-    one_line(check(*same), CONFIG, "sync0_line: is that of slave 0 already")
+    one_line(check(*same), CONFIG, "sync0_line: is already used by slave 0")
     one_line(check("--set", "sync0.windw=1s"), CONFIG, "sync0.window")
     one_line(check("--set", "sync0.window=1h"), CONFIG, "sync0.window")
     one_line(check("--set", "sync0.enable=on"), CONFIG, "slaves[].sync0_line")

@@ -158,8 +158,8 @@ def test_commands_are_off_unless_allowed(make_bench: Callable[..., Bench]) -> No
     [
         ({"dds.interface": "ecat0"}, "is bus.interface"),
         ({"dds.interface": "nowhere0"}, "nowhere0: no such network interface"),
-        ({"dds.interface": ""}, "must be given"),
-        ({"dds.interface": 'lo"/><x'}, "is no name of a network interface"),
+        ({"dds.interface": ""}, "is required"),
+        ({"dds.interface": 'lo"/><x'}, "is not the name of a network interface"),
         ({"dds.peers": "10.0.0.1 <"}, "must be addresses"),
     ],
 )

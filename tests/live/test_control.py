@@ -122,7 +122,7 @@ def test_a_loop_without_end_ends_ecdaqd_and_the_watchdog_makes_the_outputs_safe(
     segment = in_trouble(make_segment, "loop")
     assert end_of(segment) == CONTROL_EXIT
     wait_for("LED off", lambda: terminals(segment)["led"] == 0, 60)
-    assert "control: trouble: has not come back from cycle() for" in segment.log("daemon")
+    assert "control: trouble: cycle() has not returned for" in segment.log("daemon")
     status = segment.status()
     assert status["state"] == "FAILED" and status["exit_code"] == CONTROL_EXIT
     assert status["control"]["state"] == "stuck"

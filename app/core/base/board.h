@@ -3,7 +3,7 @@
  * The command board: how output values reach the cycle. One page per writer (local, program,
  * remote), each a sequence-numbered set of values; the cycle takes the newest whole set at the
  * cycle boundary and answers with the cycle in which it went on the wire. Plain memory or a
- * shared page; one writer, one reader, nobody waits.
+ * shared page; one writer, one reader; neither side blocks.
  */
 #ifndef BASE_BOARD_H
 #define BASE_BOARD_H
@@ -42,9 +42,9 @@ struct board_set {
 void board_init(struct board *board);
 
 /**
- * A board in memory that a process that may be hostile can be given to write (@ret_fd): sealed, so
- * that nobody can shorten it and let the reader run into nothing (SIGBUS). NULL with errno. Free
- * with board_unmap() and close(). Context: blocking.
+ * A board in memory that an untrusted process may write through @ret_fd: sealed, so that nobody can
+ * truncate it and cause SIGBUS in the reader. NULL with errno. Free with board_unmap() and close().
+ * Context: blocking.
  */
 struct board *board_create_shared(int *ret_fd);
 /**
@@ -65,7 +65,7 @@ uint64_t board_commit(struct board *board);
 
 /** 1 and a copy of the newest set if newer than @set->sequence and whole; else 0. RT-safe. */
 int board_take(const struct board *board, unsigned output_count, struct board_set *set);
-/** Say that the set with @sequence goes on the wire in @cycle. Context: the cycle. */
+/** Report that the set with @sequence is sent in @cycle. Context: the cycle. */
 void board_answer(struct board *board, uint64_t sequence, uint64_t cycle);
 
 #endif

@@ -149,7 +149,7 @@ static int format_refusal(const struct event *ev, char *buf, size_t buf_len)
 			ev->arg[1], channel, reason(ev->arg[0]));
 }
 
-/* The tests ask for every event's text, so none can be forgotten behind the default. */
+/* A test formats every event, so the default cannot hide a missing one. */
 static void format_sync0_figures(const struct event *ev, char *buf, size_t buf_len)
 {
 	const int32_t *a = ev->arg;

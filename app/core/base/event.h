@@ -63,7 +63,7 @@ enum event_id {
 	EVENT_COUNT,
 };
 
-/* What ecdaqd asked of the machine and did not get (arg[0] of EVENT_RT_DEGRADED; bit in
+/* Real-time facilities that ecdaqd requested and did not get (arg[0] of EVENT_RT_DEGRADED; bit in
  * rt_degraded). */
 enum event_rt {
 	EVENT_RT_PRIORITY,    /* SCHED_FIFO */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * A histogram of ns values that never allocates: 32 buckets an octave (3 % wide), values 0 to 2^40
- * ns. One writer, any number of readers, also across processes (it stands in the status page):
+ * ns. One writer, any number of readers, also across processes (it is part of the status page):
  * every field is a relaxed atomic. Context of histogram_add(): RT-safe; of the rest: any.
  */
 #ifndef BASE_HISTOGRAM_H

@@ -18,7 +18,7 @@ struct platform {
 	/** CLOCK_TAI, ns since 1970; equals UTC where the kernel's TAI offset is unset. RT-safe. */
 	int64_t (*tai_ns)(void *ctx);
 	/**
-	 * Sleep until @deadline; returns 0 or a negative errno. An interrupted sleep goes on.
+	 * Sleep until @deadline; returns 0 or a negative errno. An interrupted sleep is resumed.
 	 * In virtual time this advances the clock to @deadline plus a seeded wake latency.
 	 */
 	int (*sleep_until)(void *ctx, mono_t deadline);

@@ -40,7 +40,7 @@ struct ring_spec {
  */
 int ring_create(const struct ring_spec *spec, struct ring **ret_ring);
 
-/** Say to readers that nothing follows. Context: any. */
+/** Mark the end of the ring: readers get nothing more. Context: any. */
 void ring_close(struct ring *ring);
 
 /** Close and unmap; the file stays for readers until the next ring_create(). NULL is fine. */
@@ -56,14 +56,14 @@ uint64_t ring_pushed(const struct ring *ring);
 enum ring_result {
 	RING_OK,    /* a slot was copied, the cursor is one further */
 	RING_EMPTY, /* nothing new yet */
-	RING_LOST,  /* the cursor was overrun: *ret_lost slots are gone, the cursor is at the oldest
+	RING_LOST,  /* the cursor was overrun: *ret_lost slots are lost, the cursor is at the oldest
 		       safe one */
 	RING_CLOSED,  /* nothing new, and nothing will follow */
 	RING_DAMAGED, /* truncated or overwritten by someone: nothing more can be read of it */
 };
 
 /**
- * Open the ring at @path for reading; the cursor stands behind the newest slot. 0, or -errno:
+ * Open the ring at @path for reading; the cursor is set after the newest slot. 0, or -errno:
  * -ENOENT no ring, -EPROTO not a ring, or another version. Free with ring_reader_destroy().
  * Context of all below: one thread at a time for each reader; they never wait.
  */
@@ -85,7 +85,7 @@ uint64_t ring_newest(struct ring_reader *reader);
 
 /** 1 if the ring is no longer the file at its path: removed, or another one took its place. */
 int ring_is_replaced(const struct ring_reader *reader);
-/** 1 if the producer's process is gone without closing the ring. */
+/** 1 if the producer's process ended without closing the ring. */
 int ring_is_orphaned(struct ring_reader *reader);
 
 /** The reader's own copy of what was checked when it opened the ring. */

@@ -5,7 +5,7 @@
  * a change of layout is a new SAMPLE_VERSION.
  *
  * Cycle k belongs to the SYNC0 edge at dc_time_ns(k) = dc_time_ns(0) + k * period_ns. There is one
- * sample for every k: a cycle that the master missed is there, too, flagged SAMPLE_SKIPPED.
+ * sample for every k: a cycle that the master missed has one, too, flagged SAMPLE_SKIPPED.
  */
 #ifndef BASE_SAMPLE_H
 #define BASE_SAMPLE_H
@@ -17,14 +17,14 @@
 
 enum sample_flag {
 	SAMPLE_LOST = 1u << 0,    /* no frame back before the receive deadline: inputs are stale */
-	SAMPLE_LATE = 1u << 1,    /* a frame of an earlier cycle came, and was thrown away */
+	SAMPLE_LATE = 1u << 1,    /* a frame of an earlier cycle arrived and was dropped */
 	SAMPLE_WKC_LOW = 1u << 2, /* fewer slaves answered than expected: see slaves_bad */
 	SAMPLE_NOT_OP = 1u << 3,  /* the bus is not in OP */
 	SAMPLE_FAIL_SAFE = 1u << 4,   /* outputs hold their fail-safe values */
 	SAMPLE_SKIPPED = 1u << 5,     /* the master overran: no frame was sent for this SYNC0 */
 	SAMPLE_BAD_COUNTER = 1u << 6, /* a slave's conversion counter did not advance as it must */
 	SAMPLE_DC_UNLOCKED = 1u << 7, /* the master's servo is not locked to the reference clock */
-	SAMPLE_DOUBLED = 1u << 8,     /* a frame came back twice; the second was thrown away */
+	SAMPLE_DOUBLED = 1u << 8,     /* a frame came back twice; the second was dropped */
 };
 
 struct sample_header {
@@ -103,7 +103,7 @@ struct sample_meta {
 	uint32_t output_bytes; /* the first of them */
 	int32_t tai_offset_s;  /* TAI - UTC of the kernel at start; 0: unset, CLOCK_TAI is UTC */
 	uint64_t period_ns;
-	uint64_t session; /* CLOCK_TAI at start: tells one run of the master from the next */
+	uint64_t session; /* CLOCK_TAI at start: identifies one run of the master */
 };
 
 static_assert(sizeof(struct sample_meta) == 40, "part of the ring's format");

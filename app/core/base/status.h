@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What ecdaqd says of itself: one page in shared memory ("status" in the run directory), written by
+ * Status of ecdaqd: one page in shared memory ("status" in the run directory), written by
  * ecdaqd, read by everyone else (reader/page.h). So `ecdaq status` works while the daemon is busy,
- * and says the last known state after it has gone. Numbers are relaxed atomics with one writer
+ * and shows the last known state after it has ended. Numbers are relaxed atomics with one writer
  * each; texts are guarded by @text_sequence (odd while being written).
  */
 #ifndef BASE_STATUS_H
@@ -39,8 +39,8 @@ struct cycle_stats {
 	_Atomic uint64_t frames_lost;    /* not back before the deadline, come later or not */
 	_Atomic uint64_t frames_late;    /* came in a later cycle, or passed the slaves outside its
 					    window: not taken */
-	_Atomic uint64_t frames_doubled; /* came a second time, thrown away */
-	_Atomic uint64_t frames_foreign; /* not ours, or damaged, thrown away */
+	_Atomic uint64_t frames_doubled; /* duplicates, dropped */
+	_Atomic uint64_t frames_foreign; /* not ours, or damaged; dropped */
 	_Atomic uint64_t wkc_low;        /* cycles with a short working counter */
 	_Atomic uint64_t overruns;       /* times the work passed one or more deadlines */
 	_Atomic uint64_t cycles_skipped; /* deadlines passed over */
@@ -68,7 +68,7 @@ enum control_state {
 	CONTROL_NONE = 0, /* no program is configured */
 	CONTROL_WAITING,  /* loaded; the bus is not in OP */
 	CONTROL_RUNNING,
-	CONTROL_SAFE,    /* runs, and has asked for fail-safe outputs */
+	CONTROL_SAFE,    /* runs, and has requested fail-safe outputs */
 	CONTROL_PARKED,  /* took too long (control.overrun fail_safe) */
 	CONTROL_STOPPED, /* took too long (control.overrun stop) */
 	CONTROL_CRASHED,
@@ -84,7 +84,7 @@ struct control_status {
 	_Atomic uint32_t reserved;
 	_Atomic uint64_t calls;
 	_Atomic uint64_t overruns;    /* calls that took longer than the budget */
-	_Atomic uint64_t safe_cycles; /* calls that asked for fail-safe outputs */
+	_Atomic uint64_t safe_cycles; /* calls that requested fail-safe outputs */
 	_Atomic uint64_t limited;     /* values set that the channel or its limits did not allow */
 	_Atomic uint64_t refused;     /* values set that were no numbers, or bits too many */
 	struct histogram time;        /* of each call */
@@ -103,16 +103,16 @@ struct slave_status {
 	_Atomic uint32_t lost_links[4];       /* 0x0310..0x0313 */
 	_Atomic uint32_t processing_errors;   /* 0x030C */
 	_Atomic uint32_t pdi_errors;          /* 0x030D */
-	_Atomic uint32_t are_errors_short;    /* 1: a counter stood at 255, there were more */
+	_Atomic uint32_t are_errors_short;    /* 1: a counter saturated at 255, the sum is low */
 	_Atomic uint32_t output_sync_type;    /* 0x1C32:01; 0: free run, or no such object */
 	_Atomic uint32_t input_sync_type;     /* 0x1C33:01 */
-	_Atomic uint32_t minimum_cycle_ns;    /* 0x1C32:05, 0x1C33:05, the larger; 0: not told */
+	_Atomic uint32_t minimum_cycle_ns;    /* 0x1C32:05, 0x1C33:05, the larger; 0: not given */
 };
 
 struct status_page {
 	uint64_t magic;
 	uint32_t bytes;        /* sizeof(struct status_page): the layout's version */
-	uint32_t is_simulated; /* the segment is ecdaq-sim, as far as the daemon was told */
+	uint32_t is_simulated; /* the segment is ecdaq-sim, as the command line states */
 	int64_t pid;
 	int64_t start_tai_ns;
 	uint64_t session; /* same as in the ring's meta */
@@ -136,7 +136,7 @@ struct status_page {
 
 #define RECORD_STATUS_MAGIC UINT64_C(0x3163657273716463) /* "cdqsrec1" */
 
-/* What ecdaq-record says of itself ("record-status" in the run directory). [recorder] */
+/* Status of ecdaq-record ("record-status" in the run directory). [recorder] */
 struct record_status {
 	uint64_t magic;
 	uint32_t bytes;
@@ -162,7 +162,7 @@ struct record_status {
 
 #define DDS_STATUS_MAGIC UINT64_C(0x3173646473716463) /* "cdqsdds1" */
 
-/* What ecdaq-dds says of itself ("dds-status" in the run directory). [publisher] */
+/* Status of ecdaq-dds ("dds-status" in the run directory). [publisher] */
 struct dds_status {
 	uint64_t magic;
 	uint32_t bytes;

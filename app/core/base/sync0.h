@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What ecdaq-sync0 says: one result a line and window in a ring of its own (kind "sync0", payload
- * struct sync0_result), one status page, and alarms as events in a ring like ecdaqd's. It never
- * claims more than it could see: a figure below the noise of the measurement is marked unresolved.
+ * Output of ecdaq-sync0: one result per line and window in a ring of its own (kind "sync0", payload
+ * struct sync0_result), one status page, and alarms as events in a ring like ecdaqd's. A figure
+ * below the noise of the measurement is marked unresolved.
  */
 #ifndef BASE_SYNC0_H
 #define BASE_SYNC0_H
@@ -15,7 +15,7 @@
 #include "histogram.h"
 #include "limits.h"
 
-/* From where the edges come; readers must say which. */
+/* Source of the edges; readers must show it. */
 enum sync0_source {
 	SYNC0_GPIO = 0,
 	SYNC0_SIMULATED, /* the edge file of ecdaq-sim: no wire, no interrupt */
@@ -26,8 +26,8 @@ enum sync0_kind { SYNC0_WINDOW = 0, SYNC0_SHOT };
 
 /* Ordered by severity: the worst check is the verdict of the line. */
 enum sync0_verdict {
-	SYNC0_NONE = 0,   /* not asked, or nothing to judge */
-	SYNC0_OK,         /* within the limit, and measured well enough to say so */
+	SYNC0_NONE = 0,   /* not enabled, or nothing to judge */
+	SYNC0_OK,         /* within the limit, and resolved by the measurement */
 	SYNC0_UNRESOLVED, /* the measurement's own noise does not allow an answer */
 	SYNC0_WARN,
 	SYNC0_FAIL,

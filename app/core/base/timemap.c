@@ -214,7 +214,7 @@ static void slew_to_fit(struct timemap *map, int64_t dc_ns, int64_t latency_ns)
 	map->state.uncertainty_ns = latency_ns + scatter_ns * 9 / 2 + magnitude(wanted_ns - utc_ns);
 }
 
-/* The clock was set: forget the window, start at the two blocks that say so. */
+/* The clock was set: discard the window, restart from the two blocks that show it. */
 static enum timemap_news take_step(struct timemap *map, struct block b, int64_t latency_ns)
 {
 	int64_t before_ns = timemap_utc_ns(map, b.dc_ns);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* How options must fit to each other. */
+/* Checks of options against each other. */
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
@@ -51,7 +51,7 @@ static int check_relations(const struct config *cfg, const struct option_lines *
 		  "must be below cycle.period" },
 		{ "control.options", "control.program",
 		  cfg->control_options[0] == '\0' || cfg->control_program[0] != '\0',
-		  "there is no control.program to tell them to" },
+		  "requires control.program" },
 		{ "sync0.window", "cycle.period",
 		  cfg->sync0_window_ns >= 100 * cfg->cycle_period_ns,
 		  "must be at least 100 times cycle.period" },
@@ -68,7 +68,7 @@ static int check_relations(const struct config *cfg, const struct option_lines *
 			  cfg->record_budget_bytes >= cfg->record_rotate_bytes,
 		  "must be 0B or at least record.rotate_size" },
 		{ "record.dir", "record.enable", !cfg->record_enable || cfg->record_dir[0] != '\0',
-		  "must be given while record.enable is on" },
+		  "is required while record.enable is on" },
 	};
 
 	for (size_t i = 0; i < sizeof(relations) / sizeof(relations[0]); i++) {
@@ -100,11 +100,11 @@ static int check_dds(const struct config *cfg, const struct option_lines *lines,
 		return 0;
 	}
 	if (cfg->dds_interface[0] == '\0') {
-		fault = "must be given while dds.enable is on";
+		fault = "is required while dds.enable is on";
 	} else if (strcmp(cfg->dds_interface, cfg->interface) == 0) {
 		fault = "is bus.interface, which is for EtherCAT alone";
 	} else if (!is_made_of(cfg->dds_interface, HOST_CHARS)) {
-		fault = "is no name of a network interface";
+		fault = "is not the name of a network interface";
 	} else if (!is_made_of(cfg->dds_peers, HOST_CHARS ",")) {
 		*ret_key = "dds.peers";
 		fault = "must be addresses or host names with commas between";
@@ -138,7 +138,7 @@ static int check_slaves(const struct config *cfg, const char **ret_key, int *ret
 		for (size_t j = 0; j < i && slave->sync0_line[0] != '\0'; j++) {
 			if (strcmp(slave->sync0_line, cfg->slave[j].sync0_line) == 0) {
 				*ret_key = "slaves[].sync0_line";
-				snprintf(reason, OPTION_WHY_BYTES, "is that of slave %zu already",
+				snprintf(reason, OPTION_WHY_BYTES, "is already used by slave %zu",
 					 j);
 				return -EINVAL;
 			}
@@ -147,7 +147,7 @@ static int check_slaves(const struct config *cfg, const char **ret_key, int *ret
 			if (strcmp(slave->name, cfg->slave[j].name) == 0) {
 				*ret_key = "slaves[].name";
 				snprintf(reason, OPTION_WHY_BYTES,
-					 "slaves %zu and %zu are both called %s", j, i,
+					 "slaves %zu and %zu have the same name %s", j, i,
 					 slave->name);
 				return -EINVAL;
 			}
@@ -166,7 +166,7 @@ static const char *output_fault(const struct config *cfg, size_t i, const char *
 	}
 	for (size_t j = 0; j < i; j++) {
 		if (strcmp(output->channel, cfg->output[j].channel) == 0) {
-			return "this channel is listed twice";
+			return "duplicate channel";
 		}
 	}
 	*ret_key = "outputs[].max";
@@ -179,7 +179,7 @@ static const char *output_fault(const struct config *cfg, size_t i, const char *
 	}
 	*ret_key = "outputs[].timeout";
 	if (output->timeout_ns != 0 && output->owner != CONFIG_OWNER_REMOTE) {
-		return "only a remote owner has one";
+		return "requires owner: remote";
 	}
 	return NULL;
 }
@@ -225,7 +225,7 @@ int option_sdo_finish(const struct option_sdo *item, struct config_sdo *ret_sdo,
 		return r;
 	}
 	if (r < 0) {
-		snprintf(reason, OPTION_WHY_BYTES, "\"%.40s\" is no %s", item->value,
+		snprintf(reason, OPTION_WHY_BYTES, "\"%.40s\" is not a valid %s", item->value,
 			 sdo_type_to_str(type));
 		return r;
 	}

@@ -76,7 +76,7 @@ struct config {
 	double cycle_phase_percent;   /* set point: frame after SYNC0, share of the period */
 	double cycle_receive_percent; /* receive deadline, share of the period */
 	int32_t cycle_cpu;            /* -1 = do not pin */
-	uint32_t cycle_priority;      /* SCHED_FIFO; 0 = do not ask for it */
+	uint32_t cycle_priority;      /* SCHED_FIFO; 0: not requested */
 	enum config_poll cycle_poll;
 	enum config_overrun cycle_overrun;
 	uint32_t cycle_lock_memory;
@@ -157,23 +157,23 @@ void config_defaults(struct config *cfg);
  * another -errno with a line. @cfg is untouched on failure. Context: blocking.
  */
 int config_load(const char *path, struct config *cfg, char *error, size_t error_bytes);
-/** The same from memory; @name stands for the file in messages. */
+/** The same from memory; messages use @name as the file's name. */
 int config_parse(const char *name, const char *text, size_t text_len, struct config *cfg,
 		 char *error, size_t error_bytes);
 /**
  * Set one option by its dotted name as the file would: "cycle.period=500us",
  * "slaves[0].mode=oneshot" (one past the last makes a new item). Same errors, without FILE:LINE.
- * How options must fit to each other is not looked at: call config_check() after the last one.
+ * Options are not checked against each other: call config_check() after the last one.
  */
 int config_set(struct config *cfg, const char *assignment, char *error, size_t error_bytes);
 /**
- * What a command line asks for: the defaults, the file @path over them (NULL: none), then
- * @set_count assignments in order, and only then the check that the options fit to each other. Same
+ * Configuration of a command line: the defaults, the file @path over them (NULL: none), then
+ * @set_count assignments in order, and only then the check of the options against each other. Same
  * errors; an error of the check names the line of the file, unless the option was set over it.
  */
 int config_assemble(const char *path, const char *const *set, size_t set_count, struct config *cfg,
 		    char *error, size_t error_bytes);
-/** Do the options fit to each other? config_load() and config_parse() have asked already. 0 or
+/** Check the options against each other; config_load() and config_parse() do so themselves. 0 or
  * -EINVAL. */
 int config_check(const struct config *cfg, char *error, size_t error_bytes);
 
@@ -189,7 +189,7 @@ enum { CONFIG_WHY_BYTES = 192 };
  */
 int config_parse_duration(const char *text, int64_t *ret_ns, char *reason);
 
-/* What stands in the run directory. */
+/* Files of the run directory. */
 #define CONFIG_RUN_SAMPLES "samples"                 /* ring of samples */
 #define CONFIG_RUN_EVENTS "events"                   /* ring of events */
 #define CONFIG_RUN_STATUS "status"                   /* struct status_page */

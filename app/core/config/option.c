@@ -106,7 +106,7 @@ static int set_value(struct config *cfg, const char *name, const char *value, ch
 		base = option == NULL ? NULL : item_at(cfg, pattern, index);
 		if (base == NULL && option != NULL) {
 			snprintf(reason, OPTION_WHY_BYTES,
-				 "item %zu would leave a hole or is beyond the limit", index);
+				 "item %zu skips an index or exceeds the limit", index);
 			return -EINVAL;
 		}
 	} else if (option != NULL && strchr(name, '[') != NULL) {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The one option table (options.c): parser, --set, sample file and reference page all come from it.
- * Defaults and bounds stand in it as a person would write them ("1ms") and go through the same
+ * Defaults and bounds are written as in the file ("1ms") and go through the same
  * parser as the file. Private to config/ and to the generator of the pages. Context: blocking.
  */
 #ifndef CONFIG_OPTION_H
@@ -30,7 +30,7 @@ struct option {
 	enum option_type type;
 	size_t offset;             /* in struct config; in a list, in its item */
 	size_t bytes;              /* of the field */
-	const char *default_value; /* NULL: must be given (in lists only) */
+	const char *default_value; /* NULL: required (in lists only) */
 	const char *min;           /* numbers: inclusive bounds; else NULL */
 	const char *max;
 	const char *unit;      /* of a plain number; "" for none */
@@ -64,7 +64,7 @@ struct option_section {
 extern const struct option_section option_sections[];
 extern const size_t option_section_count;
 
-/* What an item of slaves[].sdo[] says; becomes a struct config_sdo when it is whole. */
+/* An item of slaves[].sdo[] while it is parsed; becomes a struct config_sdo when it is whole. */
 struct option_sdo {
 	uint16_t index;
 	uint8_t subindex;
@@ -106,7 +106,8 @@ struct option_lines {
 };
 
 /**
- * Do the options fit to each other? 0, or -EINVAL with the option's name in @ret_key, the reason in
+ * Check the options against each other. 0, or -EINVAL with the option's name in @ret_key, the
+ * reason in
  * @reason and the line to blame in @ret_line (0 if none is known). @lines may be NULL.
  */
 int option_cross_check(const struct config *cfg, const struct option_lines *lines,

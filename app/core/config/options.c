@@ -498,9 +498,9 @@ const struct option option_table[] = {
 	  FIELD(dds_security),
 	  .default_value = "",
 	  .unit = "",
-	  .prose =
-		  "Folder of this participant's keys (ecdaq security init makes it): DDS Security "
-		  "is used, and commands are taken from commanders that have a key. Empty: none." },
+	  .prose = "Directory with this participant's keys, made by `ecdaq security init`: DDS "
+		   "Security is used, and commands are accepted from commanders that have a "
+		   "key. Empty: none." },
 	{ .name = "dds.ros2_mirror",
 	  .type = OPTION_SWITCH,
 	  FIELD(dds_ros2_mirror),
@@ -760,8 +760,8 @@ const struct option option_table[] = {
 	  .min = "0s",
 	  .max = "1h",
 	  .unit = "ms",
-	  .prose = "Remote owners only: after this time without a sign of life, the output "
-		   "goes to its fail-safe value. 0s: never." },
+	  .prose = "Remote owners only: after this time without a heartbeat of the "
+		   "owner, the output goes to its fail-safe value. 0s: never." },
 };
 
 const size_t option_count = sizeof(option_table) / sizeof(option_table[0]);

@@ -22,7 +22,7 @@ int main(int argc, char **argv)
 	} else if (argc == 2 && strcmp(argv[1], "--sample") == 0) {
 		pages_write_sample(stdout);
 	} else {
-		fprintf(stderr, "ecdaq-options: wants --reference or --sample\n");
+		fprintf(stderr, "ecdaq-options: expected --reference or --sample\n");
 		return 2;
 	}
 	if (fflush(stdout) != 0) {

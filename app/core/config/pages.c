@@ -46,7 +46,7 @@ static void write_range(const struct option *option, FILE *out)
 static void write_default(const struct option *option, FILE *out)
 {
 	if (option->default_value == NULL) {
-		fputs("must be given", out);
+		fputs("required", out);
 	} else if (option->default_value[0] == '\0') {
 		fputs("empty", out);
 	} else {

@@ -24,7 +24,7 @@ enum sdo_type {
 	SDO_TYPES,
 };
 
-/* All of them, as an OPTION_WORD wants it. */
+/* All of them, in the form of OPTION_WORD. */
 #define SDO_TYPE_WORDS "BOOL|SINT|INT|DINT|LINT|USINT|UINT|UDINT|ULINT|REAL|LREAL"
 
 /** The type named @name, upper or lower case; -ENOENT. */

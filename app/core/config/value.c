@@ -88,7 +88,7 @@ static int parse_text(const struct option *option, const char *text, void *base,
 	}
 	for (const char *p = text; *p != '\0'; p++) {
 		if ((unsigned char)*p < 0x20 || *p == 0x7f) {
-			snprintf(reason, OPTION_WHY_BYTES, "has a control character in it");
+			snprintf(reason, OPTION_WHY_BYTES, "contains a control character");
 			return -EINVAL;
 		}
 	}

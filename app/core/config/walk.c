@@ -6,7 +6,7 @@
 #include <string.h>
 #include <strings.h>
 
-/* Where in the file's structure a mapping stands. */
+/* Place of a mapping in the file's structure. */
 struct scope {
 	const char *pattern; /* "", "cycle.", "slaves[]." */
 	const char *shown;   /* "", "cycle.", "slaves[1]." */
@@ -53,7 +53,7 @@ static int read_scalar(struct walk *walk, const struct scope *scope, const struc
 	int *line = &walk->lines.line[option - option_table];
 
 	if (scope->base == walk->cfg && *line != 0) {
-		snprintf(reason, sizeof(reason), "is set already in line %d", *line);
+		snprintf(reason, sizeof(reason), "is already set in line %d", *line);
 		return walk_fail(walk, line_of(node), shown, reason);
 	}
 	if (node->type != YAML_SCALAR_NODE) {
@@ -66,7 +66,7 @@ static int read_scalar(struct walk *walk, const struct scope *scope, const struc
 		return walk_fail(walk, line_of(node), shown, "has no value");
 	}
 	if (strlen(text_of(node)) != node->data.scalar.length) {
-		return walk_fail(walk, line_of(node), shown, "has a control character in it");
+		return walk_fail(walk, line_of(node), shown, "contains a control character");
 	}
 	if (option_parse(option, text_of(node), scope->base, reason) < 0) {
 		return walk_fail(walk, line_of(node), shown, reason);
@@ -259,7 +259,7 @@ static int check_key(struct walk *walk, const struct scope *scope, const yaml_no
 		other = yaml_document_get_node(walk->doc, p->key);
 		if (strcmp(text_of(other), text_of(key)) == 0) {
 			snprintf(shown, sizeof(shown), "%s%.40s", scope->shown, text_of(key));
-			snprintf(reason, sizeof(reason), "is set already in line %d",
+			snprintf(reason, sizeof(reason), "is already set in line %d",
 				 line_of(other));
 			return walk_fail(walk, line_of(key), shown, reason);
 		}

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* ecdaq.yaml: from the file to a YAML document; what stands in it is walk.c's business. */
+/* ecdaq.yaml: from the file to a YAML document; walk.c reads its contents. */
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
@@ -28,7 +28,7 @@ static int fail_syntax(struct walk *walk, const yaml_parser_t *parser)
 	return walk_fail(walk, (int)parser->problem_mark.line + 1, "", why);
 }
 
-/* The first document of @parser into @walk->cfg; a second is one too many. */
+/* The first document of @parser into @walk->cfg; a second one is an error. */
 static int read_documents(struct walk *walk, yaml_parser_t *parser)
 {
 	yaml_document_t doc;
@@ -48,7 +48,7 @@ static int read_documents(struct walk *walk, yaml_parser_t *parser)
 
 			if (root != NULL) {
 				r = walk_fail(walk, (int)root->start_mark.line + 1, "",
-					      "a second document: only one is read");
+					      "more than one YAML document");
 			}
 			yaml_document_delete(&next);
 		}

@@ -13,8 +13,8 @@
 
 enum echo_index { ECHO_INDEX_SAME, ECHO_INDEX_ANY };
 
-/** 1 if @frame answers @sent (a whole, valid frame) in every datagram; @index says if index bytes
- * count. */
+/** 1 if @frame answers @sent (a whole, valid frame) in every datagram; @index: whether index bytes
+ * are compared. */
 int echo_matches(const uint8_t *sent, const uint8_t *frame, size_t frame_len,
 		 enum echo_index index);
 

@@ -47,7 +47,7 @@ static uint16_t get16(const struct pcapng *f, const uint8_t *p)
 	return (uint16_t)(f->is_swapped ? p[0] << 8 | p[1] : get_le16(p));
 }
 
-/* The section header says how its numbers are written, its own length included. */
+/* The section header defines the byte order of its numbers, its own length included. */
 static int enter_section(struct pcapng *f)
 {
 	const uint8_t *p = f->bytes + f->pos;
@@ -117,7 +117,7 @@ static int take_interface(struct pcapng *f, const uint8_t *body, size_t len)
 	return 0;
 }
 
-/* Units of the interface to ns, without overflow for anything a file may say. */
+/* Units of the interface to ns, without overflow for any value in a file. */
 static int64_t time_ns(const struct pcapng_interface *i, uint64_t units)
 {
 	unsigned exponent = i->resolution & ~(unsigned)RESOLUTION_BINARY;

@@ -22,7 +22,7 @@ enum sii_category {
 };
 
 enum sii_limits {
-	SII_CATEGORIES_BYTE = 0x80, /* where the first category header stands */
+	SII_CATEGORIES_BYTE = 0x80, /* offset of the first category header */
 	SII_LIMIT_SM = 16,
 	SII_LIMIT_FMMU = 16,
 	SII_LIMIT_PDO = 128,
@@ -106,7 +106,7 @@ int sii_find_category(const uint8_t *image, size_t image_bytes, uint16_t wanted,
 
 /**
  * Parse an image. 0; -EBADMSG with one line in @error if it is too short, blank, or a category is
- * damaged. On failure @ret holds what stood before the damage.
+ * damaged. On failure @ret holds what precedes the damage.
  */
 int sii_parse(const uint8_t *image, size_t image_bytes, struct sii *ret, char *error,
 	      size_t error_bytes);
@@ -116,7 +116,7 @@ int sii_parse(const uint8_t *image, size_t image_bytes, struct sii *ret, char *e
 void sii_text(const uint8_t *image, size_t image_bytes, unsigned number,
 	      char ret_text[SII_NAME_BYTES]);
 
-/** CRC-8 over words 0 to 6, which stands in word 7 (ETG.2010). */
+/** CRC-8 over words 0 to 6, which is stored in word 7 (ETG.2010). */
 uint8_t sii_checksum(const uint8_t *image);
 
 #endif

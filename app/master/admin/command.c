@@ -136,7 +136,7 @@ static int find_oneshot(const struct admin_target *t, uint16_t slave_pos)
 	return -ENOENT;
 }
 
-/* The absolute time asked for, if it can still be reached; else the refusal. */
+/* The requested absolute time, if it can still be reached; else the refusal. */
 static int oneshot_time(const struct admin_target *t, const struct admin_request *rq,
 			int64_t *ret_time_ns, struct admin_reply *reply)
 {

@@ -18,7 +18,7 @@
 
 /* A one-shot time must be so many periods ahead: the value travels in the next frames first. */
 enum { ADMIN_ONESHOT_MARGIN_CYCLES = 5 };
-/* Nor further away than this: more likely a slip of the pen than a wish. */
+/* Latest time of a one-shot from now: a later one is probably a typing error. */
 #define ADMIN_ONESHOT_AHEAD_NS (3600 * NS_PER_S)
 
 /* What the commands work on. All of it belongs to the session; it may change between two requests.
@@ -57,7 +57,7 @@ int admin_request_parse(const void *message, size_t len, struct admin_request *r
 			char *why);
 
 /**
- * Do what a parsed @request of user @uid asks for. @reply is filled; with ADMIN_DEFERRED, the
+ * Execute a parsed @request of user @uid. @reply is filled; with ADMIN_DEFERRED, the
  * board's set *ret_sequence must be on the wire before it is sent (admin_reply_finish()). Context:
  * service thread; SDO requests block.
  */

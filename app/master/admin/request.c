@@ -64,7 +64,7 @@ static int check_verb(const struct admin_request *rq, char *why)
 		return check_items(rq, why);
 	case ADMIN_ONESHOT:
 		if (rq->is_relative > 1) {
-			return refuse(why, -EINVAL, "is_relative is neither 0 nor 1");
+			return refuse(why, -EINVAL, "is_relative must be 0 or 1");
 		}
 		return rq->slave_pos == ADMIN_ALL_SLAVES ? 0 : check_slave(rq, why);
 	case ADMIN_SDO_READ:

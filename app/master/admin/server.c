@@ -41,7 +41,7 @@ static int fail(char *error, size_t error_bytes, const char *path, int r)
 	return r;
 }
 
-/* Mode and group stand before anybody can connect: the socket gets its name last. */
+/* Mode and group are set before anyone can connect: the socket is renamed last. */
 static int name_it(const struct listener *listener, gid_t group)
 {
 	struct sockaddr_un address = { .sun_family = AF_UNIX };
@@ -92,7 +92,7 @@ static int listen_at(struct listener *listener, const char *path, gid_t group, i
 		r = listener->fd < 0 ? -errno : name_it(listener, group);
 	}
 	if (r < 0) {
-		listener->path[0] = '\0'; /* nothing of ours stands there */
+		listener->path[0] = '\0'; /* nothing of ours to unlink */
 	} else if (epoll_ctl(poller, EPOLL_CTL_ADD, listener->fd, &interest) < 0) {
 		r = -errno;
 	}
@@ -167,7 +167,7 @@ int admin_server_fd(const struct admin_server *server)
 
 static void client_send(struct client *client)
 {
-	/* A client that does not read its reply, or has gone, is closed: nobody waits for it. */
+	/* A client that does not read its reply, or has disconnected, is closed without waiting. */
 	if (send(client->fd, &client->reply, sizeof(client->reply), MSG_NOSIGNAL | MSG_DONTWAIT) !=
 	    (ssize_t)sizeof(client->reply)) {
 		client_close(client);
@@ -233,7 +233,7 @@ static void handle(struct client *client, const struct admin_target *target, con
 		client->reply = (struct admin_reply){ .magic = ADMIN_MAGIC };
 		admin_reply_refuse(&client->reply, r, "%s", why);
 		client_send(client);
-		/* What speaks another language is not listened to any longer. */
+		/* A client that violates the protocol is disconnected. */
 		if (r != -EINVAL && client->fd >= 0) {
 			client_close(client);
 		}
@@ -279,7 +279,7 @@ static void answer_due(struct client *client, const struct admin_target *target,
 	}
 }
 
-/* One byte, for the descriptor to travel with; nothing is read and nobody is waited for. */
+/* One byte to carry the descriptor; reads nothing, never blocks. */
 static void give_board(int to, int board_fd)
 {
 	char byte = 0;

@@ -58,7 +58,8 @@ int bus_sync0_start(struct bus *bus, int64_t dc_now_ns, char *error);
 /** All slaves to @state (SAFE-OP, OP, PRE-OP, INIT), with AL errors named by slave, code and text.
  */
 int bus_request_state(struct bus *bus, enum al_state state, span_t timeout, char *error);
-/** SYNC0 off, all to INIT; goes on over errors. The cycle has put outputs to fail-safe before. */
+/** SYNC0 off, all to INIT; continues after errors. The cycle must have set the outputs to
+ * fail-safe. */
 int bus_stop(struct bus *bus, char *error);
 
 /* --- in OP, a few times a second --- */
@@ -73,7 +74,7 @@ struct bus_watch_report {
 
 /**
  * Read AL state, error counters, DC difference of every slave into @page (its slave[] entries),
- * emit events through @emit, and say in @ret_report what was found. It changes nothing on the bus.
+ * emit events through @emit, and fill @ret_report. It changes nothing on the bus.
  */
 int bus_watch(struct bus *bus, struct status_page *page,
 	      void (*emit)(void *ctx, const struct event *ev), void *emit_ctx,

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What the files of bus/ share: the bus, its slaves, and the way to say what went wrong. Positions
+ * What the files of bus/ share: the bus, its slaves, and the error functions. Positions
  * are 0-based everywhere but in SOEM's calls, which take soem_index(pos). Context: service thread.
  */
 #ifndef BUS_INTERNAL_H
@@ -48,7 +48,7 @@ enum recovery_step {
 	RECOVERY_OP,
 };
 
-/* What 0x1C32 or 0x1C33 says; 0: nothing. */
+/* Contents of 0x1C32 or 0x1C33; 0: not given. */
 struct sync_limits {
 	uint16_t type; /* 0 free run, 1 SM event, 2 SYNC0, 3 SYNC1, 0x22 SM event of the other */
 	uint32_t minimum_cycle_ns;
@@ -107,7 +107,7 @@ struct bus {
 	int64_t reference_ns; /* its time as last read, and when */
 	mono_t reference_at;
 	int64_t sync0_start_ns; /* common grid; 0: SYNC0 was not started */
-	enum al_state target;   /* newest state asked for */
+	enum al_state target;   /* state requested last */
 	size_t next_recovery;   /* whose turn it is first */
 	/* SOEM */
 	ecx_contextt context;
@@ -170,7 +170,7 @@ void bus_publish_slaves(struct bus *bus);
 /** Read SM types, PDO assignment and mapping by CoE. Entries found, 0 if there are no such objects,
  * -errno with a line. */
 int bus_coe_entries(struct bus *bus, size_t pos, struct pdo_entry *ret, size_t capacity);
-/** Give entries without name or type what the object dictionary says (SDO information). */
+/** Complete entries without name or type from the object dictionary (SDO information). */
 void bus_coe_names(struct bus *bus, size_t pos, struct pdo_entry *entry, size_t count);
 
 /* --- mailbox.c --- */
@@ -181,13 +181,13 @@ int bus_sdo_value(struct bus *bus, size_t pos, uint16_t index, uint8_t subindex,
 		  uint64_t *ret_value, uint32_t *ret_abort);
 /** Mode and configured start-up SDOs of one slave, in PRE-OP. */
 int bus_startup_sdos(struct bus *bus, size_t pos);
-/** Take what lies in the mailbox of a slave unasked: emergencies. */
+/** Read unsolicited messages from a slave's mailbox: emergencies. */
 void bus_read_mail(struct bus *bus, size_t pos);
 
 /* --- map_sm.c --- */
 
-/** Tell SOEM the SyncManagers and bits of a slave's entries; *total_bytes counts the image. 0 or
- * -errno with a line. */
+/** Set SOEM's SyncManagers and bit counts from a slave's entries; *total_bytes counts the image. 0
+ * or -errno with a line. */
 int bus_map_sm(struct bus *bus, size_t pos, uint32_t *total_bytes);
 
 /* --- sync_limits.c --- */

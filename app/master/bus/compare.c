@@ -88,7 +88,7 @@ int compare_slaves(const struct config *cfg, const struct slave_info *found, siz
 			return -ENXIO;
 		}
 		if (!is_wanted(want, &found[i])) {
-			append(&text, "slave %zu is another one: expected ", i);
+			append(&text, "slave %zu: wrong identity: expected ", i);
 			append_wanted(&text, want);
 			append(&text, ", found ");
 			append_found(&text, &found[i], want->alias != 0);
@@ -96,7 +96,7 @@ int compare_slaves(const struct config *cfg, const struct slave_info *found, siz
 		}
 	}
 	if (cfg->bus_presence == CONFIG_EXACT_SLAVES && found_count > cfg->slave_count) {
-		append(&text, "slave %zu is one too many: %zu found, %zu expected; found ",
+		append(&text, "slave %zu is unexpected: %zu found, %zu expected; found ",
 		       cfg->slave_count, found_count, cfg->slave_count);
 		append_found(&text, &found[cfg->slave_count], 0);
 		return -ENXIO;

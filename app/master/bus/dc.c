@@ -28,7 +28,7 @@ static int is_follower(const struct bus *bus, size_t pos)
 
 /* --- clear, latch, read --- */
 
-/* WKC 0 is news only where a slave has a system time: the broadcasts reach whoever has the
+/* WKC 0 is an error only where a slave has a system time: the broadcasts reach all that have the
  * register. */
 static int clear_clocks(struct bus *bus)
 {

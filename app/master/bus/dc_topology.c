@@ -18,7 +18,7 @@ static int has_port(const struct dc_node *n, uint8_t port)
 	return (n->ports >> port & 1) != 0;
 }
 
-/* @a before @b on a clock of 32 bits that wraps; both lie within two seconds. */
+/* @a before @b on a clock of 32 bits that wraps; both are within two seconds. */
 static int is_earlier(uint32_t a, uint32_t b)
 {
 	return (int32_t)(a - b) < 0;
@@ -76,7 +76,7 @@ static uint8_t previous_port(const struct dc_node *n, uint8_t port)
 	return at;
 }
 
-/* Each slave stands behind the last one before it that still has an open port to give. */
+/* The parent of a slave is the last one before it that still has a free open port. */
 static int find_parents(struct dc_node *node, size_t count)
 {
 	int stack[LIMIT_SLAVES];

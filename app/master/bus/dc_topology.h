@@ -2,7 +2,7 @@
 /*
  * Propagation delays from what the slaves latched: which ports are open, and when the latching
  * frame passed each. Pure. Times are unsigned 32 bit and may wrap between ports (T13); slaves
- * without receive times may stand anywhere (T14).
+ * without receive times may be anywhere (T14).
  */
 #ifndef BUS_DC_TOPOLOGY_H
 #define BUS_DC_TOPOLOGY_H

@@ -2,8 +2,8 @@
 /*
  * The error counters of a slave's chip, 0x0300 to 0x0313, as sums (T28). A counter is 8 bits wide
  * and stops at 255 (ET1100 data sheet, registers 0x0300 to 0x0313), so it is cleared by a write
- * before it stands there, and what is shown is the sum of what it counted up. What a slave counted
- * before the first look is in the sum, too.
+ * before it saturates, and the sum of its increments is shown. What a slave counted before the
+ * first read is in the sum, too.
  */
 #ifndef BUS_ERROR_COUNTERS_H
 #define BUS_ERROR_COUNTERS_H
@@ -17,7 +17,7 @@ enum {
 	ERROR_PORT_BYTES = 14,           /* 0x0300: 8 receive, 4 forwarded, processing, PDI */
 	ERROR_LINK_BYTES = ESC_PORTS,    /* 0x0310 */
 	ERROR_CLEAR_AT = 0x80,           /* half way */
-	ERROR_FORWARDED = 2 * ESC_PORTS, /* where they stand in the first group */
+	ERROR_FORWARDED = 2 * ESC_PORTS, /* offset in the first group */
 	ERROR_PROCESSING = 3 * ESC_PORTS,
 	ERROR_PDI,
 	ERROR_LINKS = ERROR_PORT_BYTES, /* the second group, behind it */
@@ -27,12 +27,12 @@ enum {
 struct error_counters {
 	uint8_t seen[ERROR_COUNTERS]; /* in the chip, at the last look */
 	uint32_t sum[ERROR_COUNTERS];
-	int is_short; /* a counter stood at 255: there were more than its sum says */
+	int is_short; /* a counter was saturated at 255: its sum is too low */
 };
 
 /**
  * Counters @first to @first + @count - 1 read @raw now. A counter that went down was cleared or
- * lost its power in between. Returns 1 if one of them wants to be cleared.
+ * lost its power in between. Returns 1 if one of them should be cleared.
  */
 int error_counters_take(struct error_counters *ec, unsigned first, const uint8_t *raw,
 			unsigned count);

@@ -11,8 +11,7 @@
 #include "bus/exchange_frame.h"
 
 enum {
-	HISTORY = 256, /* exchanges whose frames are remembered, to tell a late one from a doubled
-			  one */
+	HISTORY = 256, /* exchanges whose frames are kept, to tell a late frame from a duplicate */
 	DC_DIFF_MAGNITUDE = 0x7fffffff,
 };
 
@@ -254,8 +253,8 @@ static int take_frame(struct exchange *ex, size_t len, mono_t at)
 
 /*
  * The transport hands out what waits in its queue even past the deadline: a frame that waited
- * there while this thread did not run is not lost. So one that nobody waits for must end the
- * wait, or a flood of them would hold the cycle for ever.
+ * there while this thread did not run is not lost. So an unexpected frame must end the wait, or a
+ * flood of them would block the cycle for ever.
  */
 static int receive_one(struct exchange *ex, mono_t deadline)
 {
@@ -269,7 +268,7 @@ static int receive_one(struct exchange *ex, mono_t deadline)
 	return take_frame(ex, (size_t)r, at) || at.ns < deadline.ns ? 0 : -EAGAIN;
 }
 
-/* What a ride or an earlier receive met stays counted; the rest starts anew. */
+/* Counts of a ride or an earlier receive are kept; the rest is reset. */
 static void begin_result(struct exchange *ex)
 {
 	ex->result = (struct exchange_result){

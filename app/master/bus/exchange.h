@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The cyclic exchange: our own frames, made once, sent every cycle. The first frame carries LRW (of
- * the first part of the process image), FRMW of 0x0910, and, if wanted, BRD of 0x0130 and of
+ * the first part of the process image), FRMW of 0x0910, and, if configured, BRD of 0x0130 and of
  * 0x092C; further frames carry the rest of the image. A SyncManager's buffer is never split (T41).
  * Every datagram's echo is checked (command, index, address, length, and that a slave marked the
  * source address); its index bytes carry a 16-bit exchange sequence, so that a late or doubled
- * frame is recognised, counted and never taken (T05, T06). The reference clock is asked by FPRD
- * instead of FRMW in the first cycle and while it is gone (T17, bus/exchange_dc.h).
+ * frame is recognised, counted and dropped (T05, T06). The reference clock is read with FPRD
+ * instead of FRMW in the first cycle and while it does not answer (T17, bus/exchange_dc.h).
  */
 #ifndef BUS_EXCHANGE_H
 #define BUS_EXCHANGE_H
@@ -36,7 +36,7 @@ struct exchange_result {
 	int64_t dc_diff_ns; /* all slaves' |0x092C| ORed: an upper estimate; -1: not read */
 	mono_t sent;        /* when the first frame was handed to the NIC */
 	span_t round_trip;  /* first frame out to last frame back; -1 ns: not back */
-	unsigned late;      /* frames of earlier cycles thrown away in this one */
+	unsigned late;      /* frames of earlier cycles dropped in this one */
 	unsigned late_by;   /* cycles, of the latest of them */
 	unsigned doubled;
 	unsigned foreign;

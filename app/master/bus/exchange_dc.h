@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * What the cyclic frame does with the reference clock. Normally FRMW reads its time and writes it
- * to the slaves behind. When the reference is gone, an FRMW would write the master's own payload
- * into all others (T17): then the frame only asks (FPRD), until the reference answers with a
- * plausible time. Context: cycle thread.
+ * to the slaves behind. While the reference does not answer, an FRMW would write the master's own
+ * payload into all others (T17): then the frame only reads (FPRD), until the reference answers with
+ * a plausible time. Context: cycle thread.
  */
 #ifndef BUS_EXCHANGE_DC_H
 #define BUS_EXCHANGE_DC_H
@@ -25,8 +25,7 @@ struct dc_track {
 /** The command for the next frame (enum ecat_cmd), and its payload in *ret_payload_ns. */
 uint8_t dc_track_command(struct dc_track *track, mono_t at, int64_t *ret_payload_ns);
 
-/** The answer to that: DC time of the reference at the frame, 0 if it is not there or not to be
- * believed. */
+/** The answer to that: DC time of the reference at the frame, 0 if it is missing or implausible. */
 int64_t dc_track_answer(struct dc_track *track, uint8_t cmd, uint16_t wkc, int64_t time_ns,
 			mono_t sent);
 

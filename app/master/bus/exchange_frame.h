@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The cyclic frames as buffers that are built once: where their datagrams stand, how a cycle writes
- * its sequence into them, how a returned frame is told to be theirs. Context: cycle thread, but for
+ * The cyclic frames as buffers that are built once: offsets of their datagrams, the sequence
+ * written in each cycle, the match of a returned frame. Context: cycle thread, but for
  * exchange_frame_build().
  */
 #ifndef BUS_EXCHANGE_FRAME_H

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * SDO transfers on SOEM's mailbox. A mailbox write is sent once only (link/nicdrv.c), so a lost one
- * is mended here: the whole transfer is tried again with a new counter, after the mailbox has been
+ * is recovered here: the whole transfer is retried with a new counter after the mailbox has been
  * emptied (T42).
  */
 #include <errno.h>
@@ -40,7 +40,7 @@ static void tell_emergency(struct bus *bus, const ec_errort *note)
 
 /*
  * What SOEM noted about the transfer that failed: -EREMOTEIO abort, -EMSGSIZE, -ETIMEDOUT nothing.
- * An emergency that came meanwhile is told, whose ever it is (T30).
+ * An emergency of any slave that came meanwhile is reported (T30).
  */
 static int take_errors(struct bus *bus, uint16_t index, uint32_t *ret_abort)
 {
@@ -72,7 +72,7 @@ static int check_request(const struct bus *bus, size_t pos)
 	return bus->slave[pos].is_lost ? -EIO : 0;
 }
 
-/* While the bus mends itself, a dead mailbox must not hold up the rest. */
+/* During recovery a dead mailbox must not delay the other slaves. */
 static int timeout_us(const struct bus *bus, size_t pos)
 {
 	return bus->slave[pos].step != RECOVERY_NONE ? FAST_US : EC_TIMEOUTRXM;
@@ -119,7 +119,7 @@ static int read_sdo(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t
 	return r;
 }
 
-/* NOLINTNEXTLINE(readability-function-size): the promise of bus.h */
+/* NOLINTNEXTLINE(readability-function-size): the interface of bus.h */
 int bus_sdo_read(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t subindex,
 		 uint8_t *ret_data, size_t *len, uint32_t *ret_abort)
 {
@@ -131,7 +131,7 @@ int bus_sdo_read(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t su
 	return r;
 }
 
-/* NOLINTNEXTLINE(readability-function-size): the promise of bus.h */
+/* NOLINTNEXTLINE(readability-function-size): the interface of bus.h */
 int bus_sdo_write(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t subindex,
 		  const uint8_t *data, size_t len, uint32_t *ret_abort)
 {
@@ -163,7 +163,7 @@ void bus_read_mail(struct bus *bus, size_t pos)
 	ec_mbxbuft mail = { 0 };
 	uint32_t abort;
 
-	/* An answer that nobody waits for any more is thrown away with it. */
+	/* A stale answer is dropped with it. */
 	ecx_mbxreceive(&bus->context, soem_index(pos), &mail, 0);
 	take_errors(bus, 0, &abort);
 }

@@ -31,7 +31,7 @@ static uint32_t bytes_of(uint32_t bits)
 
 /* --- what the slave maps --- */
 
-/* CoE tells index and length; the SII often knows the name and type. */
+/* CoE gives index and length; the SII often has the name and type. */
 static void borrow_names(struct pdo_entry *entry, size_t count, const struct pdo_entry *sii,
 			 size_t sii_count)
 {
@@ -107,7 +107,7 @@ static int check_mapped(struct bus *bus, size_t pos)
 	return 0;
 }
 
-/* The image while it is laid out. */
+/* The image while it is built. */
 struct layout {
 	const uint8_t *image; /* what SOEM's places count from */
 	struct plan_area area[PLAN_AREAS];
@@ -182,7 +182,7 @@ static int build_plan(struct bus *bus, const struct plan_area *area, size_t area
 		.slave_count = (uint16_t)bus->slave_count,
 		.is_split = bus->cfg->bus_datagrams == CONFIG_DATAGRAMS_PER_SLAVE,
 		.monitor = (int)bus->cfg->bus_monitor,
-		/* room for FRMW is left in any case; bus_dc_setup() says whose time it is */
+		/* room for FRMW is always reserved; bus_dc_setup() sets its slave */
 		.dc_reference = UINT16_MAX,
 	};
 	if (plan_chunks(&bus->plan, area, area_count, &blocked) < 0) {
@@ -204,8 +204,8 @@ static int build_plan(struct bus *bus, const struct plan_area *area, size_t area
 
 /* --- watchdog --- */
 
-/* A slave without the register keeps what it has; one that takes another value than asked is an
- * error (T08). */
+/* A slave without the register keeps what it has; one that stores another value than the one
+ * written is an error (T08). */
 static int set_watchdog(struct bus *bus, size_t pos)
 {
 	int64_t time = (bus->cfg->bus_watchdog_ns + WATCHDOG_UNIT_NS - 1) / WATCHDOG_UNIT_NS;

@@ -75,8 +75,7 @@ static int check_room(struct bus *bus, size_t pos, unsigned n, uint32_t bytes)
 	return 0;
 }
 
-/* A slave whose mapping is fixed says twice how long it is: in its SII and in its object
- * dictionary. */
+/* A slave with a fixed mapping gives its length twice: in its SII and in its object dictionary. */
 static int check_fixed(struct bus *bus, size_t pos, unsigned n, uint32_t bytes)
 {
 	const ec_slavet *soem = &bus->soem_slave[soem_index(pos)];

@@ -59,7 +59,7 @@ void name_slave(const char *device, int is_piccolo, size_t pos, char *ret_name, 
 		 base[len - 1] >= '0' && base[len - 1] <= '9' ? "_" : "", pos);
 }
 
-/* How often entry @i's name stands among the names of those that get a channel. */
+/* How often entry @i's name occurs among the entries that get a channel. */
 static int is_shared(const struct pdo_entry *entry, size_t count, char (*name)[PDO_NAME_BYTES],
 		     size_t i)
 {
@@ -94,7 +94,7 @@ static void name_with_pdo(const struct pdo_entry *e, char *name)
 
 /*
  * Modular devices (ETG.5001) number their modules' objects in steps of 0x10 from 0x6000 and 0x7000,
- * and often give their PDOs no names: the place of the module stands for that.
+ * and often give their PDOs no names: the place of the module is used instead.
  */
 static void name_with_slot(const struct pdo_entry *e, char *name)
 {

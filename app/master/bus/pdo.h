@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* One mapped entry of a PDO, as CoE or SII tells it. */
+/* One mapped entry of a PDO, read from CoE or SII. */
 #ifndef BUS_PDO_H
 #define BUS_PDO_H
 
@@ -16,7 +16,7 @@ struct pdo_entry {
 	uint8_t sm; /* SyncManager */
 	uint8_t bit_len;
 	uint8_t is_output;  /* from the master's side */
-	uint16_t data_type; /* CoE number, 0: not told */
+	uint16_t data_type; /* CoE number, 0: not given */
 	char name[PDO_NAME_BYTES];
 	char pdo_name[PDO_NAME_BYTES];
 };

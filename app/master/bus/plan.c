@@ -51,8 +51,8 @@ static uint16_t expected_wkc(const struct plan_area *area, size_t count, uint32_
 }
 
 /*
- * The end of what begins at @from and should be in one chunk: the areas of one slave that lie
- * together, and whatever shares a byte with them.
+ * The end of what begins at @from and should be in one chunk: the contiguous areas of one slave,
+ * and whatever shares a byte with them.
  */
 static uint32_t group_end(const struct plan_area *area, size_t count, uint32_t from, uint32_t bytes)
 {
@@ -74,7 +74,7 @@ static uint32_t group_end(const struct plan_area *area, size_t count, uint32_t f
 			i++;
 		}
 	}
-	/* Bytes that are nobody's go with those before them. */
+	/* Bytes without an owner go with those before them. */
 	for (i = 0; i < count; i++) {
 		if (area[i].start >= end && area[i].start > from && area[i].start < next) {
 			next = area[i].start;

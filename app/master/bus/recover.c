@@ -51,7 +51,7 @@ static void ask(struct bus *bus, size_t pos, unsigned control)
 
 /* --- finding --- */
 
-/* Where the slave stands now: every lost one before it takes no place. */
+/* Present position of the slave: lost ones before it do not count. */
 static uint16_t auto_increment_address(const struct bus *bus, size_t pos)
 {
 	uint16_t before = 0;
@@ -62,7 +62,8 @@ static uint16_t auto_increment_address(const struct bus *bus, size_t pos)
 	return (uint16_t)-before;
 }
 
-/* Behind a lost slave nothing can be told, and of two lost ones of a kind the first comes first. */
+/* Behind a lost slave nothing can be identified; of two lost ones of a kind the first is restored
+ * first. */
 static int is_place_certain(const struct bus *bus, size_t pos)
 {
 	const struct slave_info *info = &bus->slave[pos].info;
@@ -155,7 +156,7 @@ static void to_init(struct bus *bus, size_t pos)
 	enter(bus, pos, RECOVERY_PREOP);
 }
 
-/* Ask for @state until the slave is there, then go on with @next. */
+/* Request @state until the slave is in it, then continue with @next. */
 static void to_state(struct bus *bus, size_t pos, enum al_state state, enum recovery_step next)
 {
 	const struct bus_slave *sl = &bus->slave[pos];

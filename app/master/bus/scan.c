@@ -161,7 +161,7 @@ static void take_clock(struct bus *bus, size_t pos)
 	register_read(bus, pos, ESC_REG_FEATURES, features, sizeof(features));
 	sl->esc_features = get_le16(features);
 	sl->is_clock_64bit = (sl->esc_features & FEATURE_DC_64BIT) != 0;
-	/* The feature bit alone does not tell who has a system time: ask for it. */
+	/* The feature bit does not show whether there is a system time: read it. */
 	if ((sl->esc_features & FEATURE_DC) == 0 ||
 	    register_read(bus, pos, ESC_REG_DC_RECEIVE_TIME_PORT, times, sizeof(times)) < 0) {
 		sl->clock.kind = CLOCK_NONE;
@@ -174,7 +174,7 @@ static void take_clock(struct bus *bus, size_t pos)
 	sl->info.has_dc = sl->clock.kind == CLOCK_SYSTEM_TIME;
 }
 
-/* What the configuration says of the slave at its position. */
+/* The configuration of the slave at its position. */
 static void take_settings(struct bus *bus, size_t pos)
 {
 	struct bus_slave *sl = &bus->slave[pos];
@@ -200,7 +200,7 @@ static int describe(struct bus *bus, size_t pos)
 	if (r < 0) {
 		return bus_fail_slave(bus, pos, r, "its EEPROM cannot be read");
 	}
-	/* Damage is told where it matters: when the mapping is read. */
+	/* Damage is reported when the mapping is read, where it matters. */
 	sii_parse(sl->sii, sl->sii_len, &bus->parsed, why, sizeof(why));
 	name_device(bus, pos);
 	sl->assign_activate = choose_assign_activate(bus, pos);

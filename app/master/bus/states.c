@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * AL states: ask all slaves, wait while the cycle goes on, and say who refused and why. States are
- * never compared by what a broadcast ORs together.
+ * AL states: request them of all slaves, wait while the cycle runs, and report who refused and why.
+ * States are never compared by what a broadcast ORs together.
  */
 #include <errno.h>
 
@@ -28,7 +28,7 @@ static uint16_t code_of(const struct al_reading *al)
 
 /*
  * AL control is a mailbox, too: a slave that has not looked at the last request yet does not take
- * another (WKC 0). Write to those that have not taken @state; @taken says who has.
+ * another (WKC 0). Write to those that have not taken @state; @taken marks the others.
  */
 static int write_control(struct bus *bus, enum al_state state, uint8_t *taken)
 {
@@ -192,7 +192,7 @@ int bus_request_state(struct bus *bus, enum al_state state, span_t timeout, char
 	return wait_for(bus, state, give_up);
 }
 
-/* A step down that goes on over errors: the first one is kept. */
+/* A step down that continues after errors and keeps the first one. */
 static int step_down(struct bus *bus, enum al_state state, int before, char *error)
 {
 	char later[BUS_ERROR_BYTES];

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * SYNC0 of all slaves on one grid: multiples of the cycle period in DC time, plus each slave's
- * shift. A start that lies in the past never fires; so it is verified in the slave, and tried again
+ * shift. A start time in the past never fires; so it is verified in the slave and retried
  * (T10).
  */
 #include <errno.h>
@@ -79,7 +79,7 @@ static int program(struct bus *bus, size_t pos, int64_t start_ns)
 	put_le64(start, (uint64_t)(start_ns + shift_of(bus, pos)));
 	put_le32(cycle, (uint32_t)period_ns(bus));
 	put_le32(cycle + 4, SYNC1_CYCLE_NONE);
-	/* T12: 0x0980 is left alone where it says what it must. */
+	/* T12: 0x0980 is not written where it has the required value. */
 	if (r >= 0 && register_read(bus, pos, ESC_REG_DC_CYCLIC_CONTROL, &owner, 1) == 0 &&
 	    owner != control) {
 		r = register_write(bus, pos, ESC_REG_DC_CYCLIC_CONTROL, &control, 1);
@@ -97,7 +97,7 @@ static int program(struct bus *bus, size_t pos, int64_t start_ns)
 	return r;
 }
 
-/* The next SYNC0 must lie within one period (and some), on the grid. */
+/* The next SYNC0 must be within one period (plus a margin), on the grid. */
 static int is_next_plausible(const struct bus *bus, size_t pos, int64_t next_ns, int64_t now_ns)
 {
 	int64_t off_ns = fold_ns(next_ns - shift_of(bus, pos), period_ns(bus));
@@ -191,7 +191,7 @@ static int wait_past(struct bus *bus, int64_t start_ns)
 	}
 }
 
-/* Those that run are done: what is left in @wanted has to be started again. Returns how many. */
+/* Clear those that run: the ones left in @wanted have to be started again. Returns their count. */
 static int verify_all(struct bus *bus, uint8_t *wanted)
 {
 	int left = 0;

@@ -109,8 +109,8 @@ static void note_presence(struct bus *bus, size_t pos, int is_here, const struct
 	}
 }
 
-/* Counters that have come far start anew: read, cleared and read in one frame, so nothing that is
- * counted meanwhile is left out, and it does not matter which of them a chip clears. */
+/* Clear counters before they saturate: read, cleared and read in one frame, so no count in between
+ * is lost, and it does not matter which of them a chip clears. */
 static void clear_errors(struct bus *bus, size_t pos)
 {
 	struct error_counters *ec = &bus->slave[pos].errors;
@@ -162,7 +162,7 @@ static void count_errors(struct bus *bus, size_t pos, const struct look *look)
 	}
 }
 
-/* Nobody asked, for requests are answered one at a time: a slave has something to say. */
+/* No request is pending, for they are answered one at a time: the message is unsolicited. */
 static int has_mail(const struct bus *bus, size_t pos, const struct look *look)
 {
 	const struct bus_slave *sl = &bus->slave[pos];
@@ -202,7 +202,8 @@ static void show(const struct bus_slave *sl, const struct look *look, struct sla
 		memory_order_relaxed);
 }
 
-/* One that is about to be led through INIT is in OP no more, though it still says so. */
+/* A slave about to be restarted through INIT does not count as in OP, though its AL status shows
+ * OP. */
 static int is_to_leave_op(const struct bus_slave *sl)
 {
 	return sl->step >= RECOVERY_INIT && sl->step <= RECOVERY_CLOCK;

@@ -39,7 +39,7 @@ static int add_argument(struct arguments *arguments, char *text, char *reason, s
 	}
 	for (size_t i = 0; i < arguments->count; i++) {
 		if (strcmp(arguments->item[i].key, key) == 0) {
-			snprintf(reason, reason_bytes, "%.40s is given twice", key);
+			snprintf(reason, reason_bytes, "%.40s: duplicate key", key);
 			return -EINVAL;
 		}
 	}

@@ -24,9 +24,9 @@ struct arguments {
 /** 0, or -EINVAL or -E2BIG with the reason in @reason. */
 int arguments_parse(struct arguments *arguments, const char *text, char *reason,
 		    size_t reason_bytes);
-/** The value of @key, which counts as asked for; NULL: not given. */
+/** The value of @key, which is marked as used; NULL: not given. */
 const char *arguments_get(struct arguments *arguments, const char *key);
-/** A key that nobody has asked for; NULL: none. */
+/** A key that was never read; NULL: none. */
 const char *arguments_unused(const struct arguments *arguments);
 
 #endif

@@ -29,8 +29,7 @@ static int find(void *host, const char *name, int is_output, uint32_t *ret_index
 	int n = image_channel_find(ctl->spec.channels, ctl->spec.channel_count, name);
 
 	if (n < 0) {
-		return trouble(ctl, -ENOENT, name,
-			       "there is no such channel (`ecdaq channels` lists them)");
+		return trouble(ctl, -ENOENT, name, "no such channel (see `ecdaq channels`)");
 	}
 	if (is_output && ctl->output_of[n] < 0) {
 		return trouble(ctl, -EROFS, name, "is an input and cannot be written");
@@ -70,7 +69,7 @@ static int option_number(void *host, const char *key, double *ret_value)
 	}
 	value = strtod(text, &end);
 	if (end == text || *end != '\0' || !isfinite(value)) {
-		return trouble(ctl, -EINVAL, key, "the value in control.options is no number");
+		return trouble(ctl, -EINVAL, key, "the value in control.options is not a number");
 	}
 	*ret_value = value;
 	return 0;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Control programs: your own code in the cycle of ecdaqd, on named channels. Installed as
- * <ecdaq/control.h>; app/doc/reference/control.md tells how to write, build and run one.
+ * <ecdaq/control.h>; app/doc/reference/control.md describes how to write, build and run one.
  *
  * A program is a shared object with one symbol, ecdaq_program:
  *
@@ -25,7 +25,7 @@
  * cycle k + 1 is made: what it sets travels with that frame. It must not block, allocate, print or
  * take a lock. exit() runs after the last cycle.
  *
- * The header needs nothing else of ecdaq, neither to compile nor to link.
+ * The header requires no other file of ecdaq, neither to compile nor to link.
  */
 #ifndef ECDAQ_CONTROL_H
 #define ECDAQ_CONTROL_H
@@ -49,18 +49,18 @@ struct ecdaq_output {
 };
 
 enum ecdaq_flag {
-	ECDAQ_LOST = 1 << 0,        /* no frame came back: all inputs are those of before */
-	ECDAQ_LATE = 1 << 1,        /* the frame passed the slaves outside its window: the same */
-	ECDAQ_WKC_LOW = 1 << 2,     /* not all slaves answered: inputs may be those of before */
+	ECDAQ_LOST = 1 << 0,        /* no frame came back: all inputs keep their last values */
+	ECDAQ_LATE = 1 << 1,        /* the frame passed the slaves outside its window: as above */
+	ECDAQ_WKC_LOW = 1 << 2,     /* not all slaves answered: some inputs may be old */
 	ECDAQ_FAIL_SAFE = 1 << 4,   /* the frame of this cycle carried fail-safe values */
-	ECDAQ_BAD_COUNTER = 1 << 6, /* a slave's conversion counter did not go on as it must */
+	ECDAQ_BAD_COUNTER = 1 << 6, /* a slave's conversion counter is not the expected one */
 	ECDAQ_DC_UNLOCKED = 1 << 7, /* the master's clock is not locked to the slaves' */
 	ECDAQ_FIRST = 1 << 16,      /* first call since the bus came (back) to OP */
 };
 
 struct ecdaq_calls;
 
-/* What cycle() is told; valid during the call. */
+/* Argument of cycle(); valid during the call. */
 struct ecdaq_cycle {
 	const struct ecdaq_calls *calls;
 	void *host;
@@ -73,7 +73,7 @@ struct ecdaq_cycle {
 				first */
 };
 
-/* What init() is told; valid during the call. */
+/* Argument of init(); valid during the call. */
 struct ecdaq_init {
 	const struct ecdaq_calls *calls;
 	void *host;
@@ -101,8 +101,8 @@ struct ecdaq_calls {
 
 enum ecdaq_verdict {
 	ECDAQ_GO_ON = 0,
-	ECDAQ_MAKE_SAFE = 1, /* all outputs of the program hold their fail-safe values, until a
-				later cycle goes on */
+	ECDAQ_MAKE_SAFE = 1, /* all outputs of the program hold their fail-safe values until cycle()
+				returns ECDAQ_GO_ON */
 };
 
 /* The shared object's one symbol, named ecdaq_program. */
@@ -146,8 +146,7 @@ static inline int ecdaq_find_output(const struct ecdaq_init *in, const char *nam
 
 /**
  * A word of control.options ("kp=0.5, channel=piccolo0.led"). 0; -ENOENT: not given, @ret_text
- * untouched; -ENAMETOOLONG. A key that init() never asks for is a mistake in the configuration, and
- * ecdaqd says so.
+ * untouched; -ENAMETOOLONG. A key that init() never reads is a configuration error.
  */
 static inline int ecdaq_option_text(const struct ecdaq_init *in, const char *key, char *ret_text,
 				    uint32_t text_bytes)
@@ -155,7 +154,7 @@ static inline int ecdaq_option_text(const struct ecdaq_init *in, const char *key
 	return in->calls->option_text(in->host, key, ret_text, text_bytes);
 }
 
-/** The same as a number. 0; -ENOENT: not given, @ret_value untouched; -EINVAL: no number. */
+/** The same as a number. 0; -ENOENT: not given, @ret_value untouched; -EINVAL: not a number. */
 static inline int ecdaq_option_number(const struct ecdaq_init *in, const char *key,
 				      double *ret_value)
 {
@@ -202,7 +201,8 @@ static inline int ecdaq_is_slave_good(const struct ecdaq_cycle *cy, unsigned sla
 
 /**
  * Set the output's physical value; it stays until it is set again. 0; 1: limited to what the
- * channel or outputs[].min and max allow; -EINVAL: no number, the output is fail-safe from here on.
+ * channel or outputs[].min and max allow; -EINVAL: not a number, the output is fail-safe from here
+ * on.
  */
 static inline int ecdaq_set(const struct ecdaq_cycle *cy, struct ecdaq_output output,
 			    double physical)
@@ -217,7 +217,7 @@ static inline int ecdaq_set_raw(const struct ecdaq_cycle *cy, struct ecdaq_outpu
 	return cy->calls->set_raw(cy->host, output.index, raw);
 }
 
-/** Let the output hold its fail-safe value until it is set again. */
+/** Set the output to its fail-safe value until it is set again. */
 static inline void ecdaq_release(const struct ecdaq_cycle *cy, struct ecdaq_output output)
 {
 	cy->calls->release(cy->host, output.index);

@@ -30,7 +30,8 @@ static int is_own_fault(const siginfo_t *info)
 	return info->si_code > 0 || (info->si_code == SI_TKILL && info->si_pid == getpid());
 }
 
-/* As if there were no guard: a fault repeats when the handler returns, the rest is raised anew. */
+/* As if there were no guard: a fault repeats when the handler returns, the others are raised again.
+ */
 static void fall_through(int number, const siginfo_t *info)
 {
 	for (size_t i = 0; i < NUMBERS; i++) {
@@ -114,7 +115,7 @@ static int come_back(void)
 {
 	sigset_t set;
 
-	/* The handler never returned: its mask, and what the function did to the FPU, stand. */
+	/* The handler never returned: its mask and the function's FPU state are still set. */
 	fill_set(&set);
 	pthread_sigmask(SIG_UNBLOCK, &set, NULL);
 	fesetenv(FE_DFL_ENV);

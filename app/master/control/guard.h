@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A net under somebody else's function: SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP or SIGABRT inside
- * it comes back as a return value, once. What the function has done to the memory of this process
- * until then nobody knows: whoever is told of a crash makes the outputs safe and ends the process.
- * The same signals elsewhere end the process, as ever.
+ * Calls a foreign function so that SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP or SIGABRT inside it
+ * becomes a return value, once. The memory of this process may be corrupt by then: on a crash the
+ * caller sets the outputs to fail-safe and ends the process. The same signals elsewhere end the
+ * process, as usual.
  */
 #ifndef CONTROL_GUARD_H
 #define CONTROL_GUARD_H

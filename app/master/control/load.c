@@ -54,7 +54,7 @@ static int check_file(const struct complaint *to, const char *path)
 	struct stat st;
 
 	if (strchr(path, '/') == NULL) {
-		return complain(to, -EINVAL, "give its path, with a slash in it (control.program)");
+		return complain(to, -EINVAL, "expected a path with a slash (control.program)");
 	}
 	if (stat(path, &st) < 0) {
 		int r = -errno;
@@ -66,7 +66,7 @@ static int check_file(const struct complaint *to, const char *path)
 	}
 	/* It runs with the rights of ecdaqd. */
 	if ((st.st_mode & S_IWOTH) != 0) {
-		return complain(to, -EPERM, "anyone may write to it; not loaded (chmod o-w)");
+		return complain(to, -EPERM, "world-writable, not loaded (chmod o-w)");
 	}
 	return 0;
 }
@@ -92,7 +92,7 @@ static int check_program(const struct complaint *to, const struct ecdaq_program 
 	if (program->abi != ECDAQ_CONTROL_ABI) {
 		return complain(to, -ENOEXEC,
 				"was built for version %u of ecdaq/control.h, this ecdaqd has %u: "
-				"build it anew",
+				"rebuild it",
 				program->abi, ECDAQ_CONTROL_ABI);
 	}
 	if (program->bytes != sizeof(*program)) {

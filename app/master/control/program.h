@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The other side of control.h: load the user's program, let it find its channels, call it once a
- * cycle, and hold what it sets on a command board, from which the cycle takes its outputs like
- * those of any other writer. What happens when it takes too long, fails or crashes is told in
- * app/doc/reference/control.md and ADR 0033.
+ * The other side of control.h: load the user's program, resolve its channels, call it once a cycle,
+ * and put its outputs on a command board, from which the cycle takes its outputs like those of any
+ * other writer. Timeouts, failures and crashes are described in app/doc/reference/control.md and
+ * ADR 0033.
  */
 #ifndef CONTROL_PROGRAM_H
 #define CONTROL_PROGRAM_H
@@ -47,8 +47,8 @@ void control_destroy(struct control *control);
 struct board *control_board(struct control *control);
 
 /**
- * The calling thread is the one that will run the program: its own stack for signals, and the
- * signals of a crash let through. control_leave() puts back what was. Context: cycle thread.
+ * The calling thread is the one that will run the program: gives it a signal stack and unblocks the
+ * signals of a crash. control_leave() restores both. Context: cycle thread.
  */
 void control_enter(struct control *control);
 void control_leave(struct control *control);
@@ -56,7 +56,7 @@ void control_leave(struct control *control);
 enum control_result {
 	CONTROL_DONE,
 	CONTROL_OVERRAN, /* and control.overrun is count */
-	CONTROL_PARK,    /* and it is fail_safe: not called again until the bus comes to OP anew */
+	CONTROL_PARK,    /* and it is fail_safe: not called until the bus reaches OP again */
 	CONTROL_STOP,    /* and it is stop: not called again */
 	CONTROL_CRASH,   /* not called again: end the process as soon as the outputs are safe */
 	CONTROL_REST,    /* not called: it is parked, stopped or has crashed */
@@ -66,7 +66,7 @@ enum control_result {
  */
 enum control_result control_run(struct control *control, const struct sample_header *sample,
 				const uint8_t *image);
-/** A cycle in which outputs are not real: the next call starts anew. RT-safe. */
+/** A cycle in which outputs are not live: the next call has ECDAQ_FIRST. RT-safe. */
 void control_pause(struct control *control);
 
 /** 1 if the program's outputs hold their fail-safe values although the bus is in OP. RT-safe. */

@@ -35,7 +35,7 @@ static int is_resting(const struct control *ctl)
 	       ctl->state_now == CONTROL_CRASHED;
 }
 
-/* The program's outputs as they stand, or none of them, on the board: a whole set each time. */
+/* Post the program's current outputs, or none, on the board: a whole set each time. */
 static void publish(struct control *ctl, int is_real)
 {
 	board_begin(&ctl->board);

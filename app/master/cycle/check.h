@@ -15,7 +15,7 @@
 
 struct check_slave {
 	const struct channel *counter; /* NULL: it has none */
-	int is_oneshot;                /* the counter goes on only when a shot was armed */
+	int is_oneshot;                /* the counter advances only when a shot was armed */
 	int has_last;
 	uint64_t last;
 	uint64_t last_cycle;

@@ -26,7 +26,7 @@ void cycle_step(struct cycle *cycle);
 int cycle_run(struct cycle *cycle);
 /** 1 and cycle_run()'s result in @ret_result if it is to return, or has. Context: any. */
 int cycle_has_stopped(const struct cycle *cycle, int *ret_result);
-/** Ask cycle_run() to return after the step it is in. Context: any, also a signal handler. */
+/** Request cycle_run() to return after the current step. Context: any, also a signal handler. */
 void cycle_stop(struct cycle *cycle);
 
 /*

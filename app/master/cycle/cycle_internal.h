@@ -42,7 +42,7 @@ struct cycle {
 	int was_fail_safe;
 	int has_overrun;     /* this step has passed edges */
 	int is_latched_safe; /* overrun policy fail_safe, or the cycle is about to end */
-	unsigned last_steps; /* until it ends by itself; 0: it goes on */
+	unsigned last_steps; /* steps left until it stops; 0: no limit */
 	unsigned lost_in_row;
 	unsigned wkc_low_in_row;
 	uint64_t steps;
@@ -68,7 +68,7 @@ void cycle_note(struct cycle *cy, enum event_id id, int64_t value, int64_t arg0,
 
 /** Count what became of the cycle's frames. */
 void cycle_count_frames(struct cycle *cy, const struct exchange_result *res);
-/** What the frame's DC time says about the next deadline: the correction, ns. */
+/** Correction of the next deadline from the frame's DC time, ns. */
 int64_t cycle_follow(struct cycle *cy, const struct exchange_result *res);
 
 /* --- cycle_control.c: the control program --- */
@@ -99,7 +99,7 @@ struct cycle_place {
 
 /** Which SYNC0 edge the frame's inputs belong to, by the DC time at which it passed. */
 struct cycle_place cycle_place(struct cycle *cy, const struct exchange_result *res);
-/** Is each slave's sample good? Flags and counters say so. */
+/** Judge each slave's sample by flags and counters. */
 void cycle_judge(struct cycle *cy, const struct exchange_result *res, int is_in_window);
 
 #endif

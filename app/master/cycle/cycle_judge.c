@@ -116,7 +116,7 @@ struct cycle_place cycle_place(struct cycle *cy, const struct exchange_result *r
 	return ret;
 }
 
-/* A slave that is known to be out of OP is not counted, as nobody is while the bus is. */
+/* A slave known to be out of OP is not counted, nor is any while the bus is out of OP. */
 static void count_bad(struct cycle *cy, uint64_t bad, int is_explained)
 {
 	struct cycle_stats *st = cy->spec.stats;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What other threads ask of the cycle; it takes effect at the next cycle boundary. */
+/* Requests of other threads to the cycle; they take effect at the next cycle boundary. */
 #include "cycle/cycle_internal.h"
 
 int cycle_has_stopped(const struct cycle *cycle, int *ret_result)

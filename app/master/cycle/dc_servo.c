@@ -102,7 +102,7 @@ struct dc_servo_result dc_servo_update(struct dc_servo *servo, int64_t frame_dc_
 		return jump(servo, error_ns);
 	}
 	servo->filtered_ns += FILTER_SHARE * (used_ns - servo->filtered_ns);
-	/* A clamped error says where to go, not how fast the clocks differ. */
+	/* A clamped error gives the direction, not the difference in rate. */
 	if (fabs((double)error_ns) < clamp_ns) {
 		servo->integral_ns =
 			clamp(servo->integral_ns - spec->ki * used_ns, integral_limit_ns);
@@ -118,7 +118,7 @@ struct dc_servo_result dc_servo_coast(struct dc_servo *servo)
 		servo->coasted++;
 	} else if (servo->state == DC_LOCKED) {
 		servo->state = DC_LOST;
-		servo->has_jumped = 0; /* the next measurement starts anew */
+		servo->has_jumped = 0; /* the next measurement restarts */
 	}
 	return apply(servo, 0, servo->has_jumped ? servo->integral_ns : 0);
 }

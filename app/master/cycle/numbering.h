@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Cycle k is SYNC0 edge k: a grid in DC time, dc_time(k) = base + k * period. A frame's own DC time
- * says to which edge its inputs belong, so a master that wakes late still numbers them right.
+ * identifies the edge of its inputs, so a master that wakes late still numbers them correctly.
  * Context: cycle thread, RT-safe.
  */
 #ifndef CYCLE_NUMBERING_H
@@ -28,7 +28,7 @@ struct numbering {
 struct numbering_place {
 	uint64_t passed_edges; /* edges between the cycle's own and the one the frame belongs to */
 	int is_in_window;      /* not within settle_ns after an edge, nor before the cycle's own */
-	int was_rebased;       /* the grid was laid anew: the reference clock jumped */
+	int was_rebased;       /* the grid was rebased: the reference clock jumped */
 };
 
 void numbering_init(struct numbering *numbering, int64_t period_ns, int64_t settle_ns);
@@ -36,7 +36,7 @@ void numbering_init(struct numbering *numbering, int64_t period_ns, int64_t sett
 /** How many edges a wake @late_ns after the deadline has passed over. */
 uint64_t numbering_skipped(int64_t period_ns, int64_t set_point_ns, int64_t late_ns);
 
-/** Place the frame of @cycle that passed at @frame_dc_ns. The first one lays the grid. */
+/** Place the frame of @cycle that passed at @frame_dc_ns. The first one sets the grid. */
 struct numbering_place numbering_place(struct numbering *numbering, uint64_t cycle,
 				       int64_t frame_dc_ns);
 

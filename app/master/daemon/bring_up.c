@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* From nothing to OP, in the order that distributed clocks ask for (masters' sequence: filters,
+/* From nothing to OP, in the order that distributed clocks require (masters' sequence: filters,
  * delays, offsets, burst; then the cyclic frame and the servo's lock; then one common SYNC0; then
  * SAFE-OP, OP). */
 #include <errno.h>
@@ -17,7 +17,7 @@ enum {
 
 /* --- the control program --- */
 
-/* Before anything is asked of the segment: a path that is wrong is wrong whatever is out there. */
+/* Before any access to the segment: a wrong path is wrong with any slaves. */
 static int load_control(struct session *s, struct failure *failure)
 {
 	char error[FAILURE_TEXT_BYTES] = "";
@@ -307,7 +307,7 @@ int session_bring_up(struct session *session, struct failure *failure)
 	if (r < 0) {
 		session_set_message(s, failure->text);
 		if (failure->code == EXIT_CODE_INTERFACE || failure->code == EXIT_CODE_NO_SLAVE) {
-			session_drop(s); /* nobody there to lead back */
+			session_drop(s); /* no slave to restore */
 		} else {
 			session_stop(s, &ignored);
 		}

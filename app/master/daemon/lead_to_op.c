@@ -7,7 +7,7 @@
 #include "daemon/session.h"
 #include "daemon/session_internal.h"
 
-/* In a row with a frame, before OP is asked for (T07). */
+/* Consecutive cycles with a frame before OP is requested (T07). */
 enum { FLOWING_CYCLES = 10 };
 /* So many looks in a row at clocks that agree, before SYNC0 is started (T23). */
 enum { AGREEING_LOOKS = 20 };
@@ -98,9 +98,8 @@ static int wait_for_agreement(struct session *s, struct ring_reader *reader,
 }
 
 /*
- * From the burst of static drift compensation to one frame a cycle, the slaves' loops have to
- * settle once more. Only the cycle's own monitor sees that; without it the check before the burst's
- * end stands.
+ * After the burst of static drift compensation, at one frame a cycle, the slaves' loops have to
+ * settle again. Only bus.monitor sees that; without it the check during the burst is final.
  */
 static int wait_for_clocks(struct session *s, struct failure *failure)
 {
@@ -123,7 +122,7 @@ static int wait_for_clocks(struct session *s, struct failure *failure)
 	return r;
 }
 
-/* A slave that is asked for OP while frames are missing trips over its watchdog (T07). */
+/* The watchdog of a slave that goes to OP while frames are missing fires (T07). */
 static int wait_for_flow(struct session *s, struct failure *failure)
 {
 	const struct cycle_stats *st = &s->run.page->cycle;
@@ -136,7 +135,7 @@ static int wait_for_flow(struct session *s, struct failure *failure)
 
 		if (r == -ETIMEDOUT) {
 			return failure_set(failure, EXIT_CODE_WIRE, -ETIME,
-					   "bus: frames do not come back steadily: %" PRIu64
+					   "bus: no steady exchange of frames: %" PRIu64
 					   " of %" PRIu64 " lost",
 					   load(&st->frames_lost), load(&st->frames_sent));
 		}

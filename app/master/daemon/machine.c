@@ -64,8 +64,8 @@ static int open_transport(void *ctx, struct transport *ret_transport, struct fai
 }
 
 /*
- * The cycle's thread will not come back, and nothing can be sent without it: end the process, and
- * let the slaves' watchdogs do the rest. No lock, no exit handler: the program may hold any.
+ * The cycle thread hangs, and nothing can be sent without it: end the process; the slaves'
+ * watchdogs set the outputs safe. No lock, no exit handler: the program may hold any.
  */
 static void end_stuck(void *ctx, int64_t busy_ns)
 {
@@ -75,13 +75,13 @@ static void end_stuck(void *ctx, int64_t busy_ns)
 	int len;
 
 	snprintf(text, sizeof(text),
-		 "control: %.63s: has not come back from cycle() for %" PRId64
+		 "control: %.63s: cycle() has not returned for %" PRId64
 		 " ms (control.stuck); the slaves' watchdogs make the outputs safe",
 		 control_name(session_control(pg->session)), busy_ns / NS_PER_MS);
 	session_stuck(pg->session, EXIT_CODE_CONTROL, text);
 	len = snprintf(line, sizeof(line), "ecdaqd: %s\n", text);
 	if (write(STDERR_FILENO, line, (size_t)len) < 0) {
-		_exit(EXIT_CODE_CONTROL); /* nobody reads it */
+		_exit(EXIT_CODE_CONTROL); /* its result is not read */
 	}
 	_exit(EXIT_CODE_CONTROL);
 }
@@ -193,7 +193,7 @@ static void check_ring_place(struct program *pg)
 
 	if (!run->is_tmpfs) {
 		snprintf(text, sizeof(text),
-			 "%s: not on a tmpfs: write-back to the disk will hold the cycle up "
+			 "%s: not on a tmpfs: write-back to the disk will delay the cycle "
 			 "(runtime.run_dir)",
 			 run->dir);
 		degraded(pg, EVENT_RT_RING_DISK, 0, text);

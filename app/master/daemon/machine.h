@@ -11,7 +11,7 @@
 #include "daemon/supervisor.h"
 #include "link/packet_socket.h"
 
-/* What the command line asks for beside the configuration. */
+/* Command-line settings that are not in the configuration. */
 struct options {
 	uint64_t cycles;  /* stop after so many in OP; 0: no limit */
 	uint64_t seconds; /* the same in seconds */

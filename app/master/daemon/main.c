@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* ecdaqd: one session on this machine's clock, threads and NIC, until it is told to stop. */
+/* ecdaqd: one session on this machine's clock, threads and NIC, until a stop signal. */
 #include <errno.h>
 #include <inttypes.h>
 #include <poll.h>
@@ -152,7 +152,7 @@ static int bring_up(struct program *pg, struct failure *failure)
 
 static void start_anew(struct program *pg)
 {
-	fprintf(stderr, "ecdaqd: %s: all slaves are lost; starting anew when they are back\n",
+	fprintf(stderr, "ecdaqd: %s: all slaves are lost; restarting when they are back\n",
 		pg->cfg.interface);
 	pg->cycles_before = cycles_in_op(pg);
 	session_drop(pg->session);

@@ -81,7 +81,7 @@ void notify_send(const struct notify *notify, const char *format, ...)
 	if (len > 0) {
 		size_t bytes = (size_t)len < sizeof(message) ? (size_t)len : sizeof(message) - 1;
 
-		/* A manager that has gone is no reason to stop measuring. */
+		/* A missing service manager must not stop the measurement. */
 		(void)!send(notify->fd, message, bytes, MSG_NOSIGNAL);
 	}
 }

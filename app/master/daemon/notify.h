@@ -11,8 +11,8 @@
 #include "base/clock.h"
 
 struct notify {
-	int fd;              /* -1: nobody listens */
-	int64_t watchdog_ns; /* half of what the manager allows; 0: none asked for */
+	int fd;              /* -1: no service manager */
+	int64_t watchdog_ns; /* half of WATCHDOG_USEC; 0: none set */
 	mono_t next_watchdog;
 };
 
@@ -20,7 +20,7 @@ struct notify {
 void notify_open(struct notify *notify);
 void notify_close(struct notify *notify);
 
-/** Send one or more lines "READY=1", "STATUS=..."; nobody waits, nothing is reported. */
+/** Send one or more lines "READY=1", "STATUS=..."; never blocks, errors are ignored. */
 void notify_send(const struct notify *notify, const char *format, ...)
 	__attribute__((format(printf, 2, 3)));
 

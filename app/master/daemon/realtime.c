@@ -108,7 +108,7 @@ static void raise_priority(struct realtime *rt)
 	r = pthread_setschedparam(rt->thread, SCHED_FIFO, &param);
 	if (r != 0) {
 		report(rt, EVENT_RT_PRIORITY, r,
-		       "cycle.priority %d: SCHED_FIFO refused: %s: it takes CAP_SYS_NICE (or "
+		       "cycle.priority %d: SCHED_FIFO refused: %s: requires CAP_SYS_NICE (or "
 		       "`ulimit -r`, LimitRTPRIO=); the cycle will wake late under load",
 		       param.sched_priority, strerror(r));
 	}
@@ -116,7 +116,7 @@ static void raise_priority(struct realtime *rt)
 
 /* --- memory --- */
 
-/* Rights are not asked for but tried: in a user namespace CAP_IPC_LOCK says yes and the kernel no.
+/* Rights are found by trying: in a user namespace CAP_IPC_LOCK may be set and mlockall still fail.
  */
 static int may_lock_without_limit(void)
 {
@@ -170,7 +170,7 @@ static void lock_memory(struct realtime *rt)
 		int err = errno;
 
 		report(rt, EVENT_RT_MEMORY, err,
-		       "cycle.lock_memory: mlockall refused: %s: it takes CAP_IPC_LOCK, or a "
+		       "cycle.lock_memory: mlockall refused: %s: requires CAP_IPC_LOCK, or a "
 		       "higher "
 		       "`ulimit -l` (LimitMEMLOCK=), or a smaller ring.depth; memory may be paged "
 		       "out",
@@ -195,7 +195,7 @@ static void hold_cpu_awake(struct realtime *rt)
 
 		report(rt, EVENT_RT_DMA_LATENCY, err,
 		       "cycle.cpu_dma_latency: " DMA_LATENCY_PATH
-		       ": %s: let ecdaqd write to it, or set cycle.cpu_dma_latency to -1us; "
+		       ": %s: make it writable for ecdaqd, or set cycle.cpu_dma_latency to -1us; "
 		       "the CPU may sleep deeply and wake late",
 		       strerror(err));
 		if (rt->dma_latency >= 0) {
@@ -238,7 +238,7 @@ static void *cycle_thread(void *arg)
 	return NULL;
 }
 
-/* Own pages, touched now, a guard below: the stack neither faults nor runs into something else. */
+/* Own pages, touched now, a guard below: the stack neither faults nor overwrites other memory. */
 static int make_stack(struct realtime *rt)
 {
 	size_t bytes = STACK_BYTES + GUARD_BYTES;

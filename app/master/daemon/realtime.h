@@ -17,7 +17,7 @@
 #include "cycle/cycle.h"
 #include "daemon/failure.h"
 
-/* @text: what was asked for, why it was refused and what to do, on one line. */
+/* @text: what was requested, why it was refused and the remedy, on one line. */
 typedef void realtime_degraded_fn(void *ctx, enum event_rt which, int err, const char *text);
 
 struct realtime {

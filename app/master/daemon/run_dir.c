@@ -66,15 +66,15 @@ static int find_group(struct run_dir *run, const char *name, struct failure *fai
 	getgrnam_r(name, &entry, buf, sizeof(buf), &found);
 	if (found == NULL) {
 		return failure_set(failure, EXIT_CODE_CONFIG, -ENOENT,
-				   "runtime.group: no group is named %s", name);
+				   "runtime.group: %s: no such group", name);
 	}
 	run->group = found->gr_gid;
 	return 0;
 }
 
-/* The recorder and the publisher, other users of the group, lay pages of their own beside ours: the
- * group may make files. Each belongs to the group (set-group-ID), and only its maker takes it away
- * (sticky). */
+/* The recorder and the publisher, other users of the group, create pages of their own beside ours:
+ * the group may create files. Each belongs to the group (set-group-ID), and only its owner may
+ * remove it (sticky). */
 static int hand_to_group(const struct run_dir *run, struct failure *failure)
 {
 	if (run->group == (gid_t)-1) {

@@ -24,7 +24,7 @@ struct run_dir {
 	int is_tmpfs;
 	struct status_page *page;
 	struct ring *events;
-	struct board *remote; /* outputs as ecdaq-dds wants them */
+	struct board *remote; /* outputs set by ecdaq-dds */
 	int remote_fd;        /* the same, to be given to it; -1: none */
 };
 

@@ -40,7 +40,7 @@ static void clear_control(struct control_status *st)
 	histogram_clear(&st->time);
 }
 
-/* Counters and histograms; not what says where the cycle stands. */
+/* Counters and histograms, but not the state of the cycle. */
 static void clear_stats(struct cycle_stats *st)
 {
 	ZERO(st->frames_sent);

@@ -27,17 +27,17 @@ struct session;
 struct session_hooks {
 	/** Open the way to the wire, once in each bring-up. 0 or -errno with @failure. */
 	int (*transport_open)(void *ctx, struct transport *ret_transport, struct failure *failure);
-	/** Let @cycle run from here on. 0 or -errno with @failure. */
+	/** Start the thread of @cycle. 0 or -errno with @failure. */
 	int (*cycle_start)(void *ctx, struct cycle *cycle, struct failure *failure);
-	/** Ask it to stop, wait until it has; the result of cycle_run(). */
+	/** Stop it and wait for its end; the result of cycle_run(). */
 	int (*cycle_end)(void *ctx);
-	/** 1 if the cycle has ended by itself. */
+	/** 1 if the cycle has ended without a stop request. */
 	int (*cycle_has_ended)(void *ctx);
 	/** Return at @until at the latest; on virtual time the cycle makes a step. */
 	void (*wait)(void *ctx, mono_t until);
 	/** Called often, also in the middle of a long bring-up: a sign of life. May be NULL. */
 	void (*alive)(void *ctx);
-	/** One line for whoever started the program; the session goes on. May be NULL. */
+	/** A warning for whoever started the program; the session continues. May be NULL. */
 	void (*warn)(void *ctx, const char *text);
 	void *ctx;
 };
@@ -58,7 +58,7 @@ int session_create(const struct session_spec *spec, struct session **ret_session
 /**
  * Scan, compare, map, clocks; then ring and cycle; the servo's lock, SYNC0, SAFE-OP, OP. 0, or
  * -errno with @failure; everything but the run directory is taken down again then. -ECANCELED with
- * EXIT_CODE_OK: told to stop on the way.
+ * EXIT_CODE_OK: stop requested on the way.
  */
 int session_bring_up(struct session *session, struct failure *failure);
 
@@ -70,7 +70,8 @@ enum session_result {
 
 /**
  * One pass of the service loop: admin requests, bus watch, status page. An enum session_result, or
- * -errno with @failure if the cycle has ended by itself. May also be called while nothing is up.
+ * -errno with @failure if the cycle has ended without a stop request. May also be called while
+ * nothing is up.
  */
 int session_service(struct session *session, struct failure *failure);
 
@@ -79,11 +80,10 @@ int session_fd(const struct session *session);
 /** 1 if session_service() should be called again within a period or so. */
 int session_is_pressed(const struct session *session);
 
-/** Outputs safe, SAFE-OP, SYNC0 off, INIT, ring closed. Goes on over errors: 0, or the first one
+/** Outputs safe, SAFE-OP, SYNC0 off, INIT, ring closed. Continues after errors: 0, or the first one
  * with @failure. */
 int session_stop(struct session *session, struct failure *failure);
-/** Take everything down without a word on the wire: the slaves are gone, or shall be left as they
- * are. */
+/** Release everything without sending a frame: the slaves are lost, or must keep their state. */
 void session_drop(struct session *session);
 
 /** How it all ended, for the status page: state STOPPED or FAILED, exit code, message. */

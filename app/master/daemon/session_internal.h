@@ -34,7 +34,7 @@ struct session {
 	int is_riding; /* the cycle owns the transport and the event ring */
 	int is_link_up;
 	enum bus_state state;
-	int is_partial; /* RECOVERING, and the cycle goes on with the slaves that are in OP */
+	int is_partial; /* RECOVERING, and the cycle continues with the slaves that are in OP */
 	mono_t next_watch;
 	uint64_t silent_cycles; /* in a row without a frame */
 	uint64_t cycles_seen;
@@ -57,7 +57,7 @@ mono_t session_now(const struct session *s);
  * for it. */
 struct platform session_cycle_platform(struct session *s);
 
-/** 0; -ECANCELED with @failure if told to stop. */
+/** 0; -ECANCELED with @failure on a stop request. */
 int session_cancelled(const struct session *s, struct failure *failure);
 /** After one call of bus/bus.h that gave @r and @error: @late is what "not in time" means for it.
  */
@@ -69,12 +69,11 @@ int session_lead_to_op(struct session *s, struct failure *failure);
 /** Stop the cycle and give the transport back; its result. */
 int session_cycle_end(struct session *s);
 
-/** The cycle has ended by itself: take it down and say why. */
+/** The cycle has ended without a stop request: release it and report why. */
 int session_report_ended(struct session *s, struct failure *failure);
-/** Does anything come back at all? The cycle's counters say so, also while the bus is being asked.
- */
+/** Detect the loss of all frames from the cycle's counters, also during service transfers. */
 void session_listen(struct session *s);
-/** Of @frames sent, @twice came back a second time: say it if that is nearly each of them. */
+/** Of @frames sent, @twice came back a second time: warn if that is nearly all of them. */
 void session_judge_doubled(struct session *s, uint64_t frames, uint64_t twice);
 /** Look after the bus; an enum session_result. */
 enum session_result session_watch(struct session *s);

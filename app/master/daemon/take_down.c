@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* From OP, or from wherever bring-up has come to, back to nothing. */
+/* From OP, or from any step of bring-up, back to nothing. */
 #include <errno.h>
 
 #include "daemon/session.h"
 #include "daemon/session_internal.h"
 
-/* So many cycles carry the fail-safe outputs before the slaves are asked to leave OP. */
+/* Number of cycles with fail-safe outputs before the slaves leave OP. */
 enum { SAFE_CYCLES = 4 };
 #define SAFE_TIMEOUT_NS (200 * NS_PER_MS)
 

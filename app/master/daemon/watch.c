@@ -6,12 +6,12 @@
 #include "daemon/session.h"
 #include "daemon/session_internal.h"
 
-/* Not one frame back for so long: the cable at the master, or the first slave, is gone. */
+/* No frame back for this long: the cable at the master, or the first slave, is disconnected. */
 #define SILENCE_NS (50 * NS_PER_MS)
 #define WATCH_PERIOD_NS (100 * NS_PER_MS)
 /* Recovery goes one step a look. */
 #define RECOVERY_PERIOD_NS (20 * NS_PER_MS)
-/* All slaves gone for so long: their clocks cannot be trusted to go on, start anew. */
+/* All slaves lost for this long: their clocks may have been reset, restart from bring-up. */
 #define LOST_LIMIT_NS (5 * NS_PER_S)
 
 enum { DOUBLED_WINDOW_CYCLES = 500, DOUBLED_FRAMES_MIN = 50 };
@@ -85,7 +85,7 @@ static void serve_admin(struct session *s)
 
 /* --- bus --- */
 
-/* Asking is also what binds the socket anew to an interface that went and came back. */
+/* The query also binds the socket again to an interface that was removed and came back. */
 static void watch_link(struct session *s)
 {
 	const struct transport *tr = line_transport(s->line);
@@ -109,7 +109,7 @@ static int can_go_on(const struct session *s, const struct bus_watch_report *rep
 	       report->is_reference_op && (s->state == BUS_OP || s->state == BUS_RECOVERING);
 }
 
-/* The cycle goes on with the slaves of @op_mask; 0: outputs safe, no sample is judged. */
+/* The cycle continues with the slaves of @op_mask; 0: outputs safe, no sample is judged. */
 static void go_on_with(struct session *s, uint64_t op_mask)
 {
 	s->is_partial = op_mask != 0 && op_mask != UINT64_MAX;
@@ -188,7 +188,7 @@ enum session_result session_watch(struct session *s)
 	struct bus_watch_report report = { 0 };
 
 	if (s->silent_cycles >= silence_limit(s)) {
-		/* Nobody is there to be asked; each question would cost its time-out. */
+		/* No slave answers; each request would cost its timeout. */
 		follow_silence(s);
 	} else if (bus_watch(s->bus, s->run.page, emit_event, s, &report) == 0) {
 		follow_bus(s, &report);
@@ -202,8 +202,8 @@ enum session_result session_watch(struct session *s)
 
 void session_judge_doubled(struct session *s, uint64_t frames, uint64_t twice)
 {
-	static const char text[] = "every frame comes back twice: a second ecdaq-sim, or a switch "
-				   "that copies, at this interface?";
+	static const char text[] = "duplicate frames: is a second ecdaq-sim or a switch on this "
+				   "segment?";
 
 	/* A flood of frames that are not ours is more than that. */
 	int is_so = frames >= DOUBLED_FRAMES_MIN && twice >= frames - frames / 10 &&
@@ -268,7 +268,7 @@ int session_report_ended(struct session *s, struct failure *failure)
 					   &s->run.page->cycle.cycle_number, memory_order_relaxed));
 	}
 	return failure_set(failure, EXIT_CODE_FAILED, r < 0 ? r : -EIO,
-			   "cycle: ended by itself: error %d", -r);
+			   "cycle: thread ended unexpectedly: error %d", -r);
 }
 
 int session_service(struct session *session, struct failure *failure)

@@ -174,7 +174,7 @@ static int transact_direct(struct line *line, const uint8_t *frame, size_t frame
 			return give(&line->in, ret_answer, capacity);
 		}
 		line->thrown_away++;
-		/* A flood of frames that nobody waits for must not outlast the deadline. */
+		/* A flood of unexpected frames must not delay the deadline. */
 		if (at.ns >= deadline.ns) {
 			return -ETIMEDOUT;
 		}
@@ -288,7 +288,7 @@ int line_ride_answer(struct line *line, const uint8_t *frame, size_t frame_len)
 	    !echo_matches(line->out.bytes, frame, frame_len, ECHO_INDEX_SAME)) {
 		return 0;
 	}
-	/* A second copy, or one that nobody waits for any more, is known, too, and dropped. */
+	/* A duplicate, or an answer that came too late, is recognised, too, and dropped. */
 	if (move_state(line, RIDE_OUT, RIDE_ANSWERING)) {
 		memcpy(line->answer.bytes, frame, frame_len);
 		line->answer.len = frame_len;

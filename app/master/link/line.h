@@ -6,7 +6,7 @@
  * is so from line_create() until line_ride_begin(). Riding: the cycle thread owns the transport. A
  * service frame waits in one slot; the cycle sends it when time is left in its cycle
  * (line_ride_take) and gives the answer back (line_ride_answer). There is one service thread, so
- * one slot is enough; it is handed over with acquire and release, nobody locks, the cycle never
+ * one slot is enough; it is handed over with acquire and release, without locks; the cycle never
  * waits.
  */
 #ifndef LINK_LINE_H
@@ -19,7 +19,7 @@
 
 struct line;
 
-/* How the service thread lets time pass while the cycle owns the transport. */
+/* How the service thread waits while the cycle owns the transport. */
 struct line_waiter {
 	/**
 	 * Return at @until at the latest, sooner whenever something may have happened. On the
@@ -48,7 +48,7 @@ struct line *line_bound(void);
 /**
  * Send @frame and wait for its echo (wire/echo.h: every command, index, address and length the
  * same). Returns the answer's length, -ETIMEDOUT, -EINVAL for bytes that are no EtherCAT frame, or
- * -errno of the transport. Other frames are thrown away and counted. While riding, @timeout is 100
+ * -errno of the transport. Other frames are dropped and counted. While riding, @timeout is 100
  * ms at least.
  */
 int line_transact(struct line *line, const uint8_t *frame, size_t frame_len, uint8_t *ret_answer,
@@ -62,7 +62,7 @@ void line_timeout_set(struct line *line, span_t timeout);
 /** For try 0 to LINE_TRIES - 1. */
 span_t line_timeout(const struct line *line, unsigned try);
 
-/** @attend is called whenever this thread sends or waits: a sign that it gets on. NULL: nobody. */
+/** @attend is called whenever this thread sends or waits: its keepalive. NULL: none. */
 void line_set_keepalive(struct line *line, void (*attend)(void *ctx), void *ctx);
 
 /** Frames that line_transact() met and threw away in direct mode. */
@@ -70,10 +70,10 @@ uint64_t line_discarded(const struct line *line);
 /** Transactions of direct mode that were answered. */
 uint64_t line_answered(const struct line *line);
 
-/** Let @span pass; while riding the cycle goes on. */
+/** Wait for @span; while riding, the cycle runs meanwhile. */
 void line_sleep(struct line *line, span_t span);
 
-/** From now on the cycle owns the transport, and @waiter lets time pass. */
+/** From now on the cycle owns the transport, and the service thread waits through @waiter. */
 void line_ride_begin(struct line *line, struct line_waiter waiter);
 /** The cycle has ended: back to direct. */
 void line_ride_end(struct line *line);

@@ -2,7 +2,7 @@
 /*
  * SOEM's NIC layer on a line. What it adds to line_transact(): an index of its own on the wire, and
  * the rule which frames may be sent twice. The line has checked length and echo of every answer, so
- * what SOEM copies out of rxbuf lies inside it.
+ * what SOEM copies out of rxbuf is inside it.
  */
 #include "oshw.h"
 
@@ -86,8 +86,8 @@ int ecx_outframe_red(ecx_portt *port, uint8 idx)
 }
 
 /*
- * A mailbox buffer lies in process RAM; writing it again after the answer was lost would put the
- * same message in twice, or block a full mailbox (T03). Registers may be written again.
+ * A mailbox buffer is process RAM; a second write after a lost answer would queue the same message
+ * twice, or block a full mailbox (T03). Registers may be written again.
  */
 static int may_be_repeated(const uint8_t *frame)
 {
@@ -97,7 +97,7 @@ static int may_be_repeated(const uint8_t *frame)
 	       get_le16(dg + 4) < ESC_REG_PROCESS_RAM;
 }
 
-/* One try: the WKC of the last datagram, as SOEM wants it, or EC_NOFRAME. */
+/* One try: the WKC of the last datagram, as SOEM expects it, or EC_NOFRAME. */
 static int transact(ecx_portt *port, uint8 idx, int64_t timeout_ns)
 {
 	uint8_t frame[ECAT_FRAME_MAX_BYTES] = { 0 };

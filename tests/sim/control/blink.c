@@ -135,11 +135,10 @@ TEST(sim_control, blink_says_what_is_wrong_with_its_options)
 		      "init() failed: a.led: does not belong to the program (outputs: owner: "
 		      "program)");
 	check_refused("control.options=slave=c",
-		      "init() failed: c.led: there is no such channel (`ecdaq channels` lists "
-		      "them)");
+		      "init() failed: c.led: no such channel (see `ecdaq channels`)");
 	check_refused("control.options=by=hand", "init() failed: by is led or oneshot");
 	check_refused("control.options=every=0",
 		      "init() failed: every and ahead are 1 to 1000000 cycles");
 	check_refused("control.options=every=x",
-		      "init() failed: every: the value in control.options is no number");
+		      "init() failed: every: the value in control.options is not a number");
 }

@@ -223,7 +223,8 @@ TEST(sim_control, pi_loop_says_what_is_wrong_with_its_options)
 {
 	check_refused("control.options=min=5, max=5", "min must be below max");
 	check_refused("control.options=kp=-1", "kp and ki must not be below 0");
-	check_refused("control.options=ki=fast", "ki: the value in control.options is no number");
+	check_refused("control.options=ki=fast",
+		      "ki: the value in control.options is not a number");
 	check_refused("control.options=actuator=plant.sensor",
 		      "plant.sensor: is an input and cannot be written");
 }

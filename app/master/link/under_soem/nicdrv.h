@@ -2,7 +2,7 @@
 /*
  * The port under SOEM's functions: frame buffers by index, as SOEM's sources use them, and the
  * line that carries the frames. One service thread uses it; nothing here is locked. Written for
- * ecdaq; the file's name, and those of the functions, are what SOEM's sources ask for.
+ * ecdaq; the names of the file and of the functions are those that SOEM's sources use.
  */
 #ifndef LINK_UNDER_SOEM_NICDRV_H
 #define LINK_UNDER_SOEM_NICDRV_H
@@ -19,13 +19,14 @@ typedef struct ecx_redport {
 
 typedef struct ecx_port {
 	struct line *line;
-	/* By frame index; a received frame stands here without its Ethernet header. */
+	/* By frame index; a received frame is stored here without its Ethernet header. */
 	ec_bufT rxbuf[EC_MAXBUF];
 	ec_bufT txbuf[EC_MAXBUF];
 	int txbuflength[EC_MAXBUF];
 	int bufstat[EC_MAXBUF];
 	uint8 lastidx;
-	uint8 sequence; /* the index byte on the wire: 256 long, so that a late answer is told apart
+	uint8 sequence; /* the index byte on the wire: 256 long, so that a late answer is
+			 * distinguished
 			 */
 	uint64 retries; /* idempotent frames sent again */
 	/* Named by SOEM's redundant init, which ecdaq does not call. */

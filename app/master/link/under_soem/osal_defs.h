@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * What SOEM's sources expect of the system's compiler, for gcc and clang on Linux. Written for
- * ecdaq; the names are what those sources ask for.
+ * ecdaq; the names are those that these sources use.
  */
 #ifndef LINK_UNDER_SOEM_OSAL_DEFS_H
 #define LINK_UNDER_SOEM_OSAL_DEFS_H
@@ -10,7 +10,7 @@
 #define EC_BIG_ENDIAN
 #endif
 
-/* SOEM's own progress texts; bus/ says what happened. */
+/* SOEM's own progress texts; bus/ reports errors itself. */
 #define EC_PRINT(...)                                                                              \
 	do {                                                                                       \
 	} while (0)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * SOEM's view of the network hardware: a line (link/line.h) and nothing else. Written for ecdaq;
- * the names are what SOEM's sources ask for.
+ * SOEM's view of the network hardware: only a line (link/line.h). Written for ecdaq;
+ * the names are those that SOEM's sources use.
  */
 #ifndef LINK_UNDER_SOEM_OSHW_H
 #define LINK_UNDER_SOEM_OSHW_H

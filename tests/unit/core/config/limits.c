@@ -23,15 +23,15 @@ TEST(config, options_that_do_not_fit_to_each_other_blame_a_line_of_the_file)
 	parse_fails("record:\n  budget: 128MiB\n",
 		    "t.yaml:2: record.budget: must be 0B or at least record.rotate_size");
 	parse_fails("record:\n  dir: \"\"\n",
-		    "t.yaml:2: record.dir: must be given while record.enable is on");
+		    "t.yaml:2: record.dir: is required while record.enable is on");
 	parse_fails("bus:\n  watchdog: 2ms\n",
 		    "t.yaml:2: bus.watchdog: must be 0s or at least three times cycle.period");
 	parse_fails("bus:\n  presence: exact\n",
 		    "t.yaml:2: bus.presence: exact requires a slaves list");
 	parse_fails("slaves:\n- name: a\n- name: a\n",
-		    "t.yaml:3: slaves[].name: slaves 0 and 1 are both called a");
+		    "t.yaml:3: slaves[].name: slaves 0 and 1 have the same name a");
 	parse_fails("slaves:\n- sync0_line: GPIO17\n- {}\n- sync0_line: GPIO17\n",
-		    "t.yaml:4: slaves[].sync0_line: is that of slave 0 already");
+		    "t.yaml:4: slaves[].sync0_line: is already used by slave 0");
 	parse_fails("slaves:\n- sync0_shift: 1ms\n",
 		    "t.yaml:2: slaves[].sync0_shift: must be less than one cycle.period");
 	parse_fails("outputs:\n- { channel: a, min: 1, max: 0, fail_safe: 1 }\n",
@@ -39,9 +39,9 @@ TEST(config, options_that_do_not_fit_to_each_other_blame_a_line_of_the_file)
 	parse_fails("outputs:\n- { channel: a, min: 1 }\n",
 		    "t.yaml:2: outputs[].fail_safe: is not within min and max");
 	parse_fails("outputs:\n- { channel: a, timeout: 1s }\n",
-		    "t.yaml:2: outputs[].timeout: only a remote owner has one");
+		    "t.yaml:2: outputs[].timeout: requires owner: remote");
 	parse_fails("outputs:\n- channel: a\n- channel: a\n",
-		    "t.yaml:3: outputs[].channel: this channel is listed twice");
+		    "t.yaml:3: outputs[].channel: duplicate channel");
 	parse_fails("outputs:\n- channel: \"\"\n", "t.yaml:2: outputs[].channel: is missing");
 }
 

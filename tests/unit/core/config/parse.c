@@ -272,21 +272,21 @@ TEST(config, values_out_of_range_are_named_with_the_range)
 		    "t.yaml:2: slaves[0].name: expected letters, digits, _ and - "
 		    "only, not \"a.b\"");
 	parse_fails("record:\n  dir: \"/a\\nb\"\n",
-		    "t.yaml:2: record.dir: has a control character in it");
+		    "t.yaml:2: record.dir: contains a control character");
 	parse_fails("record:\n  dir: \"/a\\0b\"\n",
-		    "t.yaml:2: record.dir: has a control character in it");
+		    "t.yaml:2: record.dir: contains a control character");
 }
 
 TEST(config, duplicate_keys_are_named_with_the_first_line)
 {
 	parse_fails("cycle:\n  period: 1ms\n  period: 2ms\n",
-		    "t.yaml:3: cycle.period: is set already in line 2");
+		    "t.yaml:3: cycle.period: is already set in line 2");
 	parse_fails("cycle:\n  period: 1ms\nbus:\ncycle:\n  cpu: 1\n",
-		    "t.yaml:4: cycle: is set already in line 1");
+		    "t.yaml:4: cycle: is already set in line 1");
 	parse_fails("cycle.period: 1ms\ncycle:\n  period: 1ms\n",
-		    "t.yaml:3: cycle.period: is set already in line 1");
+		    "t.yaml:3: cycle.period: is already set in line 1");
 	parse_fails("slaves:\n- name: a\n  name: b\n",
-		    "t.yaml:3: slaves[0].name: is set already in line 2");
+		    "t.yaml:3: slaves[0].name: is already set in line 2");
 }
 
 TEST(config, broken_yaml_is_one_line_with_its_place)
@@ -297,7 +297,7 @@ TEST(config, broken_yaml_is_one_line_with_its_place)
 	parse_fails("cycle: [ 1\n", "t.yaml:2: not YAML: did not find expected ',' or ']' while "
 				    "parsing a flow sequence");
 	parse_fails("cycle:\n  cpu: 1\n---\ncycle:\n  cpu: 2\n",
-		    "t.yaml:4: a second document: only one is read");
+		    "t.yaml:4: more than one YAML document");
 	parse_fails("a: *b\n", "t.yaml:1: not YAML: found undefined alias");
 }
 
@@ -310,7 +310,7 @@ TEST(config, objects_must_be_whole_and_fit_their_type)
 	parse_fails("slaves:\n- sdo:\n  - index: 0x8000\n    type: UINT\n    value: 70000\n",
 		    "t.yaml:5: slaves[0].sdo[0].value: 70000 does not fit into UINT");
 	parse_fails("slaves:\n- sdo:\n  - { index: 0x8000, type: UINT, value: x }\n",
-		    "t.yaml:3: slaves[0].sdo[0].value: \"x\" is no UINT");
+		    "t.yaml:3: slaves[0].sdo[0].value: \"x\" is not a valid UINT");
 	parse_fails("slaves:\n- sdo:\n  - { index: 0x8000, type: WORD, value: 1 }\n",
 		    "t.yaml:3: slaves[0].sdo[0].type: expected one of "
 		    "BOOL|SINT|INT|DINT|LINT|USINT|UINT|UDINT|ULINT|REAL|LREAL, not \"WORD\"");

@@ -46,8 +46,7 @@ TEST(config, set_refuses_with_one_line)
 	set_fails("cycle.perid=1ms", "cycle.perid: unknown option; did you mean cycle.period?");
 	set_fails("cycle.period=20ms", "cycle.period: 20ms is out of range: 250us to 10ms");
 	set_fails("cycle=1", "cycle: unknown option; did you mean cycle?");
-	set_fails("slaves[1].name=x",
-		  "slaves[1].name: item 1 would leave a hole or is beyond the limit");
+	set_fails("slaves[1].name=x", "slaves[1].name: item 1 skips an index or exceeds the limit");
 	set_fails("slaves[].name=x", "slaves[].name: unknown option; did you mean slaves[].name?");
 	set_fails("slaves[-1].name=x",
 		  "slaves[-1].name: unknown option; did you mean slaves[].name?");
@@ -104,7 +103,7 @@ TEST(config, dds_wants_an_interface_of_its_own)
 	config_defaults(&cfg);
 	CHECK_EQ(config_set(&cfg, "dds.enable=on", error, sizeof(error)), 0);
 	CHECK_EQ(config_check(&cfg, error, sizeof(error)), -EINVAL);
-	CHECK_STR(error, "dds.interface: must be given while dds.enable is on");
+	CHECK_STR(error, "dds.interface: is required while dds.enable is on");
 	CHECK_EQ(config_set(&cfg, "dds.interface=eth0", error, sizeof(error)), 0);
 	CHECK_EQ(config_set(&cfg, "bus.interface=eth0", error, sizeof(error)), 0);
 	CHECK_EQ(config_check(&cfg, error, sizeof(error)), -EINVAL);

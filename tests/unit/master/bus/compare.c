@@ -50,7 +50,7 @@ TEST(compare, wrong_slave_is_told_with_both_identities)
 
 	cfg->slave[1].product = 0x11;
 	CHECK_EQ(compare_slaves(cfg, found, 2, error, sizeof(error)), -ENXIO);
-	CHECK_STR(error, "slave 1 is another one: expected vendor 0x00000002 product 0x00000011 "
+	CHECK_STR(error, "slave 1: wrong identity: expected vendor 0x00000002 product 0x00000011 "
 			 "revision any, "
 			 "found vendor 0x00000002 product 0x0b0c3052 revision 0x00110000 (EL2828)");
 }
@@ -90,7 +90,7 @@ TEST(compare, one_too_many_is_told_where_exactly_those_listed_are_wanted)
 
 	cfg->bus_presence = CONFIG_EXACT_SLAVES;
 	CHECK_EQ(compare_slaves(cfg, found, 2, error, sizeof(error)), -ENXIO);
-	CHECK_STR(error, "slave 1 is one too many: 2 found, 1 expected; found vendor 0x00000002 "
+	CHECK_STR(error, "slave 1 is unexpected: 2 found, 1 expected; found vendor 0x00000002 "
 			 "product 0x0b0c3052 "
 			 "revision 0x00110000 (EL2828)");
 	CHECK_EQ(compare_slaves(cfg, found, 1, error, sizeof(error)), 0);

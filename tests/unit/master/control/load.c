@@ -22,7 +22,7 @@ TEST(control, a_file_that_is_missing_is_said)
 {
 	check_refused("/nowhere/at/all.so", -ENOENT, "No such file or directory");
 	check_refused("/tmp", -EINVAL, "is not a file");
-	check_refused("blink", -EINVAL, "give its path, with a slash in it (control.program)");
+	check_refused("blink", -EINVAL, "expected a path with a slash (control.program)");
 }
 
 TEST(control, a_file_that_is_no_shared_object_is_said)
@@ -45,7 +45,7 @@ TEST(control, a_file_that_anyone_may_write_is_not_loaded)
 	CHECK(fd >= 0);
 	CHECK_EQ(fchmod(fd, 0666), 0);
 	close(fd);
-	check_refused(path, -EPERM, "anyone may write to it; not loaded (chmod o-w)");
+	check_refused(path, -EPERM, "world-writable, not loaded (chmod o-w)");
 	unlink(path);
 }
 
@@ -64,8 +64,7 @@ TEST(control, an_object_that_lacks_a_function_is_said)
 TEST(control, another_version_of_the_header_is_said)
 {
 	check_refused(ECDAQ_TEST_PROGRAMS "/other_abi.so", -ENOEXEC,
-		      "was built for version 2 of ecdaq/control.h, this ecdaqd has 1: build it "
-		      "anew");
+		      "was built for version 2 of ecdaq/control.h, this ecdaqd has 1: rebuild it");
 	check_refused(ECDAQ_TEST_PROGRAMS "/other_bytes.so", -ENOEXEC,
 		      "ecdaq_program.bytes is 8 instead of 40: use ECDAQ_PROGRAM_HEAD");
 	check_refused(ECDAQ_TEST_PROGRAMS "/no_cycle.so", -ENOEXEC, "ecdaq_program has no cycle()");
@@ -109,8 +108,8 @@ TEST(control, a_channel_that_cannot_be_had_is_named_with_the_reason)
 	check_find("a.adc", 0, 0, "");
 	check_find("a.led", 0, 0, ""); /* an output can be read */
 	check_find("a.led", 1, 0, "");
-	check_find("c.adc", 0, -ENOENT, "there is no such channel (`ecdaq channels` lists them)");
-	check_find("c.led", 1, -ENOENT, "there is no such channel (`ecdaq channels` lists them)");
+	check_find("c.adc", 0, -ENOENT, "no such channel (see `ecdaq channels`)");
+	check_find("c.led", 1, -ENOENT, "no such channel (see `ecdaq channels`)");
 	check_find("a.adc", 1, -EROFS, "is an input and cannot be written");
 	check_find("b.foreign", 1, -EACCES,
 		   "does not belong to the program (outputs: owner: program)");
@@ -219,15 +218,15 @@ TEST(control, options_are_told_by_their_keys)
 TEST(control, options_that_cannot_be_meant_are_refused)
 {
 	check_options_refused("kp=1x",
-			      "init() failed: kp: the value in control.options is no number");
+			      "init() failed: kp: the value in control.options is not a number");
 	check_options_refused("kp=inf",
-			      "init() failed: kp: the value in control.options is no number");
+			      "init() failed: kp: the value in control.options is not a number");
 	check_options_refused("kp=",
-			      "init() failed: kp: the value in control.options is no number");
+			      "init() failed: kp: the value in control.options is not a number");
 	check_options_refused("word=12345678",
 			      "init() failed: word: the value in control.options is too long");
 	check_options_refused("kb=2", "control.options: kb: unknown key");
 	check_options_refused("kp", "control.options: \"kp\" is not KEY=VALUE");
 	check_options_refused("=3", "control.options: \"=3\" has no key");
-	check_options_refused("kp=1,kp=2", "control.options: kp is given twice");
+	check_options_refused("kp=1,kp=2", "control.options: kp: duplicate key");
 }

@@ -126,7 +126,7 @@ TEST(run_dir, a_group_that_is_not_there_is_an_error_of_the_configuration)
 	snprintf(b.cfg.group, sizeof(b.cfg.group), "no-such-group-9");
 	CHECK_EQ(open_home(&b, &run, &failure), -ENOENT);
 	CHECK_EQ(failure.code, EXIT_CODE_CONFIG);
-	CHECK_STR(failure.text, "runtime.group: no group is named no-such-group-9");
+	CHECK_STR(failure.text, "runtime.group: no-such-group-9: no such group");
 	run_dir_close(&run);
 	bench_close(&b);
 }
