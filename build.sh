@@ -25,7 +25,7 @@ usage: ./build.sh VERB [OPTION...]
   help     print this, or the options of a verb: ./build.sh help VERB
 
 Missing packages are installed on Debian 12 or 13 (as root or with sudo) and listed on other systems;
-app/tools/packages.txt says what each is for. Downloads are kept in ~/.cache/ecdaq/.
+app/tools/packages.txt has the purpose of each. Downloads are kept in ~/.cache/ecdaq/.
 
 exit codes: 0 done, 1 failed, 2 wrong command line, 130 and 143 ended by SIGINT and SIGTERM.
 
@@ -62,23 +62,22 @@ usage: ./build.sh test [--fail-fast | --keep-going] [--only PATTERN] [--fuzz-sec
 Without GROUP all groups run, the fast ones first:
   unit     app/, module by module; also under ASan+UBSan, and what threads share under TSan
   tidy     the rules of the source tree: include table, banned calls, sizes, formatting, lint
-  docs     links and paths of all pages
   cli      the operator's tool and the programs' command lines; also under ASan+UBSan
   replay   captures of real buses against the simulated segment
   sim      the whole master on virtual time; also under ASan+UBSan
   fuzz     every fuzz target: its corpus, then some seconds of search
-  recipes  the image's recipes and layers, parsed by BitBake, held against their rules
+  recipes  the image's recipes and layers, parsed by BitBake, and their rules
   live     everything over a veth pair, in real time
   dds      samples and commands over DDS between two namespaces
-  docs     the commands of README and of the tutorials, in a fresh clone
-  boot     the images, built and looked at, and in QEMU; skipped, and said so, where one is not root
+  docs     links and paths of all pages; the commands of README and the tutorials, in a fresh clone
+  boot     the images, built, inspected and booted in QEMU; skipped, with a message, without root
 Only when named:
-  control  of unit, sim, cli and live what is about control programs
-  sync0    of unit, cli and live what is about the SYNC0 check
-  wire     SYNC0 on GPIO lines of the image in QEMU; as root, on a machine that does nothing else
+  control  the tests of control programs in unit, sim, cli and live
+  sync0    the tests of the SYNC0 check in unit, cli and live
+  wire     SYNC0 on GPIO lines of the image in QEMU; as root, on an idle machine
 
   --keep-going      run all groups even if one fails (default)
-  --fail-fast       stop behind the first suite with a failure
+  --fail-fast       stop after the first suite with a failure
   --only PATTERN    only tests whose name matches (ctest -R, pytest -k)
   --fuzz-seconds N  of search for each fuzz target (default: 5)
 

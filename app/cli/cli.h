@@ -48,7 +48,7 @@ enum exit_code cli_exit_of(int errno_value);
 
 /**
  * The path of @file (CONFIG_RUN_...) in the run directory, CONFIG_PATH_BYTES long. EXIT_CODE_OK, or
- * the code of a failure that was said.
+ * the code of a failure, which has been reported.
  */
 enum exit_code cli_path(struct cli *cli, const char *file, char *ret_path);
 

@@ -29,7 +29,7 @@ void follow_close(struct follow *follow)
 }
 
 /* The ring is closed. Is its ecdaqd still there, so that another one may follow? */
-static int may_go_on(struct follow *follow)
+static int may_continue(struct follow *follow)
 {
 	const struct status_page *page;
 	uint32_t state;
@@ -43,9 +43,9 @@ static int may_go_on(struct follow *follow)
 	return running_is_alive(page->pid) && state != BUS_STOPPED && state != BUS_FAILED;
 }
 
-enum follow_news follow_next(struct follow *follow, uint64_t *ret_lost)
+enum follow_result follow_next(struct follow *follow, uint64_t *ret_lost)
 {
-	enum follow_news news = FOLLOW_IDLE;
+	enum follow_result result = FOLLOW_IDLE;
 
 	if (follow->is_idle) {
 		screen_wait(follow->idle_ns);
@@ -55,25 +55,25 @@ enum follow_news follow_next(struct follow *follow, uint64_t *ret_lost)
 	}
 	switch (reader_next(follow->samples.reader, ret_lost)) {
 	case READER_SAMPLE:
-		news = FOLLOW_SAMPLE;
+		result = FOLLOW_SAMPLE;
 		break;
 	case READER_LOST:
-		news = FOLLOW_LOST;
+		result = FOLLOW_LOST;
 		break;
 	case READER_EMPTY:
 		break;
 	case READER_BEGUN:
 		samples_take_table(&follow->samples);
-		news = FOLLOW_NEW_BUS;
+		result = FOLLOW_NEW_BUS;
 		break;
 	case READER_ENDED:
 	case READER_WAITING:
 		if (reader_error(follow->samples.reader) == -EIO) {
 			return FOLLOW_DAMAGED;
 		}
-		news = may_go_on(follow) ? FOLLOW_IDLE : FOLLOW_ENDED;
+		result = may_continue(follow) ? FOLLOW_IDLE : FOLLOW_ENDED;
 		break;
 	}
-	follow->is_idle = news == FOLLOW_IDLE;
-	return news;
+	follow->is_idle = result == FOLLOW_IDLE;
+	return result;
 }

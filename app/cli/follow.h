@@ -16,20 +16,20 @@ struct follow {
 	int is_idle;
 };
 
-enum follow_news {
+enum follow_result {
 	FOLLOW_SAMPLE,  /* samples_header() and samples_image() hold it */
 	FOLLOW_LOST,    /* this reader was too slow; *ret_lost samples are gone */
 	FOLLOW_IDLE,    /* nothing more for now: write out what you have */
-	FOLLOW_NEW_BUS, /* ecdaqd has started the bus anew: look channels up again */
+	FOLLOW_NEW_BUS, /* ecdaqd has restarted the bus: look channels up again */
 	FOLLOW_ENDED,   /* ecdaqd has ended */
 	FOLLOW_DAMAGED, /* the ring was truncated or overwritten */
-	FOLLOW_OVER,    /* the user wants to stop */
+	FOLLOW_OVER,    /* the user has requested the end */
 };
 
-/** Stand at the newest sample. EXIT_CODE_OK, or the code of a failure that was said. */
+/** Start at the newest sample. EXIT_CODE_OK, or the code of a failure, which has been reported. */
 enum exit_code follow_open(struct cli *cli, struct follow *ret_follow);
 void follow_close(struct follow *follow);
 
-enum follow_news follow_next(struct follow *follow, uint64_t *ret_lost);
+enum follow_result follow_next(struct follow *follow, uint64_t *ret_lost);
 
 #endif

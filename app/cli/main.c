@@ -70,16 +70,16 @@ static enum exit_code verb_program(struct cli *cli, int argc, char **argv)
 
 static const struct verb verbs[] = {
 	{ "status", "", "Bus, cycle, slaves and recorder on one screen.",
-	  "After ecdaqd has ended it shows the last known state and says so.\n", verb_status },
+	  "After ecdaqd has ended it shows the last known state, marked as such.\n", verb_status },
 	{ "top", "", "The same, live. Ends with q, Ctrl-C, or ecdaqd.",
 	  "Where standard output is no terminal it prints a line every interval instead.\n",
 	  verb_top },
 	{ "slaves", "", "The slaves: position, identity, AL state.", NULL, verb_slaves },
 	{ "channels", "", "The channel table: what the process image holds.", NULL, verb_channels },
-	{ "watch", "CHANNEL...", "Values of channels as they come, every cycle.",
+	{ "watch", "CHANNEL...", "Values of channels, every cycle.",
 	  "CHANNEL may hold * and ?: 'piccolo*.adc'. A sample that is not fresh is marked.\n",
 	  verb_watch },
-	{ "set", "OUTPUT=VALUE...", "Set outputs, all in the same cycle; says in which.",
+	{ "set", "OUTPUT=VALUE...", "Set outputs, all in the same cycle; prints its number.",
 	  "VALUE is physical, in the channel's unit; on, off, true, false for BOOL.\n", verb_set },
 	{ "oneshot", "SLAVE|all", "Fire SYNC0 once at a DC time, in one-shot mode.",
 	  "SLAVE is a name or a position. With all, every slave that has an output oneshot_time "
@@ -109,8 +109,8 @@ static const struct verb verbs[] = {
 	  NULL, verb_program },
 	{ "security", "...", "The keys of DDS Security (see ecdaq security --help).", NULL,
 	  verb_program },
-	{ "doctor", "", "Is this machine fit for the cycle? Each check with what mends it.",
-	  "OK, WARN: costs latency or safety. FAIL: measuring cannot be relied on. SKIP: does not\n"
+	{ "doctor", "", "Check this machine for the cycle; each problem with its fix.",
+	  "OK, WARN: costs latency or safety. FAIL: measurements are unreliable. SKIP: does not\n"
 	  "apply, or could not be read. Exit code 1 with a FAIL (--strict: or a WARN).\n",
 	  verb_doctor },
 	{ "clear", "", "Set counters and histograms of ecdaqd to zero.", NULL, verb_clear },

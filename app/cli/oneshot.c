@@ -143,7 +143,7 @@ static void look(struct oneshot *one, struct shot *shot)
 		return;
 	}
 	sampled_ns = (int64_t)image_get_raw(image, &samples->channels[shot->sample_time]);
-	/* What stood there before was sampled earlier. */
+	/* The value before that was sampled earlier. */
 	if (sampled_ns < shot->at_ns - EDGE_TOLERANCE_NS) {
 		return;
 	}

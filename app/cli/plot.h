@@ -26,7 +26,7 @@ struct plot_spec {
 struct plot *plot_create(const struct plot_spec *spec);
 void plot_destroy(struct plot *plot);
 
-/** @time_ns must not go back; if it does, the plot starts anew. */
+/** @time_ns must not go back; if it does, the plot is cleared. */
 void plot_add(struct plot *plot, unsigned panel, int64_t time_ns, double value);
 
 /** All panels in @rows lines. */

@@ -40,7 +40,7 @@ void screen_draw(const char *text, const char *footer);
 
 /**
  * Wait @ns or for a key: its code, or 0. 'q', Ctrl-C and a caught signal make screen_is_over() true
- * and end the wait, and so does SIGCONT: draw anew. Without screen_begin() no keys are read.
+ * and end the wait, and so does SIGCONT: redraw. Without screen_begin() no keys are read.
  */
 int screen_wait(int64_t ns);
 

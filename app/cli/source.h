@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Where the reading verbs read: status pages and rings of the run directory, by core/reader. What
- * goes wrong is said (cli_fail).
+ * Where the reading verbs read: status pages and rings of the run directory, by core/reader.
+ * Failures are reported (cli_fail).
  */
 #ifndef CLI_SOURCE_H
 #define CLI_SOURCE_H
@@ -14,11 +14,12 @@
 #include "cli/cli.h"
 #include "reader/reader.h"
 
-/** A copy of ecdaqd's status page. EXIT_CODE_OK, or the code of a failure that was said. */
+/** A copy of ecdaqd's status page. EXIT_CODE_OK, or the code of a failure, which has been reported.
+ */
 enum exit_code source_status(struct cli *cli, const struct status_page **ret_page);
 /** The same without a message; 0 or -errno. */
 int source_try_status(struct cli *cli, const struct status_page **ret_page);
-/** The recorder's page, or NULL: it may not have been started. Nothing is said. */
+/** The recorder's page, or NULL: it may not have been started. Reports nothing. */
 const struct record_status *source_record(struct cli *cli);
 /** The same of ecdaq-dds. */
 const struct dds_status *source_dds(struct cli *cli);
@@ -35,9 +36,10 @@ struct samples {
 	const struct channel *channels;
 };
 
-/** EXIT_CODE_OK, or the code of a failure that was said. Release with samples_close(). */
+/** EXIT_CODE_OK, or the code of a failure, which has been reported. Release with samples_close().
+ */
 enum exit_code samples_open(struct cli *cli, struct samples *ret_samples);
-/** The same without a word; 0 or -errno. */
+/** The same without a message; 0 or -errno. */
 int samples_try(struct cli *cli, struct samples *ret_samples);
 void samples_close(struct samples *samples);
 /** Take the table of the session that the reader has begun. */
@@ -52,11 +54,11 @@ void samples_flags_format(uint32_t flags, char *buf, size_t buf_len);
 /** The word of bit @bit; NULL for one that has none. */
 const char *samples_flag_name(unsigned bit);
 
-/** The n-th slave of the status page, copied, its texts closed. */
+/** The n-th slave of the status page, copied, its texts terminated. */
 struct slave_info source_slave(const struct status_page *page, uint32_t index);
 uint32_t source_slave_count(const struct status_page *page);
 
-/** The position that @text names, "piccolo0" or "1", or the code of a failure that was said. */
+/** The position that @text names, "piccolo0" or "1", or the code of a failure, reported. */
 enum exit_code source_find_slave(const struct cli *cli, const struct status_page *page,
 				 const char *text, uint16_t *ret_pos);
 

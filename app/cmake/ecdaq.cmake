@@ -15,7 +15,7 @@ target_link_libraries(ecdaq_all_wings INTERFACE ecdaq_options)
 target_include_directories(ecdaq_all_wings INTERFACE "${CMAKE_SOURCE_DIR}/core" "${CMAKE_SOURCE_DIR}/master"
 	"${CMAKE_SOURCE_DIR}/services" "${CMAKE_SOURCE_DIR}/sim" "${CMAKE_SOURCE_DIR}")
 
-# ecdaq_wing_includes(TARGET): what lies in a folder of app/ includes core/ and its own wing, by the
+# ecdaq_wing_includes(TARGET): sources in a folder of app/ include core/ and their own wing, by the
 # name of the module: "base/ring.h", "cycle/cycle.h". The cli is one module: "cli/text.h".
 function(ecdaq_wing_includes target)
 	file(RELATIVE_PATH place "${CMAKE_SOURCE_DIR}" "${CMAKE_CURRENT_SOURCE_DIR}")

@@ -111,7 +111,7 @@ fi
 [ -f "$archive" ] || die "$archive: no such file"
 found=$(sha256sum "$archive" | cut -d ' ' -f 1)
 [ "$found" = "$sha256" ] ||
-	die "$archive: SHA-256 is $found, but libgpiod.lock names $sha256; remove the file or mend the lock"
+	die "$archive: SHA-256 is $found, but libgpiod.lock names $sha256; remove the file or correct the lock file"
 
 top=${file%.tar.gz}
 tar -xzf "$archive" -C "$work" "$top/lib" "$top/include" "$top/LICENSE" ||

@@ -11,7 +11,7 @@ usage()
 usage: app/third_party/fetch-soem.sh [--archive FILE] [--force] [--help]
 
 Unpacks what soem.lock pins into app/third_party/soem/ and applies patches/*.patch in order.
-A run with nothing to do ends at once; a changed lock file or patch unpacks anew.
+A run with nothing to do ends at once; after a change of lock file or patches it unpacks again.
 
   --archive FILE  take the source distribution from FILE; nothing is downloaded
   --force         unpack even if nothing changed
@@ -155,7 +155,7 @@ fi
 [ -f "$archive" ] || die "$archive: no such file"
 found=$(sha256_of "$archive")
 [ "$found" = "$sha256" ] ||
-	die "$archive: SHA-256 is $found, but soem.lock names $sha256; remove the file or mend the lock"
+	die "$archive: SHA-256 is $found, but soem.lock names $sha256; remove the file or correct the lock file"
 
 unpack
 apply_patches

@@ -2,7 +2,7 @@
 """Write the reference page of the installed headers to standard output: api_page.py HEADER...
 
 The page holds nothing that is not in the headers: each one's opening comment, then its macros,
-types and functions in their order, each with the comment that stands before it.
+types and functions in their order, each with the comment before it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ INSTALLED = {"core/reader/api.h": "ecdaq/reader.h", "master/control/control.h": 
 
 @dataclass(frozen=True)
 class Item:
-    """One declaration: its name, its text as it stands in the header, its comment as prose."""
+    """One declaration: its name, its text in the header, its comment as prose."""
 
     name: str
     code: str

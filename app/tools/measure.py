@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: MIT
 """Measure on this machine and write one page per subject to app/doc/results/.
 
-Called by `build.sh measure`, which has built everything. Each page says by which command, at which
-commit, on which machine and when it was written.
+Called by `build.sh measure`, which has built everything. Each page names the command, the
+commit, the machine and the date.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ TERM_SECONDS = 20
 
 
 def adopt_orphans() -> None:
-    """What loses its parent becomes a child of this process, wherever it has hidden itself."""
+    """What loses its parent becomes a child of this process, whatever its session or group."""
     ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
 

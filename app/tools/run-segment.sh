@@ -24,8 +24,8 @@ real-time priority and reports that once.
   --config FILE   ecdaq.yaml for ecdaqd and ecdaq-record (default: built-in defaults)
   --record DIR    folder of the recordings (default: build/run/record)
   --no-dds        do not start ecdaq-dds. Without this option it publishes on the loopback interface,
-                  in a domain and with a tag of its own (one line names them), or as section dds of
-                  FILE says
+                  in a domain and with a tag of its own (printed at start), or as section dds of
+                  FILE configures
   --no-sync0      do not start ecdaq-sync0. Without this option it checks the simulated pulses, marked
                   as simulated in `ecdaq sync0`, or what section sync0 of FILE names (enable, edges)
   --json          no live view; the last line of standard output is `ecdaq status --json --summary`;
@@ -37,8 +37,8 @@ exit codes: 0 stopped as requested, 1 failed (the last line of standard error is
 environment:
   ECDAQ_BIN_DIR  folder of the programs (default: build/stage/bin)
   ECDAQ_RUN_DIR  run directory: rings, status, admin socket; used by one run at a time (default: a new
-                 /dev/shm/ecdaq-run-*, removed at the end). In a second terminal `ecdaq` reads what
-                 runs here, and app/tools/tell-segment.py sets inputs of the simulated slaves or
+                 /dev/shm/ecdaq-run-*, removed at the end). In a second terminal `ecdaq` reads this
+                 run, and app/tools/tell-segment.py sets inputs of the simulated slaves or
                  injects faults.
   ECDAQ_SII      as --sii
 USAGE
@@ -61,7 +61,7 @@ note()
 	printf -- '-- %s\n' "$*" >&2
 }
 
-# The highest domain: no default of anybody, and below the kernel's ephemeral ports.
+# The highest domain: not a default of any DDS, and below the kernel's ephemeral ports.
 private_domain=230
 seconds=
 slaves=2
@@ -224,7 +224,7 @@ start()
 	pid[$name]=$!
 }
 
-# failure NAME HOW: the first one is the cause of all others; its program's last message says more.
+# failure NAME HOW: the first one is the cause of all others; its program's last message has the details.
 failure()
 {
 	failed=1
@@ -344,7 +344,7 @@ clean_up()
 	[ -z "${run_dir_is_own:-}" ] || rm -rf "$ECDAQ_RUN_DIR"
 }
 
-# has_ended NAME: also says how, in $status.
+# has_ended NAME: sets $status to its exit code.
 has_ended()
 {
 	! kill -0 "${pid[$1]}" 2> /dev/null || return 1
@@ -352,8 +352,8 @@ has_ended()
 	wait "${pid[$1]}" || status=$?
 }
 
-# Returns when the first of the children has ended, except ecdaq-sync0: the run goes on without it. It
-# looks instead of waiting: a signal during "wait -n" can make bash lose the end of a child.
+# Returns when the first of the children has ended, except ecdaq-sync0: the run continues without it. It
+# polls instead of waiting: a signal during "wait -n" can make bash lose the end of a child.
 wait_for_end()
 {
 	local name status
@@ -418,7 +418,7 @@ run_inside()
 
 	[ "$sync0" = no ] || segment_options+=(--edges "$ECDAQ_RUN_DIR/edges" --edges-keep 8)
 
-	# As root the segment gets a real-time priority below the master's: it stands for hardware.
+	# As root the segment gets a real-time priority below the master's: it replaces hardware.
 	! chrt -f 1 true 2> /dev/null || segment_options+=(--priority 50)
 	[ -z "$sii" ] || segment_options+=(--sii "$sii")
 	[ -z "$seconds" ] || daemon_options+=(--seconds "$seconds")

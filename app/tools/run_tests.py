@@ -266,7 +266,6 @@ GROUPS: dict[str, list[Suite]] = {
         replace(ctest("unit", "tsan", "-R", SHARED_STATE_TESTS), run=run_shared_state),
     ],
     "tidy": [pytest("tidy", "release")],
-    "docs": [pytest("docs", "release")],
     "cli": [
         ctest("cli", "release"),
         pytest("cli", "release"),
@@ -284,7 +283,7 @@ GROUPS: dict[str, list[Suite]] = {
     "live": [ctest("live", "release"), pytest("live", "release")],
     "dds": [pytest("dds", "release", "-s")],
     "docs": [pytest("docs", "release")],
-    # What unit, sim, cli and live have of control programs, together.
+    # All tests of control programs in unit, sim, cli and live.
     "control": [
         Suite("control release", "release", run_ctest, ("-R", CONTROL_TESTS)),
         Suite("control cli python", "release", run_pytest, ("tests/cli", "-k", "control")),
@@ -295,7 +294,7 @@ GROUPS: dict[str, list[Suite]] = {
             ("tests/live", "-k", "control or loopback"),
         ),
     ],
-    # What unit, cli and live have of the SYNC0 check, together.
+    # All tests of the SYNC0 check in unit, cli and live.
     "sync0": [
         Suite("sync0 release", "release", run_ctest, ("-R", SYNC0_TESTS)),
         Suite("sync0 cli python", "release", run_pytest, ("tests/cli", "-k", "test_sync0")),
@@ -309,12 +308,12 @@ GROUPS: dict[str, list[Suite]] = {
     "boot": [booted("boot", f"--ignore-glob={WIRE_FILES}")],
     "wire": [booted("wire", "-k", "test_70_sync0 or test_80_sync0")],
 }
-# Part of other groups, or too exact for a machine that others load: only when named.
+# Part of other groups, or too exact for a loaded machine: only when named.
 ON_REQUEST = ("control", "sync0", "wire")
 
 
 class Builder:
-    """Builds each flavour or image when a suite first needs it, and remembers how that ended."""
+    """Builds each flavour or image when a suite first needs it, and keeps the result."""
 
     def __init__(self) -> None:
         self.failed: dict[str, str | None] = {}
@@ -420,7 +419,7 @@ def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def main(arguments: Sequence[str]) -> int:
-    # A shell that starts us in the background has SIGINT ignored, and so would all tests' programs.
+    # Started in the background by a shell, this ignores SIGINT; the tests must not inherit that.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, end_on_signal)
     adopt_orphans()

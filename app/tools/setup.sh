@@ -81,7 +81,7 @@ run_step()
 }
 
 # A Python of 3.11 or newer that can make environments; the machine's own if the first on PATH
-# (which may be anybody's) cannot.
+# (which may be any) cannot.
 find_python()
 {
 	for candidate in ${PYTHON:-} python3 /usr/bin/python3; do
@@ -200,7 +200,7 @@ need_packages()
 	[ -z "$missing" ] || report_missing "$missing" "still not found after installing"
 }
 
-# want_packages PURPOSE WHAT: the same for what is optional; one line says what is left out.
+# want_packages PURPOSE WHAT: the same for what is optional; one line names what is skipped.
 want_packages()
 {
 	[ -n "$(missing_packages "$1")" ] || return 0
@@ -238,7 +238,7 @@ make_venv()
 		--quiet --disable-pip-version-check --requirement "$root/tests/requirements.txt" ||
 		{
 			cat "$cache/venv.log" >&2
-			die "pip cannot install tests/requirements.txt (its reason is above)"
+			die "pip cannot install tests/requirements.txt (see above)"
 		}
 	touch "$venv/.complete"
 }
@@ -303,7 +303,7 @@ configure_flavour()
 		return 0
 	if ! run_step "configuring ${build_dir##*/}" "$build_dir/configure.log" "$@"; then
 		cat "$build_dir/configure.log" >&2
-		die "cannot configure $build_dir (cmake's reason is above)"
+		die "cannot configure $build_dir (see above)"
 	fi
 	printf '%s\n' "$*" > "$build_dir/configured"
 }

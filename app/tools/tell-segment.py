@@ -13,13 +13,13 @@ from pathlib import Path
 
 EPILOG = """\
 LINE is an io line or a fault line, as `ecdaq-sim --help` lists them:
-  io slave=0              what slave 0 has at its terminals
-  io slave=0 slot3.1=1    and channel 1 of its third module switched on first
+  io slave=0              the values at the terminals of slave 0
+  io slave=0 slot3.1=1    the same, after channel 1 of its third module is set
   at=1s for=200ms lose    a fault
 """
 
 
-def tell(path: Path, line: str) -> str:
+def send(path: Path, line: str) -> str:
     """The segment's answer to @line; OSError if there is none."""
     with (
         tempfile.TemporaryDirectory(prefix="ecdaq-tell-") as folder,
@@ -44,7 +44,7 @@ def main() -> int:
     )
     arguments = parser.parse_args()
     try:
-        print(tell(arguments.control, " ".join(arguments.line)))
+        print(send(arguments.control, " ".join(arguments.line)))
     except OSError as error:
         why = "no answer" if isinstance(error, TimeoutError) else error.strerror
         print(f"tell-segment: {arguments.control}: {why}", file=sys.stderr)

@@ -70,8 +70,8 @@ def read_junit(path: Path, label: str) -> Outcome:
             if case.get("status") == "notrun" and why != "SKIP_RETURN_CODE=77":
                 outcome.failures.append(f"{label}: {name}\ncould not be run: {why}")
                 continue
-            said = re.search(r"^skipped: (.*)$", output, re.MULTILINE)
-            outcome.skips.append(f"{label}: {name}: {said.group(1) if said else why}")
+            reason = re.search(r"^skipped: (.*)$", output, re.MULTILINE)
+            outcome.skips.append(f"{label}: {name}: {reason.group(1) if reason else why}")
         else:
             outcome.passed += 1
     return outcome

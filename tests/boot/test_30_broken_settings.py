@@ -13,16 +13,16 @@ BOOT_FILES = {
 }
 
 
-def test_the_console_says_what_is_wrong_and_where(machine: Machine) -> None:
+def test_the_console_names_the_error_and_its_place(machine: Machine) -> None:
     console = machine.console()
     assert "ecdaq.yaml on the boot partition is not used" in console
     assert "ecdaq.yaml:3" in console
     assert "colour" in console
-    assert "hostname: 'notaname!' is no host name" in console
-    assert "50-port.network: touches the EtherCAT port" in console
+    assert "hostname: 'notaname!' is not a host name" in console
+    assert "50-port.network: matches the EtherCAT port" in console
 
 
-def test_the_journal_says_it_too(machine: Machine) -> None:
+def test_the_journal_has_the_same_messages(machine: Machine) -> None:
     journal = machine.run("sudo journalctl --boot --unit=ecdaq-boot-config --output=cat")
     assert "is not used" in journal
 

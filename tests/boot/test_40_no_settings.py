@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""An untouched card: the machine comes up, says that nobody can log in, and lets nobody in."""
+"""An unmodified card: the machine boots, reports that no user can log in, and accepts no login."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from machine import Machine
 WITH_KEY = False
 
 
-def test_the_console_says_that_nobody_can_log_in(machine: Machine) -> None:
-    assert "nobody can log in: no key in authorized_keys" in machine.console()
+def test_the_console_reports_that_no_user_can_log_in(machine: Machine) -> None:
+    assert "no user can log in: no key in authorized_keys" in machine.console()
 
 
-def test_nobody_is_let_in(machine: Machine) -> None:
+def test_no_login_is_accepted(machine: Machine) -> None:
     result = machine.try_run("true")
     assert result.returncode == 255
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The power goes at random moments: the machine boots again by itself, its file system is mended
+"""The power goes at random moments: the machine boots again by itself, its file system is repaired
 by its journal alone, and the recordings open.
 
 In guest time, so that the moments are spread over the guest's second and not over the host's load.
@@ -23,7 +23,7 @@ OP_S = 900
 # What a cut may cost at most: one record.sync_period (1 s) and one record.chunk_period (100 ms),
 # and the time the disk takes.
 LOSS_LIMIT_CYCLES = 2000
-BAD_WORDS = ("cannot be mended", "e2fsck -y", "memory instead of the data partition")
+BAD_WORDS = ("cannot be repaired", "e2fsck -y", "memory instead of the data partition")
 
 
 def recording(machine: Machine) -> dict[str, Any] | None:
@@ -40,7 +40,7 @@ def check(machine: Machine) -> None:
 
 
 def cycles_kept(machine: Machine, status: dict[str, Any]) -> int:
-    """How many cycles of the run that `status` tells of are in the recordings."""
+    """How many cycles of the run in `status` are in the recordings."""
     run = Path(status["recording"]).name.rpartition("-")[0]
     rows = json.loads(machine.run("sudo ecdaq log list --dir /data/record --json", seconds=900))
     found = [row for row in rows if row["file"].startswith(run)]
@@ -54,7 +54,7 @@ def test_the_machine_comes_back_after_every_cut(machine: Machine) -> None:
     for cut in range(1, CUTS + 1):
         wait_for("a recording", OP_S, lambda: recording(machine))
         moment = dice.uniform(0.0, 8.0)
-        # The disk is busy, and what was seen last is told on the way out.
+        # The disk is busy, and the last state seen is reported at the end.
         seen = json.loads(
             machine.run(
                 "(sudo dd if=/dev/urandom of=/data/noise bs=64k count=64 status=none &)"

@@ -24,7 +24,7 @@ from made_machine import (
 
 # check, what is wrong, its level, a part of the value or the remedy
 BAD: list[tuple[str, Files, str, str]] = [
-    ("machine", {"/run/systemd/container": "lxc"}, "WARN", "say nothing about hardware"),
+    ("machine", {"/run/systemd/container": "lxc"}, "WARN", "do not apply to hardware"),
     (
         "machine",
         {"/proc/cpuinfo": "flags\t\t: fpu vme hypervisor\n"},

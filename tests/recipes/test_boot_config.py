@@ -47,7 +47,7 @@ class Place:
         }
 
     def run(self) -> str:
-        """What it said. It never fails: whatever the folder holds, the machine has to come up."""
+        """Its output. It never fails: whatever the folder holds, the machine has to boot."""
         self.console.write_text("")
         done = subprocess.run(
             [PROGRAM], env=self.environment, capture_output=True, text=True, check=False
@@ -73,9 +73,9 @@ def public_key(tmp_path: Path) -> str:
 
 def test_without_a_folder_the_built_in_settings_hold(place: Place) -> None:
     place.source.rmdir()
-    said = place.run()
-    assert "no ecdaq/ folder on the boot partition" in said
-    assert "nobody can log in" in said
+    output = place.run()
+    assert "no ecdaq/ folder on the boot partition" in output
+    assert "no user can log in" in output
     assert "period: 1ms" in (place.target / "ecdaq.yaml").read_text()
     assert "--set bus.interface=ecat0" in place.options()
     assert "--set cycle.cpu=3" in place.options()
@@ -83,7 +83,7 @@ def test_without_a_folder_the_built_in_settings_hold(place: Place) -> None:
     assert "--set record.budget=" in place.options()
 
 
-def test_what_a_file_says_is_not_said_again(place: Place) -> None:
+def test_an_option_in_the_file_gets_no_default(place: Place) -> None:
     (place.source / "ecdaq.yaml").write_text(
         "bus:\n  interface: lan9\ncycle:\n  cpu: 2\nrecord:\n  dir: /data/x\n  budget: 1GiB\n"
     )
@@ -94,9 +94,9 @@ def test_what_a_file_says_is_not_said_again(place: Place) -> None:
 
 def test_a_broken_file_is_named_and_not_used(place: Place) -> None:
     (place.source / "ecdaq.yaml").write_text("colour: blue\n")
-    said = place.run()
-    assert "ecdaq.yaml on the boot partition is not used" in said
-    assert "going on with the built-in settings" in said
+    output = place.run()
+    assert "ecdaq.yaml on the boot partition is not used" in output
+    assert "built-in settings are used" in output
     assert "colour" not in (place.target / "ecdaq.yaml").read_text()
     assert "is not used" in place.console.read_text()
 
@@ -104,21 +104,21 @@ def test_a_broken_file_is_named_and_not_used(place: Place) -> None:
 @pytest.mark.parametrize("text", ["", "x" * 70000])
 def test_an_empty_or_huge_file_is_left_out(place: Place, text: str) -> None:
     (place.source / "ecdaq.yaml").write_text(text)
-    assert "left out" in place.run()
+    assert "ignored" in place.run()
     assert "period: 1ms" in (place.target / "ecdaq.yaml").read_text()
 
 
 def test_keys_with_windows_line_ends_are_taken(place: Place, public_key: str) -> None:
     (place.source / "authorized_keys").write_text(public_key.replace("\n", "\r\n"))
-    said = place.run()
-    assert "nobody can log in" not in said
+    output = place.run()
+    assert "no user can log in" not in output
     assert (place.target / "ssh/operator").read_text() == public_key
 
 
-def test_a_file_without_a_key_lets_nobody_in(place: Place) -> None:
+def test_a_file_without_a_key_allows_no_login(place: Place) -> None:
     (place.source / "authorized_keys").write_text("please let me in\n")
-    said = place.run()
-    assert "no usable key" in said
+    output = place.run()
+    assert "no usable key" in output
     assert (place.target / "ssh/operator").read_text() == ""
 
 
@@ -133,17 +133,17 @@ def test_network_files_are_taken_but_never_for_the_ethercat_port(place: Place) -
     (place.source / "network").mkdir()
     (place.source / "network/10-a.network").write_text("[Match]\nName=lan0\n")
     (place.source / "network/20-b.network").write_text("[Match]\nName=ecat0\n")
-    said = place.run()
+    output = place.run()
     assert [p.name for p in place.networkd.iterdir()] == ["10-a.network"]
-    assert "20-b.network: touches the EtherCAT port" in said
+    assert "20-b.network: matches the EtherCAT port" in output
 
 
 def test_time_servers_are_addresses_and_nothing_else(place: Place) -> None:
     (place.source / "time-servers").write_text("# ours\r\nntp1.example\r\n$(reboot)\n192.0.2.1\n")
-    said = place.run()
+    output = place.run()
     sources = (place.target / "chrony.d/boot.sources").read_text()
     assert sources == "server ntp1.example iburst\nserver 192.0.2.1 iburst\n"
-    assert "is no address" in said
+    assert "is not an address" in output
 
 
 @pytest.mark.parametrize(

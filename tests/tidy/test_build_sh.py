@@ -119,6 +119,6 @@ def test_where_nothing_can_be_installed_what_is_missing_is_listed_with_its_reaso
     result = build_sh("build", PATH=str(tools), ECDAQ_OS_RELEASE=str(release))
     assert result.returncode == 1
     assert "not Debian 12 or 13" in result.stderr
-    assert re.search(r"^  ninja-build +carries the build out$", result.stderr, re.MULTILINE)
+    assert re.search(r"^  ninja-build +runs the build$", result.stderr, re.MULTILINE)
     assert re.search(r"^  patch +applies our patches", result.stderr, re.MULTILINE)
     assert "cmake " not in result.stderr

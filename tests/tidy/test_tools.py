@@ -23,7 +23,7 @@ def expect_silence(command: list[str]) -> None:
 def test_c_is_formatted() -> None:
     result = tools.run(["clang-format", "--dry-run", "--Werror", *tools.c_files()])
     unformatted = sorted(set(re.findall(r"^([^:\n]+):\d+:\d+: error", result.stderr, re.MULTILINE)))
-    assert result.returncode == 0, "./build.sh lint --fix mends:\n" + "\n".join(unformatted)
+    assert result.returncode == 0, "./build.sh lint --fix formats:\n" + "\n".join(unformatted)
 
 
 def test_python_is_formatted() -> None:

@@ -15,7 +15,7 @@
 #define RT_PERIOD "/proc/sys/kernel/sched_rt_period_us"
 #define TIMER_MIGRATION "/proc/sys/kernel/timer_migration"
 #define NO_CLAIM                                                                                   \
-	"latencies measured here say nothing about hardware" REMEDY "measure on the target "       \
+	"latencies measured here do not apply to hardware" REMEDY "measure on the target "         \
 	"hardware"
 
 /* A shorter exit latency does not make a cycle late. */

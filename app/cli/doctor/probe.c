@@ -330,7 +330,7 @@ static int call_disk(const char *dir, char text[PROBE_TEXT_BYTES])
 	return 0;
 }
 
-/* Mailbox property interface: GET_THROTTLED; the value sent says which sticky bits to clear. */
+/* Mailbox property interface: GET_THROTTLED; the value sent selects the sticky bits to clear. */
 static int call_throttled(const char *object, char text[PROBE_TEXT_BYTES])
 {
 	enum { TAG = 0x00030046, TAG_VALUE = 5, WORDS = 7 };

@@ -46,7 +46,7 @@ static enum exit_code init(const struct security *s)
 
 	if (result == EXIT_CODE_OK) {
 		print_appliance(s);
-		printf("%s/ca: whoever has it lets people in: keep it away from both\n", s->dir);
+		printf("%s/ca: signs the keys of all participants: keep it offline\n", s->dir);
 	}
 	return result;
 }
@@ -72,7 +72,7 @@ static enum exit_code add(const struct security *s, enum keystore_role role)
 		exit_of(keystore_add(s->dir, s->name, role, (unsigned)s->days, error), error);
 
 	if (result == EXIT_CODE_OK) {
-		printf("%s/%s: for this %s, and for nobody else\n", s->dir, s->name,
+		printf("%s/%s: for this %s only\n", s->dir, s->name,
 		       role == KEYSTORE_COMMANDER ? "commander" : "subscriber");
 	}
 	return result;

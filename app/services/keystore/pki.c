@@ -168,7 +168,7 @@ int pki_write_key(EVP_PKEY *key, const char *dir, const char *name, char *error)
 			 dir, name, error);
 }
 
-/* Keys with a passphrase are rejected: there is nobody to ask for it. */
+/* Keys with a passphrase are rejected: no user is present to enter it. */
 /* NOLINTNEXTLINE(readability-non-const-parameter): libcrypto's type of it */
 static int no_passphrase(char *buf, int size, int is_writing, void *arg)
 {

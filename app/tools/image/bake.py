@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Carry out the recipes of layers/ and recipes/ on this machine: what BitBake with Isar would do,
+"""Build the recipes of layers/ and recipes/ on this machine: what BitBake with Isar would do,
 with nothing but Debian and PyPI. Called by build-image.sh."""
 
 from __future__ import annotations

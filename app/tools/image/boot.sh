@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# The image in QEMU, for a person. `./build.sh boot` calls this.
+# The image in QEMU, for interactive use. `./build.sh boot` calls this.
 set -eu
 
 here=$(CDPATH='' cd -- "$(dirname -- "$0")" && pwd)
@@ -13,13 +13,13 @@ usage: ./build.sh boot [--fresh] [--ssh-port N] [--key FILE] [--config FILE] [--
                        [--lan] [--wire] [-- QEMU-OPTION...]
 
 Boots the image of machine qemuarm64 in QEMU (no KVM needed): its serial console here, its SSH port on
-127.0.0.1, the EtherCAT segment simulated inside. Nobody has a password: log in with
+127.0.0.1, the EtherCAT segment simulated inside. There are no passwords: log in with
 
   ssh -p 2222 -i build/image/boot/key operator@127.0.0.1
 
 and end it with `sudo poweroff` there, or Ctrl-a x here. The disk keeps what was recorded.
 
-  --fresh       start from a new disk (default: the disk of the last time, if the image is the same)
+  --fresh       start from a new disk (default: the previous disk, if the image is the same)
   --ssh-port N  port on 127.0.0.1 that leads to the guest's SSH (default: 2222)
   --key FILE    public key that may log in (default: one made for this, build/image/boot/key)
   --config FILE ecdaq.yaml for the boot partition (default: one for emulation,
@@ -126,7 +126,7 @@ if [ "$lan" = yes ]; then
 fi
 boot mcopy -o authorized_keys ecdaq.yaml ::ecdaq/
 
-# What is started and made for the guest ends with it.
+# What was started and created for the guest is removed when it ends.
 pids=
 taps=
 end()
@@ -141,7 +141,7 @@ trap end EXIT
 trap 'exit 1' INT TERM HUP
 add_tap()
 {
-	ip tuntap add dev "$2" mode tap || die "$1: no tap $2 to be had (its reason is above)"
+	ip tuntap add dev "$2" mode tap || die "$1: cannot create tap $2 (see above)"
 	taps="$taps $2"
 }
 

@@ -14,14 +14,14 @@ usage: ./build.sh image [--machine MACHINE] [--recipe RECIPE] [--jobs N] [--plan
 
 Builds the disk image of the appliance: a Debian 13 root file system, our PREEMPT_RT kernel and our
 programs, from the recipes in recipes/ and layers/. Needs Debian 12 or 13 on x86-64 and root (it makes
-chroots, and runs arm64 programs through the kernel's binfmt_misc). What is done is kept, by the hash
-of all that went in: a second run only does what changed.
+chroots, and runs arm64 programs through the kernel's binfmt_misc). Results are cached by the
+hash of all inputs: a second run only does what changed.
 
   --machine MACHINE  qemuarm64 (default): QEMU's virt machine, the segment simulated inside;
                      raspberrypi4-64: Raspberry Pi 4 Model B and Compute Module 4
   --recipe RECIPE    one recipe instead of the whole image: linux-ecdaq, soem, ecdaq, ecdaq-config
   --jobs N           tasks at the same time (default: as many as there are cores)
-  --plan             say what would be done, and the hash of each task, and end
+  --plan             print the tasks that would run, with their hashes, and exit
 
 The results are in build/image/MACHINE/: the disk (.img, .img.zst for flashing, .bmap), the kernel, its
 command line, the package list (.manifest), the bill of materials (.spdx.json) and .sha256.
@@ -91,7 +91,7 @@ need_bitbake()
 		"${PYTHON:-python3}" -m venv "$venv" || die "${PYTHON:-python3} cannot make an environment"
 		"$venv/bin/python" -m pip install --quiet --disable-pip-version-check \
 			--requirement "$here/requirements.txt" ||
-			die "pip cannot install app/tools/image/requirements.txt (its reason is above)"
+			die "pip cannot install app/tools/image/requirements.txt (see above)"
 		touch "$venv/.complete"
 	}
 }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Carry tasks out: stamps say what is done, kept results are brought back instead of made again."""
+"""Run tasks: stamps record what is done, kept results are restored instead of made again."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ RESULTS_KEPT = 8
 
 
 def copy_tree(source: Path, target: Path) -> None:
-    """As it is; what holds nothing takes no room: a disk image is mostly that."""
+    """Unchanged; holes take no space: a disk image is mostly holes."""
     target.parent.mkdir(parents=True, exist_ok=True)
     subprocess.run(["cp", "-a", "--reflink=auto", "--sparse=always", source, target], check=True)
 
 
 class BuildError(Exception):
-    """A task failed; the message says which and where its log is."""
+    """A task failed; the message names it and its log."""
 
 
 @dataclass
@@ -35,11 +35,11 @@ class Running:
 
     task: Task
     started: float
-    told: float = field(default=0.0)
+    reported: float = field(default=0.0)
 
 
 class Executor:
-    """Runs what a wanted task needs, at most `jobs` at a time."""
+    """Runs a task and what it needs, at most `jobs` at a time."""
 
     def __init__(self, graph: Graph, cache: Path, jobs: int) -> None:
         self.graph = graph
@@ -60,7 +60,7 @@ class Executor:
         return Path(keep) if keep else None
 
     def is_done(self, task: Task) -> bool:
-        """Done with exactly these inputs, its stamp says."""
+        """Whether its stamp has the hash of these inputs."""
         stamp = self._stamp(task)
         if self.graph.recipe(task).flag(task.name, "nostamp"):
             return False
@@ -71,8 +71,8 @@ class Executor:
         stamp.parent.mkdir(parents=True, exist_ok=True)
         stamp.write_text(self.graph.hash(task))
 
-    def plan(self, wanted: Task) -> list[Task]:
-        """What has to run for `wanted`, in order; nothing below a result that is there."""
+    def plan(self, goal: Task) -> list[Task]:
+        """What has to run for `goal`, in order; nothing below an existing result."""
         order: list[Task] = []
         seen: set[Task] = set()
 
@@ -88,7 +88,7 @@ class Executor:
                 visit(other)
             order.append(task)
 
-        visit(wanted)
+        visit(goal)
         return order
 
     def _restore(self, task: Task) -> None:
@@ -170,15 +170,15 @@ class Executor:
         return run.task
 
     def _wait(self) -> Task | None:
-        """The next task that ends; tells once a minute what is still being worked on."""
+        """The next task that ends; prints once a minute which are still running."""
         while True:
             pid, status = os.waitpid(-1, os.WNOHANG)
             if pid in self.running:
                 return self._finish(pid, status)
             now = time.monotonic()
             for run in self.running.values():
-                if now - run.told >= STILL_EVERY_S:
-                    run.told = now
+                if now - run.reported >= STILL_EVERY_S:
+                    run.reported = now
                     print(f"      {run.task}: {now - run.started:.0f} s so far", flush=True)
             time.sleep(0.05)
 
@@ -186,9 +186,9 @@ class Executor:
         """The log of a task, as BitBake writes it."""
         return Path(self.graph.recipe(task).value("T")) / f"log.{task.name}"
 
-    def run(self, wanted: Task) -> int:
-        """Do what `wanted` needs. The number of tasks that ran; BuildError if one failed."""
-        order = self.plan(wanted)
+    def run(self, goal: Task) -> int:
+        """Run what `goal` needs. The number of tasks that ran; BuildError if one failed."""
+        order = self.plan(goal)
         waiting = {t: {o for o in self.graph.needs(t) if o in order} for t in order}
         for task in order:
             if self._object(task).exists():

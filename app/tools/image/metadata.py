@@ -21,7 +21,7 @@ class MetadataError(Exception):
 
 
 class _Collect(logging.Handler):
-    """BitBake reports through logging: keep what it says about errors."""
+    """BitBake reports through logging: keep its errors."""
 
     def __init__(self) -> None:
         super().__init__(logging.ERROR)
@@ -67,12 +67,12 @@ class Recipe:
         return str(self.data.getVar(name) or "")
 
     def layer(self) -> str:
-        """The folder the recipe stands in, below the top of the tree."""
+        """The recipe's folder, below the top of the tree."""
         return self.file.parts[-4] if len(self.file.parts) > 3 else ""
 
 
 def write_configuration(top: Path, build: Path, settings: dict[str, str]) -> None:
-    """bblayers.conf and local.conf, as a person would write them for BitBake."""
+    """bblayers.conf and local.conf, as one writes them for BitBake."""
     conf = build / "conf"
     conf.mkdir(parents=True, exist_ok=True)
     layers = " ".join(str(top / layer) for layer in LAYERS)

@@ -22,16 +22,16 @@ from pathlib import Path
 from typing import Any, TextIO
 
 EPILOG = """\
-PIPE is made if it is not there; start this before ecdaq-sim, and both before or after QEMU, whose
+PIPE is created if missing; start this before ecdaq-sim, and both before or after QEMU, whose
 options are -qtest unix:QTEST,server=on,wait=off -qtest-log none -qmp unix:QMP,server=on,wait=off
 """
 LINES = range(8)
 POWER_BUTTON = 3
-PATIENCE_S = 60.0
+CONNECT_TIMEOUT_S = 60.0
 
 
 class WireError(Exception):
-    """Why there is no wire; one line."""
+    """Why there is no wire, in one line."""
 
 
 class Connection:
@@ -39,7 +39,7 @@ class Connection:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        until = time.monotonic() + PATIENCE_S
+        until = time.monotonic() + CONNECT_TIMEOUT_S
         while True:
             try:
                 self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
@@ -52,10 +52,10 @@ class Connection:
                 time.sleep(0.1)
         self.file = self.socket.makefile("rb")
 
-    def say(self, line: str) -> None:
+    def send(self, line: str) -> None:
         self.socket.sendall(line.encode() + b"\n")
 
-    def hear(self) -> str:
+    def receive(self) -> str:
         line = self.file.readline()
         if not line:
             raise WireError(f"{self.path}: QEMU is gone")
@@ -63,17 +63,17 @@ class Connection:
 
 
 class Monitor(Connection):
-    """QEMU's monitor, where the chip is looked for."""
+    """QEMU's monitor, which knows the chip."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        self.hear()
+        self.receive()
         self.ask("qmp_capabilities")
 
     def ask(self, command: str, **arguments: str) -> Any:
-        self.say(json.dumps({"execute": command, "arguments": arguments}))
+        self.send(json.dumps({"execute": command, "arguments": arguments}))
         while True:
-            answer = json.loads(self.hear())
+            answer = json.loads(self.receive())
             if "error" in answer:
                 raise WireError(f"{self.path}: {command}: {answer['error']['desc']}")
             if "return" in answer:
@@ -100,30 +100,30 @@ class Pins(Connection):
         self.chip = chip
 
     def pulse(self, line: int) -> None:
-        """Up and down again; it has happened when this returns."""
+        """Up and down again; both are done when this returns."""
         pin = f"set_irq_in {self.chip} unnamed-gpio-in {line}"
-        self.say(f"{pin} 1\n{pin} 0")
+        self.send(f"{pin} 1\n{pin} 0")
         for _ in range(2):
-            answer = self.hear()
+            answer = self.receive()
             if not answer.startswith("OK"):
                 raise WireError(f"{self.path}: '{answer}' to {pin}")
 
 
 def open_pipe(path: Path) -> TextIO:
-    """Waits for who writes it."""
+    """Waits for a writer."""
     with contextlib.suppress(FileExistsError):
         os.mkfifo(path)
     if not stat.S_ISFIFO(path.stat().st_mode):
-        raise WireError(f"{path}: is no pipe: the edges of a file come too late for a wire")
+        raise WireError(f"{path}: not a pipe: the edges in a file are too late for a wire")
     return path.open()
 
 
 def carry(pipe: TextIO, pins: Pins, line_of: dict[int, int], log: TextIO | None) -> None:
-    """Each edge to its line, until nobody writes any more."""
+    """Each edge to its line, until the writer has closed the pipe."""
     for edge in pipe:
         words = edge.split()
         if len(words) != 3:
-            continue  # what another reader left of a line
+            continue  # the rest of a line that another reader began
         slave, at_ns, dc_ns = (int(word) for word in words)
         line = line_of.get(slave)
         if line is None:

@@ -4,8 +4,8 @@
 # virt.sh FOLDER host|guest [QEMU-OPTION...]
 #
 # host:  its clock is the host's; both processors run at once. Function, not timing.
-# guest: its clock counts instructions, one a nanosecond, and stands still for nobody else: a cycle of
-#        1 ms holds whatever the host does. QEMU then runs one processor at a time and hands over when
+# guest: its clock counts instructions, one a nanosecond, and is independent of the host's load: a
+#        cycle of 1 ms holds. QEMU then runs one processor at a time and hands over when
 #        1/N of the time to the next timer is spent, N being the number of processors. With two, one
 #        waits up to half a cycle for the other. So N is 16, of which Linux uses two (nr_cpus=2; the
 #        others are never started), and the turns are short.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# A package of files: do_install lays them into ${D} as they shall be on the target.
+# A package of files: do_install copies them to ${D} with their paths on the target.
 inherit dpkg
 
 D = "${S}/image"

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # A root file system of IMAGE_PREINSTALL (Debian's) and IMAGE_INSTALL (recipes'), and a disk made of
-# it as WKS_FILE says. Variables as in Isar; the work is done by mmdebstrap and meta-local/lib.
+# it as WKS_FILE describes. Variables as in Isar; the work is done by mmdebstrap and meta-local/lib.
 inherit sdk-run
 
 # An image is of one machine; everything else is shared by machines.
@@ -117,7 +117,7 @@ unpack_rootfs() {
 	tar -xpf "${WORKDIR}/tar/rootfs.tar" --numeric-owner --xattrs --xattrs-include='*' -C "${IMAGE_ROOTFS}"
 }
 
-# Kernel and device trees stand beside the image.
+# Kernel and device trees are beside the image.
 do_copy_boot_files[cleandirs] = "${DEPLOYDIR}"
 do_copy_boot_files() {
 	cp "${IMAGE_ROOTFS}/boot/vmlinux" "${DEPLOYDIR}/${KERNEL_IMAGE}"
@@ -135,7 +135,7 @@ make_disk() {
 	sdk_run sh "${PP}/disk/make-disk.sh" "${PP}"
 }
 
-# The newest image of this machine is laid where people look; a link costs no room.
+# Copies the newest image of this machine to the deploy folder (reflinks where the file system has them).
 addtask deploy after do_image before do_build
 do_deploy[nostamp] = "1"
 do_deploy() {

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Work inside the SDK chroot (sdk-chroot.bb). Each call has a mount namespace of its own, in which the
-# chroot lies under an overlay: what a package installs there is gone afterwards, and nothing stays
+# chroot is below an overlay: what a package installs there is gone afterwards, and nothing stays
 # mounted, however the call ends.
 
 # Where a recipe's WORKDIR is seen inside, as in Isar.

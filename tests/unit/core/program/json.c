@@ -73,9 +73,10 @@ TEST(json, utf8_goes_through_and_what_is_none_is_replaced)
 	text_is("\xc0\xaf", "\"\xef\xbf\xbd\xef\xbf\xbd\"");                 /* overlong */
 	text_is("\xe0\x80\xaf", "\"\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd\""); /* overlong */
 	text_is("\xed\xa0\x80", "\"\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd\""); /* surrogate */
-	text_is("\xf4\x90\x80\x80", "\"\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd\""); /* beyond
-												U+10FFFF
-											      */
+	text_is("\xf4\x90\x80\x80",
+		"\"\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd\""); /* beyond
+									    U+10FFFF
+									  */
 }
 
 TEST(json, floats_are_short_and_read_back_the_same)

@@ -5,8 +5,8 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "harness/test.h"
 #include "harness/made_ring.h"
+#include "harness/test.h"
 
 static struct status_page copy;
 

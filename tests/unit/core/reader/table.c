@@ -4,8 +4,8 @@
 #include <errno.h>
 #include <string.h>
 
-#include "harness/test.h"
 #include "harness/made_ring.h"
+#include "harness/test.h"
 
 TEST(channel_table, channels_are_grouped_by_slave_and_found_by_entry)
 {
