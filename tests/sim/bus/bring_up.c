@@ -160,7 +160,7 @@ TEST(bring_up, outputs_reach_the_board)
 	bench_destroy(b);
 }
 
-TEST(bring_up, terminals_that_are_only_an_sii_come_to_op)
+TEST(bring_up, terminals_simulated_from_their_sii_reach_op)
 {
 	struct bus_bench *b = bench_create(&(struct bench_spec){
 		.sii = { "ek1100", "el2828", "el2889" }, .ppm = { 30, -30, 60 }, .seed = 5 });
@@ -201,7 +201,7 @@ TEST(bring_up, mixed_line_packs_bits_and_bytes)
 	bench_destroy(b);
 }
 
-TEST(bring_up, many_kinds_of_real_images_stand_in_one_line)
+TEST(bring_up, many_kinds_of_real_images_work_in_one_line)
 {
 	struct bus_bench *b = bench_create(&(struct bench_spec){
 		.piccolos = 1,
@@ -220,7 +220,7 @@ TEST(bring_up, many_kinds_of_real_images_stand_in_one_line)
 	bench_destroy(b);
 }
 
-TEST(bring_up, slave_that_says_coe_answers_or_is_an_error)
+TEST(bring_up, slave_that_announces_coe_answers_or_is_an_error)
 {
 	struct bus_bench *b = bench_create(&(struct bench_spec){ .sii = { "akd" }, .seed = 7 });
 	int r = bench_find(b);

@@ -16,7 +16,7 @@ enum {
 	SIGMA_NS = 2000,
 	FEATURES_DC = 0x000c,
 	MAILBOX_START = 0x1000,
-	NOBODY = 0x7777
+	NO_SLAVE_ADDR = 0x7777
 };
 
 #define TAI_START_NS (INT64_C(1795000000) * NS_PER_S)
@@ -80,9 +80,9 @@ static void make_segment(struct bus_bench *b, const struct bench_spec *spec)
 /* --- the master's transport: the host's, counted --- */
 
 /*
- * A reference that does not answer: its reads go to an address that nobody has, and an FRMW becomes
- * the write that the others would see. It counts the reference itself as one of them, which is
- * taken back on the way in.
+ * A reference that does not answer: its reads go to an address that no slave has, and an FRMW
+ * becomes the write that the others would see. The reference itself executes it, too, which is
+ * subtracted from the returned WKC.
  */
 static void mute(uint8_t *frame, size_t frame_len, uint16_t reference)
 {
@@ -92,7 +92,7 @@ static void mute(uint8_t *frame, size_t frame_len, uint16_t reference)
 	while (ecat_frame_next(frame, frame_len, &pos, &dg) == 1) {
 		if (dg.ado == ESC_REG_DC_SYSTEM_TIME && dg.adp == reference &&
 		    (dg.cmd == ECAT_CMD_FRMW || dg.cmd == ECAT_CMD_FPRD)) {
-			put_le16(dg.data - 8, NOBODY);
+			put_le16(dg.data - 8, NO_SLAVE_ADDR);
 		}
 	}
 }
@@ -118,7 +118,7 @@ static void unmute(const struct bus_bench *b, uint8_t *frame, size_t frame_len)
 	size_t pos = 0;
 
 	while (ecat_frame_next(frame, frame_len, &pos, &dg) == 1) {
-		if (dg.adp == NOBODY) {
+		if (dg.adp == NO_SLAVE_ADDR) {
 			put_le16(dg.data - 8, bus_plan(b->bus)->dc_reference);
 			put_le16(dg.wkc,
 				 (uint16_t)(get_le16(dg.wkc) - (dg.cmd == ECAT_CMD_FRMW ? 1 : 0)));

@@ -58,13 +58,13 @@ struct bus_bench {
 /** Ends the test if it cannot be built; skips it where an SII file is not there. */
 struct bus_bench *bench_create(const struct bench_spec *spec);
 void bench_destroy(struct bus_bench *b);
-/** The master is gone without a word; a new one stands at the same line. */
+/** End the master without taking the bus down; a new one opens the same line. */
 void bench_new_master(struct bus_bench *b);
 
-/* Steps; each returns what the bus said. */
+/* Steps of bring-up; each returns the result of the bus call. */
 int bench_find(struct bus_bench *b);  /* scan, compare */
 int bench_map(struct bus_bench *b);   /* and map, clocks */
-int bench_cycle(struct bus_bench *b); /* exchange begins; runs until the loop stands */
+int bench_cycle(struct bus_bench *b); /* exchange begins; runs until the loop has settled */
 int bench_to_op(struct bus_bench *b); /* SYNC0, SAFE-OP, OP */
 /** All of it; ends the test with the bus's line on failure. */
 void bench_bring_up(struct bus_bench *b);
@@ -77,7 +77,7 @@ unsigned bench_recover(struct bus_bench *b, unsigned limit);
 struct bus_watch_report bench_watch(struct bus_bench *b);
 int bench_stop(struct bus_bench *b);
 
-/** 1: the reference's system time answers no more (WKC 0), all else goes on; 0: it does again. */
+/** 1: the reference's system time no longer answers (WKC 0), all else does; 0: it answers again. */
 void bench_mute_reference(struct bus_bench *b, int is_mute);
 /** A line of sim/fault.h; its times count from now. */
 void bench_fault(struct bus_bench *b, const char *line);

@@ -89,8 +89,8 @@ TEST(faults, one_frame_in_a_hundred_lost_does_not_keep_the_bus_from_op)
 	}
 }
 
-/* T09: the master is killed in OP; SYNC0 goes on, the slaves are in OP or fell by watchdog. */
-TEST(faults, killed_master_leaves_a_bus_that_the_next_one_takes)
+/* T09: the master is killed in OP; SYNC0 continues, the slaves are in OP or left it by watchdog. */
+TEST(faults, after_a_killed_master_the_next_one_reaches_op)
 {
 	for (unsigned wait_ms = 0; wait_ms <= 300; wait_ms += 60) {
 		struct bus_bench *b =
@@ -111,7 +111,7 @@ TEST(faults, killed_master_leaves_a_bus_that_the_next_one_takes)
 }
 
 /* T10 */
-TEST(faults, sync0_start_in_the_past_is_noticed_and_done_again)
+TEST(faults, sync0_start_in_the_past_is_detected_and_retried)
 {
 	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 2, .seed = 60 });
 	uint64_t before;
@@ -229,7 +229,7 @@ static int clocks_with(const char *fault, char *ret_error)
 	return r;
 }
 
-TEST(faults, drift_burst_goes_on_over_a_wire_that_is_silent_for_a_while)
+TEST(faults, drift_burst_continues_after_a_short_silence_of_the_wire)
 {
 	char error[BUS_ERROR_BYTES];
 
@@ -237,7 +237,7 @@ TEST(faults, drift_burst_goes_on_over_a_wire_that_is_silent_for_a_while)
 	CHECK_EQ(clocks_with("at=5ms for=200ms lose", error), 0);
 }
 
-TEST(faults, drift_burst_on_a_dead_wire_ends_and_says_for_how_long_nothing_came)
+TEST(faults, drift_burst_on_a_dead_wire_ends_and_reports_the_duration_of_silence)
 {
 	char error[BUS_ERROR_BYTES];
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What slaves say in their mailboxes unasked, and what they refuse. */
+/* Unsolicited mailbox messages of slaves, and aborted requests. */
 #include <errno.h>
 
 #include "base/bytes.h"
@@ -72,7 +72,7 @@ static void check_emergency(unsigned count, uint16_t slave)
 	CHECK(strstr(text, "emergency 0x5112, error register 0x21, data a0 a1 a2 a3 a4") != NULL);
 }
 
-TEST(mailbox, emergency_that_nobody_asks_for_becomes_an_event)
+TEST(mailbox, unsolicited_emergency_becomes_an_event)
 {
 	struct bus_bench *b = start(3, 111);
 	uint64_t bad = b->cycles - b->ok;
@@ -90,7 +90,7 @@ TEST(mailbox, emergency_that_nobody_asks_for_becomes_an_event)
 	bench_destroy(b);
 }
 
-TEST(mailbox, emergency_in_front_of_an_answer_is_told_and_the_answer_is_read)
+TEST(mailbox, emergency_before_an_answer_is_reported_and_the_answer_is_read)
 {
 	struct bus_bench *b = start(2, 112);
 	uint8_t data[64];

@@ -78,7 +78,7 @@ TEST(recovery, slave_in_the_middle_is_power_cycled)
 	power_cycle(3, 1, 71);
 }
 
-/* T17, T18: everything behind is gone with it; clocks go on by themselves. */
+/* T17, T18: everything behind is lost with it; the clocks run on freely. */
 TEST(recovery, reference_clock_is_power_cycled)
 {
 	power_cycle(3, 0, 72);
@@ -347,7 +347,7 @@ TEST(recovery, watching_costs_no_cycle)
 	bench_destroy(b);
 }
 
-TEST(recovery, slave_that_missed_one_look_is_neither_lost_nor_in_op)
+TEST(recovery, slave_that_missed_one_poll_is_neither_lost_nor_in_op)
 {
 	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 2, .seed = 96 });
 	struct bus_watch_report report;
@@ -361,7 +361,7 @@ TEST(recovery, slave_that_missed_one_look_is_neither_lost_nor_in_op)
 	bench_destroy(b);
 }
 
-TEST(recovery, stop_on_a_dead_line_ends_soon_and_says_so)
+TEST(recovery, stop_on_a_dead_line_ends_soon_with_an_error)
 {
 	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 8, .seed = 97 });
 	int64_t begun_ns;

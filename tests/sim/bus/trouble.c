@@ -66,7 +66,7 @@ TEST(trouble, blank_eeprom_is_an_error_and_no_hang)
 	bench_destroy(b);
 }
 
-TEST(trouble, category_that_goes_round_in_circles_ends_the_walk)
+TEST(trouble, circular_category_list_ends_the_walk)
 {
 	struct bus_bench *b = bench_create(&(struct bench_spec){ .sii = { "el2889" }, .seed = 15 });
 	struct esc *esc = segment_esc(b->segment, 0);
@@ -173,7 +173,7 @@ static unsigned mailbox_writes_of_bring_up(uint8_t coe_details)
 	return writes;
 }
 
-TEST(trouble, slave_without_sdo_information_is_not_asked_for_it)
+TEST(trouble, sdo_information_is_not_requested_from_a_slave_without_it)
 {
 	enum { SDO = 0x01, SDO_INFORMATION = 0x02, PDO_ASSIGN = 0x04 };
 	unsigned without = mailbox_writes_of_bring_up(SDO);

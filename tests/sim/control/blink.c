@@ -29,7 +29,7 @@ static unsigned wrong;
 static unsigned changes;
 static uint64_t last_led;
 
-/* After each cycle: the LED bit in its frame is the one that its DC time asks for. */
+/* After each cycle: the LED bit in its frame is the one that its DC time requires. */
 static void check_led(struct virtual_master *master)
 {
 	const struct sample_header *h;
@@ -129,7 +129,7 @@ static void check_refused(const char *options, const char *why)
 	close_all();
 }
 
-TEST(sim_control, blink_says_what_is_wrong_with_its_options)
+TEST(sim_control, blink_reports_errors_in_its_options)
 {
 	check_refused("control.options=slave=a",
 		      "init() failed: a.led: does not belong to the program (outputs: owner: "

@@ -181,7 +181,7 @@ TEST(sim_control, pi_loop_holds_over_lost_frames)
 	close_all();
 }
 
-TEST(sim_control, the_plant_falls_to_nothing_when_its_master_is_gone)
+TEST(sim_control, the_plant_falls_to_zero_when_its_master_is_gone)
 {
 	int64_t start_ns;
 	struct sim_device *plant;
@@ -219,7 +219,7 @@ static void check_refused(const char *options, const char *why)
 	close_all();
 }
 
-TEST(sim_control, pi_loop_says_what_is_wrong_with_its_options)
+TEST(sim_control, pi_loop_reports_errors_in_its_options)
 {
 	check_refused("control.options=min=5, max=5", "min must be below max");
 	check_refused("control.options=kp=-1", "kp and ki must not be below 0");

@@ -73,7 +73,7 @@ static void check_frame(struct virtual_master *master)
 	checked++;
 }
 
-TEST(sim_control, what_is_made_of_the_inputs_of_cycle_k_goes_out_in_cycle_k_plus_1)
+TEST(sim_control, outputs_computed_from_cycle_k_are_sent_in_cycle_k_plus_1)
 {
 	struct probe *probe = probe_use();
 	uint64_t calls;

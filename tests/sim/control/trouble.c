@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Programs that crash, ask for safety, take too long, or are there when the bus falls. */
+/* Programs that crash, request fail-safe, take too long, or run when the bus fails. */
 #include <errno.h>
 #include <signal.h>
 
@@ -155,7 +155,7 @@ TEST(sim_control, when_the_process_dies_the_slave_s_own_watchdog_makes_the_outpu
 	close_all();
 }
 
-TEST(sim_control, a_program_runs_in_op_only_and_starts_anew_when_op_is_back)
+TEST(sim_control, a_program_runs_in_op_only_and_restarts_when_op_is_back)
 {
 	uint64_t before;
 
@@ -219,7 +219,7 @@ static int make_safe(const struct ecdaq_cycle *cy, void *state)
 	return calls > 150 ? ECDAQ_MAKE_SAFE : ECDAQ_GO_ON;
 }
 
-TEST(sim_control, a_program_that_asks_for_safety_gets_it_in_the_next_frame)
+TEST(sim_control, fail_safe_requested_by_a_program_is_in_the_next_frame)
 {
 	open_all(make_safe);
 	virtual_master_run(&vm, 200 - calls);
@@ -250,7 +250,7 @@ static int be_slow_once(const struct ecdaq_cycle *cy, void *state)
 	return ECDAQ_GO_ON;
 }
 
-/* Run until the slow cycle and @cycles more; what virtual_master_run() said. */
+/* Run until the slow cycle and @cycles more; the result of virtual_master_run(). */
 static int run_slowly(const char *policy, uint64_t cycles)
 {
 	static char overrun[64];

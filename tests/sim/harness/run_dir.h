@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Run directories of a test: on a tmpfs, and gone when the program ends, however it ends. */
+/* Run directories of a test: on a tmpfs, removed at the end of the program, however it ends. */
 #ifndef TESTS_SIM_HARNESS_RUN_DIR_H
 #define TESTS_SIM_HARNESS_RUN_DIR_H
 

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What stands on the table in a test: a line of slaves on virtual time, FB1111-Piccolo boards if
- * nothing else is asked for, a host clock, a plan of faults, and an oscilloscope on every SYNC0
- * pin. Masters come and go (virtual_master.h).
+ * The test bench: a line of slaves on virtual time, FB1111-Piccolo boards by default, a host clock,
+ * a plan of faults, and an oscilloscope on every SYNC0 pin. Masters come and go (virtual_master.h).
  */
 #ifndef TESTS_SIM_HARNESS_VIRTUAL_BENCH_H
 #define TESTS_SIM_HARNESS_VIRTUAL_BENCH_H
@@ -59,7 +58,7 @@ void virtual_bench_done(struct virtual_bench *bench);
 void virtual_bench_fault(struct virtual_bench *bench, const char *line);
 /** True time now. */
 int64_t virtual_bench_now_ns(const struct virtual_bench *bench);
-/** Forget what was measured and measure from here on. */
+/** Discard the measurements and start new ones. */
 void virtual_bench_measure(struct virtual_bench *bench);
 
 #endif

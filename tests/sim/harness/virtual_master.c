@@ -159,7 +159,7 @@ static void step_cycle(struct virtual_master *vm)
 	}
 }
 
-static void let_pass(void *ctx, mono_t until)
+static void advance_clock(void *ctx, mono_t until)
 {
 	struct virtual_master *vm = ctx;
 	struct platform pf = in_process_platform(vm->bench->host);
@@ -275,7 +275,7 @@ void virtual_master_init(struct virtual_master *vm, struct virtual_bench *bench,
 			   .cycle_start = start_cycle,
 			   .cycle_end = end_cycle,
 			   .cycle_has_ended = has_cycle_ended,
-			   .wait = let_pass,
+			   .wait = advance_clock,
 			   .ctx = vm },
 		.segment = RUN_DIR_SIMULATED,
 	};

@@ -16,7 +16,7 @@
 #include "daemon/session.h"
 #include "sim/harness/virtual_bench.h"
 
-/* What the samples said. All counts are of samples taken from the ring. */
+/* Summary of the samples. All counts are of samples read from the ring. */
 struct virtual_result {
 	uint64_t samples;
 	uint64_t gaps;            /* a cycle number that is not one more */
@@ -60,7 +60,7 @@ struct virtual_master {
  */
 void virtual_master_init(struct virtual_master *vm, struct virtual_bench *bench,
 			 const char *const *settings);
-/** Gone without a word on the wire, as by SIGKILL. */
+/** End without sending a frame, as by SIGKILL. */
 void virtual_master_kill(struct virtual_master *vm);
 
 /** session_bring_up(); 0 or -errno with vm->failure. */
@@ -70,7 +70,7 @@ int virtual_master_run(struct virtual_master *vm, uint64_t cycles);
 /** Outputs safe, INIT; 0 or -errno with vm->failure. The samples up to there are in the result. */
 int virtual_master_stop(struct virtual_master *vm);
 
-/** Forget the samples counted so far. */
+/** Discard the samples counted so far. */
 void virtual_master_forget(struct virtual_master *vm);
 
 /** In OP, some cycles on, with no sample counted yet. Ends the test where OP is not reached. */

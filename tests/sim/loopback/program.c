@@ -40,7 +40,7 @@ struct cycle_values {
 static struct cycle_values history[HISTORY_CYCLES];
 static size_t history_count;
 
-/* After each cycle, also those that the service loop lets pass. */
+/* After each cycle, also those during waits of the service loop. */
 static void remember(struct virtual_master *master)
 {
 	struct cycle_values *v = &history[history_count++];
@@ -189,7 +189,7 @@ TEST(sim_loopback, a_low_working_counter_makes_the_outputs_safe_until_op_is_back
 	coupler_set(&b, COUPLER_DI, 1, 1);
 	virtual_master_run(&vm, 5);
 	CHECK_EQ(history[history_count - 1].lamps, 0xf8);
-	/* A reset coupler lets frames pass and takes no part: WKC 0. */
+	/* A reset coupler forwards frames and does not process them: WKC 0. */
 	virtual_bench_fault(&b, "at=0s reset slave=0");
 	virtual_master_run(&vm, 2000);
 	check_whole();
@@ -206,7 +206,7 @@ TEST(sim_loopback, a_low_working_counter_makes_the_outputs_safe_until_op_is_back
 	close_all();
 }
 
-/* --- what is not as the configuration says --- */
+/* --- mismatches with the configuration --- */
 
 static void check_bring_up_fails(const struct virtual_spec *spec, const char *const *config,
 				 const char *const *wanted)

@@ -59,7 +59,7 @@ TEST(sim_bring_up, two_slaves_reach_op_and_every_sample_is_good)
 	virtual_bench_done(&b);
 }
 
-/* T23: no slave is asked for OP before the servo is locked. */
+/* T23: OP is requested of no slave before the servo is locked. */
 static void check_lock_before_op(struct virtual_master *vm)
 {
 	uint32_t dc_state = atomic_load(&session_page(vm->session)->cycle.dc_state);
@@ -71,7 +71,7 @@ static void check_lock_before_op(struct virtual_master *vm)
 	}
 }
 
-TEST(sim_bring_up, op_is_asked_for_only_after_lock)
+TEST(sim_bring_up, op_is_requested_only_after_lock)
 {
 	static struct virtual_bench b;
 	static struct virtual_master vm;
@@ -84,7 +84,7 @@ TEST(sim_bring_up, op_is_asked_for_only_after_lock)
 	virtual_bench_done(&b);
 }
 
-/* T07: no watchdog bites on the way. */
+/* T07: no watchdog trips on the way. */
 static void check_no_watchdog(struct virtual_master *vm)
 {
 	for (unsigned i = 0; i < vm->bench->spec.slaves; i++) {
@@ -93,7 +93,7 @@ static void check_no_watchdog(struct virtual_master *vm)
 	}
 }
 
-TEST(sim_bring_up, no_watchdog_bites_in_sixty_starts)
+TEST(sim_bring_up, no_watchdog_trips_in_sixty_starts)
 {
 	for (uint64_t seed = 1; seed <= STARTS; seed++) {
 		static struct virtual_bench b;
@@ -119,7 +119,7 @@ TEST(sim_bring_up, a_master_killed_in_op_is_followed_by_one_that_reaches_op)
 	virtual_master_init(&first, &b, NULL);
 	bring_up(&first);
 	virtual_master_run(&first, 500);
-	virtual_master_kill(&first); /* SYNC0 goes on, the slaves are in OP (T09) */
+	virtual_master_kill(&first); /* SYNC0 continues, the slaves are in OP (T09) */
 	CHECK_EQ(segment_esc(b.segment, 0)->sync.is_running, 1);
 	virtual_master_init(&second, &b, NULL);
 	bring_up(&second);

@@ -166,7 +166,7 @@ TEST(sim_clocks, a_reference_that_drifts_is_followed)
 	virtual_bench_done(&b);
 }
 
-/* T17: with the reference gone nobody writes a time into the others. */
+/* T17: without the reference no time is written into the others. */
 TEST(sim_clocks, no_slave_s_clock_jumps_when_the_reference_loses_power)
 {
 	static struct virtual_bench b;

@@ -89,7 +89,7 @@ TEST(sim_frames, a_doubled_frame_is_counted_and_taken_once)
 	run_close(&r);
 }
 
-TEST(sim_frames, damaged_frames_are_thrown_away_and_nothing_is_invented)
+TEST(sim_frames, damaged_frames_are_dropped_and_their_data_is_not_used)
 {
 	static struct run r;
 
@@ -130,7 +130,7 @@ TEST(sim_frames, a_storm_of_faults_is_counted_and_survived)
 	run_close(&r);
 }
 
-TEST(sim_frames, a_cycle_held_up_for_five_periods_leaves_no_gap_in_the_numbers)
+TEST(sim_frames, a_cycle_delayed_by_five_periods_leaves_no_gap_in_the_numbers)
 {
 	static struct run r;
 

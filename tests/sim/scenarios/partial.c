@@ -57,8 +57,8 @@ static void wait_for_op(void)
 	}
 }
 
-/* Break the last slave, look at the others, mend it, look at all. */
-static void check_others_go_on(const char *breaks, const char *mends)
+/* Break the last slave, check the others, restore it, check all. */
+static void check_others_continue(const char *breaks, const char *restores)
 {
 	uint64_t bad[SLAVES];
 	uint64_t good[SLAVES];
@@ -84,7 +84,7 @@ static void check_others_go_on(const char *breaks, const char *mends)
 	CHECK_EQ(virtual_master_value(&vm, "b.led"), 1);
 	CHECK(atomic_load(&stats()->slave_good[0]) >= good[0] + 1000);
 	CHECK_EQ(atomic_load(&stats()->slave_good[LAST]), good[LAST]);
-	virtual_bench_fault(&b, mends);
+	virtual_bench_fault(&b, restores);
 	wait_for_op();
 	CHECK_EQ(atomic_load(&stats()->slave_bad[0]), 0);
 	CHECK_EQ(atomic_load(&stats()->slave_bad[1]), 0);
@@ -99,17 +99,17 @@ static void check_others_go_on(const char *breaks, const char *mends)
 	close_all();
 }
 
-TEST(sim_partial, others_go_on_while_a_slave_has_no_power)
+TEST(sim_partial, others_continue_while_a_slave_has_no_power)
 {
-	check_others_go_on("at=10ms power-off slave=2", "at=0s power-on slave=2");
+	check_others_continue("at=10ms power-off slave=2", "at=0s power-on slave=2");
 }
 
-TEST(sim_partial, others_go_on_while_a_cable_is_out)
+TEST(sim_partial, others_continue_while_a_cable_is_out)
 {
-	check_others_go_on("at=10ms cut slave=2", "at=0s heal slave=2");
+	check_others_continue("at=10ms cut slave=2", "at=0s heal slave=2");
 }
 
-TEST(sim_partial, a_slave_that_falls_to_safe_op_is_led_back_alone)
+TEST(sim_partial, a_slave_that_falls_to_safe_op_is_restored_alone)
 {
 	open_all("bus.datagrams=per_slave");
 	virtual_bench_fault(&b, "at=10ms al-error slave=1 code=0x001a");

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Cables and power: what falls comes back, and samples say what they are worth in between. */
+/* Cables and power: what is lost comes back, and samples are marked bad in between. */
 #include "harness/test.h"
 #include "sim/harness/virtual_master.h"
 
@@ -53,7 +53,7 @@ static void check_all_good_again(void)
 	CHECK_EQ(vm.result.gaps, 0);
 }
 
-static void check_falls_and_returns(const char *breaks, const char *mends, uint64_t limit_ms)
+static void check_falls_and_returns(const char *breaks, const char *restores, uint64_t limit_ms)
 {
 	uint64_t ms;
 
@@ -63,9 +63,9 @@ static void check_falls_and_returns(const char *breaks, const char *mends, uint6
 	CHECK_EQ(state(), BUS_RECOVERING);
 	CHECK_EQ(vm.result.gaps, 0);
 	CHECK_EQ(vm.result.bad_unexplained, 0);
-	virtual_bench_fault(&b, mends);
+	virtual_bench_fault(&b, restores);
 	ms = wait_for_op(limit_ms);
-	printf("%s, %s: OP again after %llu ms\n", breaks, mends, (unsigned long long)ms);
+	printf("%s, %s: OP again after %llu ms\n", breaks, restores, (unsigned long long)ms);
 	check_all_good_again();
 	close_all();
 }
@@ -85,7 +85,7 @@ TEST(sim_recovery, a_slave_without_power_and_with_power_again)
 	check_falls_and_returns("at=10ms power-off slave=1", "at=0s power-on slave=1", 1200);
 }
 
-TEST(sim_recovery, a_slave_that_reports_an_error_is_led_back)
+TEST(sim_recovery, a_slave_that_reports_an_error_is_restored)
 {
 	open_all(NULL);
 	virtual_bench_fault(&b, "at=10ms al-error slave=1 code=0x001a");
@@ -95,7 +95,7 @@ TEST(sim_recovery, a_slave_that_reports_an_error_is_led_back)
 	close_all();
 }
 
-TEST(sim_recovery, a_master_held_up_past_the_watchdog_brings_the_slaves_back)
+TEST(sim_recovery, a_master_delayed_past_the_watchdog_restores_the_slaves)
 {
 	open_all(NULL);
 	in_process_stall(b.host, 300 * NS_PER_MS);
@@ -106,7 +106,7 @@ TEST(sim_recovery, a_master_held_up_past_the_watchdog_brings_the_slaves_back)
 	close_all();
 }
 
-TEST(sim_recovery, the_whole_segment_without_power_is_started_anew)
+TEST(sim_recovery, the_whole_segment_restarts_after_a_power_cut)
 {
 	int r = SESSION_GOES_ON;
 

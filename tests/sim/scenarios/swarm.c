@@ -40,9 +40,9 @@ struct swarm {
 	int is_off;
 };
 
-static void toggle(struct swarm *sw, int *state, const char *breaks, const char *mends)
+static void toggle(struct swarm *sw, int *state, const char *breaks, const char *restores)
 {
-	virtual_bench_fault(&sw->b, *state ? mends : breaks);
+	virtual_bench_fault(&sw->b, *state ? restores : breaks);
 	*state = !*state;
 }
 
@@ -88,7 +88,7 @@ static void make_trouble(struct swarm *sw, enum trouble trouble)
 	}
 }
 
-/* Numbers without a gap; outputs safe when the sample says so, and live when it does not. */
+/* Numbers without a gap; outputs safe when the sample is flagged so, and live when it is not. */
 static void check_nothing_invented(const struct swarm *sw, uint64_t seed)
 {
 	const struct virtual_result *res = &sw->vm.result;
@@ -178,7 +178,7 @@ static void one_seed(uint64_t seed)
 	virtual_bench_done(&sw.b);
 }
 
-TEST(sim_swarm, whatever_happened_the_bus_is_well_again_afterwards)
+TEST(sim_swarm, after_random_faults_the_bus_reaches_op_again)
 {
 	const char *only = getenv("ECDAQ_SEED");
 

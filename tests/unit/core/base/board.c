@@ -78,7 +78,7 @@ TEST(board, the_cycle_never_takes_half_a_set)
 	CHECK_EQ(set.raw[0], 50000 * 16);
 }
 
-TEST(board, output_taken_back_is_not_set_in_the_next_set)
+TEST(board, a_withdrawn_output_is_not_set_in_the_next_set)
 {
 	board_init(&board);
 	memset(&set, 0, sizeof(set));
@@ -95,7 +95,7 @@ TEST(board, output_taken_back_is_not_set_in_the_next_set)
 	CHECK_EQ(set.is_set[4], 1);
 }
 
-TEST(board, whoever_is_given_a_shared_one_cannot_shorten_it_and_can_only_empty_it)
+TEST(board, the_receiver_of_a_shared_board_cannot_truncate_it_only_empty_it)
 {
 	int fd = -1;
 	struct board *mine = board_create_shared(&fd);

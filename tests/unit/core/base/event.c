@@ -11,13 +11,13 @@ TEST(event, every_severity_has_a_word_of_its_own)
 	CHECK_STR(event_severity_to_str(EVENT_ERROR), "error");
 }
 
-TEST(event, a_number_that_is_none_is_an_error)
+TEST(event, an_unknown_event_number_is_an_error)
 {
 	CHECK_EQ(event_severity(EVENT_COUNT), EVENT_ERROR);
 	CHECK_STR(event_severity_to_str((enum event_severity)99), "error");
 }
 
-TEST(event, a_shot_says_how_far_it_came_and_within_its_error_only_a_bound)
+TEST(event, a_shot_has_its_distance_or_a_bound_if_unresolved)
 {
 	struct event ev = { .id = EVENT_SYNC0_SHOT,
 			    .slave_pos = 3,

@@ -100,7 +100,7 @@ TEST(event, an_event_without_a_slave_names_none)
 	}
 }
 
-TEST(event, a_refusal_says_why_in_words)
+TEST(event, a_refusal_has_its_reason_as_text)
 {
 	struct event ev = {
 		.id = EVENT_COMMAND_REFUSED, .slave_pos = 2, .value = 5, .arg = { -34, 7 }

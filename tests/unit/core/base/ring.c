@@ -74,7 +74,7 @@ TEST(ring, a_reader_gets_every_slot_in_order_and_knows_what_the_ring_is)
 	unlink(path);
 }
 
-TEST(ring, a_reader_that_was_lapped_learns_exactly_how_many_it_missed)
+TEST(ring, a_reader_that_was_lapped_gets_the_exact_number_of_missed_slots)
 {
 	struct ring *ring = make_ring(64, 8);
 	struct ring_reader *reader = open_reader();
@@ -265,7 +265,7 @@ TEST(ring, a_ring_truncated_while_it_is_read_is_damaged_and_raises_no_signal)
 	}
 }
 
-TEST(ring, sizes_written_over_the_header_change_nothing_for_who_has_it_open)
+TEST(ring, sizes_written_over_the_header_do_not_affect_open_readers)
 {
 	struct ring *ring = ring_with(8, 3);
 	struct ring_reader *reader = open_reader();
@@ -309,7 +309,7 @@ TEST(ring, a_read_writes_no_more_than_the_callers_buffer_holds)
 	unlink(path);
 }
 
-TEST(ring, a_head_that_the_slots_contradict_is_damage_and_no_endless_loop)
+TEST(ring, a_head_that_contradicts_the_slots_is_damage_and_no_endless_loop)
 {
 	/* Ahead of what was pushed by one, by much, by more than there can be; behind. */
 	static const uint64_t heads[] = { 6, 1000, UINT64_MAX / 8, UINT64_MAX, 4 };
@@ -354,7 +354,7 @@ TEST(ring, a_slot_that_was_overwritten_is_damage)
 	unlink(path);
 }
 
-TEST(ring, a_reader_goes_back_and_forth_among_what_is_there)
+TEST(ring, a_reader_seeks_back_and_forth_within_the_ring)
 {
 	struct ring *ring = ring_with(4096, 6000);
 	struct ring_reader *reader = open_reader();

@@ -97,7 +97,7 @@ TEST(timemap, rate_of_a_slave_100_ppm_off_is_found_in_ten_seconds)
 	timemap_destroy(f.map);
 }
 
-TEST(timemap, late_wakes_neither_bend_the_map_nor_make_it_step)
+TEST(timemap, late_wakes_neither_distort_the_map_nor_make_it_step)
 {
 	struct feeder f = feeder_make(TAI_START, 0);
 	struct timemap_state state;
@@ -118,7 +118,7 @@ TEST(timemap, late_wakes_neither_bend_the_map_nor_make_it_step)
 
 /* Below the limit of a step the map is slewed: at most 2 ms a second, on top of the clocks' rate.
  */
-TEST(timemap, a_small_error_is_worn_off_no_faster_than_the_slew_limit)
+TEST(timemap, a_small_error_is_reduced_no_faster_than_the_slew_limit)
 {
 	for (int sign = -1; sign <= 1; sign += 2) {
 		struct feeder f = feeder_make(TAI_START, 0);
@@ -229,7 +229,7 @@ TEST(timemap, the_kernels_new_tai_offset_is_not_a_step_of_utc)
 	timemap_destroy(f.map);
 }
 
-TEST(timemap, dc_time_set_anew_gives_one_step_and_absurd_pairs_are_ignored)
+TEST(timemap, a_changed_dc_time_is_one_step_and_absurd_pairs_are_ignored)
 {
 	struct feeder f = feeder_make(TAI_START, 0);
 	struct timemap_state state;

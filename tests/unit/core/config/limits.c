@@ -6,7 +6,7 @@
 #include "harness/test.h"
 #include "unit/core/config/parsing.h"
 
-TEST(config, options_that_do_not_fit_to_each_other_blame_a_line_of_the_file)
+TEST(config, conflicting_options_are_reported_with_a_line_of_the_file)
 {
 	parse_fails("dc:\n  lock_limit: 60us\n",
 		    "t.yaml:2: dc.unlock_limit: must not be below dc.lock_limit");

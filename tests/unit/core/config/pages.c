@@ -36,7 +36,7 @@ static char *committed(const char *path)
 static void is_fresh(const char *path, char *text)
 {
 	if (strcmp(committed(path), text) != 0) {
-		test_fail(__FILE__, __LINE__, "%s is stale: write it anew with ecdaq-options",
+		test_fail(__FILE__, __LINE__, "%s is stale: regenerate it with ecdaq-options",
 			  path);
 	}
 	free(text);

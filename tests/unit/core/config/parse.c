@@ -149,7 +149,7 @@ TEST(config, one_shot_is_the_mode_or_the_object_that_the_mode_would_write)
 	CHECK_EQ(config_is_oneshot(&cfg, 60), 0);
 }
 
-TEST(config, presence_that_is_said_beats_the_one_that_follows)
+TEST(config, explicit_presence_overrides_the_derived_one)
 {
 	static struct config cfg;
 

@@ -19,7 +19,7 @@ void parse_fails(const char *text, const char *wanted)
 {
 	static struct config before;
 	static struct config cfg;
-	char error[256] = "nothing said";
+	char error[256] = "no error text";
 
 	memset(&cfg, 0x5a, sizeof(cfg));
 	before = cfg;

@@ -7,7 +7,7 @@
 
 /** @text must be taken; nothing of what @cfg was before is left. */
 void parse_ok(const char *text, struct config *cfg);
-/** @text must be refused with just this one line, and leave the configuration as it was. */
+/** @text must be refused with just this one line, and leave the configuration unchanged. */
 void parse_fails(const char *text, const char *wanted);
 
 #endif

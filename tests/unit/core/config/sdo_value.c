@@ -47,7 +47,7 @@ TEST(sdo_value, bounds_of_every_integer_type_are_exact)
 	fails(SDO_LINT, "9223372036854775808", -ERANGE);
 }
 
-TEST(sdo_value, text_that_is_no_value_is_refused)
+TEST(sdo_value, invalid_text_is_rejected)
 {
 	fails(SDO_UINT, "", -EINVAL);
 	fails(SDO_UINT, "-", -EINVAL);
@@ -61,7 +61,7 @@ TEST(sdo_value, text_that_is_no_value_is_refused)
 	fails(SDO_LREAL, "1e309", -ERANGE);
 }
 
-TEST(sdo_value, text_comes_back_as_it_went_in)
+TEST(sdo_value, parsed_values_are_printed_as_the_same_text)
 {
 	static const struct {
 		enum sdo_type type;

@@ -9,7 +9,7 @@ static void set_fails(const char *assignment, const char *wanted)
 {
 	static struct config before;
 	static struct config cfg;
-	char error[256] = "nothing said";
+	char error[256] = "no error text";
 
 	config_defaults(&cfg);
 	before = cfg;
@@ -39,7 +39,7 @@ TEST(config, set_takes_what_the_file_takes)
 	CHECK(cfg.output[0].max > 1e300);
 }
 
-TEST(config, set_refuses_with_one_line)
+TEST(config, set_rejects_with_one_line)
 {
 	set_fails("cycle.period", "cycle.period: expected OPTION=VALUE");
 	set_fails("=1", "=1: expected OPTION=VALUE");
@@ -57,7 +57,7 @@ TEST(config, set_refuses_with_one_line)
 	set_fails("a\nb=1", "a?b: unknown option");
 }
 
-TEST(config, set_leaves_the_fit_of_options_to_check)
+TEST(config, set_does_not_check_options_against_each_other)
 {
 	static struct config cfg;
 	char error[256] = "";
@@ -95,7 +95,7 @@ TEST(config, run_path_takes_the_option_then_the_environment_then_the_standard_pl
 	CHECK_STR(path, standard);
 }
 
-TEST(config, dds_wants_an_interface_of_its_own)
+TEST(config, dds_requires_an_interface_of_its_own)
 {
 	static struct config cfg;
 	char error[256];

@@ -101,7 +101,7 @@ TEST(command_line, overrides_come_before_the_check_of_the_file)
 	unlink(path);
 }
 
-TEST(command_line, an_error_in_what_is_set_does_not_blame_a_line_of_the_file)
+TEST(command_line, an_error_in_an_assignment_names_no_line_of_the_file)
 {
 	char path[] = "/tmp/ecdaq-command-line-XXXXXX";
 

@@ -62,7 +62,7 @@ TEST(json, text_is_escaped)
 	text_is("/", "\"/\"");
 }
 
-TEST(json, utf8_goes_through_and_what_is_none_is_replaced)
+TEST(json, utf8_is_kept_and_invalid_bytes_are_replaced)
 {
 	text_is("\xc2\xb5s", "\"\xc2\xb5s\"");
 	text_is("\xe2\x82\xac", "\"\xe2\x82\xac\"");
@@ -89,7 +89,7 @@ TEST(json, floats_are_short_and_read_back_the_same)
 	CHECK(strtod(written(write_double), NULL) == 4096 * 3.3 / 4096);
 }
 
-TEST(json, numbers_that_json_has_not_are_null)
+TEST(json, numbers_that_json_cannot_represent_are_null)
 {
 	double_is((double)NAN, "null");
 	double_is(HUGE_VAL, "null");
@@ -128,7 +128,7 @@ static void write_nested(struct json *js)
 	json_array_end(js);
 }
 
-TEST(json, commas_stand_between_values_only)
+TEST(json, commas_are_between_values_only)
 {
 	CHECK_STR(written(write_nested), "{\"a\":{},\"b\":[1,{\"k\\\"\":\"v\"}],\"c\":3},[]");
 }
@@ -138,7 +138,7 @@ static void write_fixed(struct json *js)
 	json_fixed(js, NULL, double_in, 1);
 }
 
-TEST(json, a_figure_has_the_decimals_asked_for)
+TEST(json, a_figure_has_the_requested_decimals)
 {
 	double_in = 2.25;
 	CHECK_STR(written(write_fixed), "2.2");

@@ -53,7 +53,7 @@ static void two_signals(void)
 	raise(SIGINT);
 }
 
-TEST(stop, a_second_signal_exits_where_that_was_asked_for)
+TEST(stop, a_second_signal_exits_where_requested)
 {
 	CHECK_EQ(exit_code_of(two_signals), 128 + SIGINT);
 }

@@ -53,7 +53,7 @@ static void expect_sample(struct bench *b, uint64_t cycle)
 		 (cycle + 100) & 0xffff);
 }
 
-TEST(reader, it_waits_for_a_ring_reads_it_and_goes_on_with_the_next)
+TEST(reader, it_waits_for_a_ring_reads_it_and_continues_with_the_next)
 {
 	struct bench b;
 
@@ -108,7 +108,7 @@ TEST(reader, a_ring_that_was_replaced_unclosed_is_read_to_its_end_first)
 	bench_close(&b);
 }
 
-TEST(reader, a_session_ends_when_its_process_is_gone)
+TEST(reader, a_session_ends_when_its_process_has_ended)
 {
 	struct bench b;
 	pid_t pid;
@@ -165,7 +165,7 @@ TEST(reader, a_session_that_is_skipped_is_not_read_and_the_next_one_is)
 	bench_close(&b);
 }
 
-TEST(reader, a_slow_reader_is_told_how_many_samples_it_lost)
+TEST(reader, a_slow_reader_gets_the_number_of_lost_samples)
 {
 	struct bench b;
 
@@ -185,7 +185,7 @@ TEST(reader, a_slow_reader_is_told_how_many_samples_it_lost)
 	bench_close(&b);
 }
 
-TEST(reader, a_ring_of_another_kind_or_not_consistent_is_not_begun)
+TEST(reader, a_ring_of_another_kind_or_inconsistent_is_not_opened)
 {
 	struct made_meta meta = made_meta();
 	struct bench b;

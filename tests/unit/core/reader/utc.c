@@ -50,7 +50,7 @@ static const char *quality(const struct bench *b)
 	return utc_quality(&state);
 }
 
-TEST(utc, with_the_kernels_tai_offset_it_is_utc_and_says_tai)
+TEST(utc, with_the_kernels_tai_offset_it_is_utc_and_marked_tai)
 {
 	struct bench b;
 
@@ -61,7 +61,7 @@ TEST(utc, with_the_kernels_tai_offset_it_is_utc_and_says_tai)
 	utc_destroy(b.utc);
 }
 
-TEST(utc, an_unset_tai_offset_is_said_and_clock_tai_taken_for_utc)
+TEST(utc, an_unset_tai_offset_is_reported_and_clock_tai_taken_for_utc)
 {
 	struct bench b;
 
@@ -72,7 +72,7 @@ TEST(utc, an_unset_tai_offset_is_said_and_clock_tai_taken_for_utc)
 	utc_destroy(b.utc);
 }
 
-TEST(utc, a_wall_clock_that_was_never_set_is_said_and_its_setting_is_survived)
+TEST(utc, an_unset_wall_clock_is_reported_and_its_first_setting_is_one_step)
 {
 	struct bench b;
 	struct timemap_state state;
@@ -104,7 +104,7 @@ TEST(utc, a_tai_offset_that_comes_later_does_not_move_utc)
 	utc_destroy(b.utc);
 }
 
-/* As run() without DC: the cycle number times the period stands in for it. */
+/* As run() without DC: the cycle number times the period is used instead. */
 static void run_without_dc(struct bench *b, int64_t tai_start_ns, unsigned count)
 {
 	for (unsigned i = 0; i < count; i++, b->cycle++) {
@@ -176,7 +176,7 @@ TEST(utc, the_map_is_reported_once_a_second_and_a_step_at_once_and_once)
 	utc_destroy(b.utc);
 }
 
-TEST(utc, times_that_are_none_do_no_harm)
+TEST(utc, invalid_times_do_no_harm)
 {
 	static const int64_t times[] = { INT64_MIN, INT64_MIN + 1, INT64_MAX, -1, 0 };
 	struct bench b;

@@ -17,7 +17,7 @@ TEST(al, states_have_the_fields_names_and_the_error_bit_does_not_matter)
 	CHECK_STR(al_state_to_str(0xffff), "none");
 }
 
-TEST(al, codes_that_a_user_meets_say_what_they_mean)
+TEST(al, known_codes_have_their_text_and_others_are_unknown)
 {
 	CHECK_STR(al_status_code_to_str(AL_CODE_NONE), "no error");
 	CHECK_STR(al_status_code_to_str(AL_CODE_INVALID_MAILBOX_CONFIG),

@@ -94,7 +94,7 @@ TEST(datagram, other_ethertypes_and_other_ethercat_types_are_not_ours)
 	CHECK_EQ(ecat_frame_is_valid(frame, len), 0);
 }
 
-TEST(datagram, a_length_past_the_end_or_a_promise_of_more_is_damage)
+TEST(datagram, a_length_past_the_end_or_a_missing_next_datagram_is_damage)
 {
 	uint8_t frame[ECAT_FRAME_MAX_BYTES];
 	size_t len = two_datagrams(frame);

@@ -66,10 +66,10 @@ TEST(pcapng, what_is_written_is_read_back_with_its_time_to_the_ns)
 	CHECK_EQ(pcapng_next(&in, &p), 0);
 }
 
-TEST(pcapng, the_other_byte_order_says_the_same)
+TEST(pcapng, the_other_byte_order_reads_the_same)
 {
-	/* Two 16-bit numbers to a word change places, too: link type 1 stands in the upper half
-	 * then. */
+	/* Two 16-bit numbers in a word change places, too: link type 1 is in the upper half then.
+	 */
 	uint8_t section[20] = { 0x4d, 0x3c, 0x2b, 0x1a, [8] = 0xff, [12] = 0xff };
 	uint8_t interface[8] = { [2] = 1 };
 	uint8_t packet[24] = { [8] = 5, [12] = 3, [16] = 3 };
@@ -85,7 +85,7 @@ TEST(pcapng, the_other_byte_order_says_the_same)
 	CHECK_EQ(pcapng_open(&in, f.bytes, f.len), 0);
 	CHECK_EQ(pcapng_next(&in, &p), 1);
 	CHECK_EQ(in.interface[0].link_type, 1);
-	CHECK_EQ(p.t_ns, 5000); /* microseconds, where the interface says nothing */
+	CHECK_EQ(p.t_ns, 5000); /* microseconds, the default of an interface */
 	CHECK_EQ(p.len, 3);
 	CHECK_MEM(p.bytes, "xyz", 3);
 }
@@ -164,7 +164,7 @@ TEST(pcapng, a_file_cut_anywhere_gives_its_whole_packets_and_then_an_error)
 	}
 }
 
-TEST(pcapng, a_packet_of_an_interface_that_is_not_there_is_refused)
+TEST(pcapng, a_packet_of_an_undefined_interface_is_rejected)
 {
 	struct file f = two_packets();
 	struct pcapng_packet p = { .t_ns = 77 };
@@ -195,7 +195,7 @@ TEST(pcapng, more_interfaces_than_the_limit_are_named_as_such)
 	CHECK_EQ(pcapng_next(&in, &p), -E2BIG);
 }
 
-TEST(pcapng, a_second_section_starts_its_interfaces_anew)
+TEST(pcapng, a_second_section_restarts_its_interfaces)
 {
 	struct file f = two_packets();
 	struct pcapng_packet p;

@@ -104,7 +104,7 @@ TEST(sii, an_image_cut_anywhere_is_refused_with_a_reason_or_read)
 	}
 }
 
-TEST(sii, a_blank_eeprom_is_called_blank)
+TEST(sii, a_blank_eeprom_is_reported_as_blank)
 {
 	struct image im;
 	char error[160];
@@ -122,7 +122,7 @@ TEST(sii, categories_without_end_end_at_the_images_end)
 	size_t offset = 77;
 	size_t bytes = 77;
 
-	/* Zeros are empty categories of type 0: the walk must go on, and stop. */
+	/* Zeros are empty categories of type 0: the walk must continue, and end. */
 	memset(im.bytes + SII_CATEGORIES_BYTE, 0, IMAGE_BYTES - SII_CATEGORIES_BYTE);
 	CHECK_EQ(parse(&im, IMAGE_BYTES, &sii), -EBADMSG);
 	CHECK_EQ(sii_find_category(im.bytes, IMAGE_BYTES, SII_CATEGORY_SM, &offset, &bytes),
@@ -130,7 +130,7 @@ TEST(sii, categories_without_end_end_at_the_images_end)
 	CHECK_EQ(offset, 77);
 }
 
-TEST(sii, a_category_past_the_end_keeps_what_stood_before_it)
+TEST(sii, a_category_past_the_end_keeps_what_precedes_it)
 {
 	struct image im = small_slave();
 	struct sii sii;

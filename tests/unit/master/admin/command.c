@@ -61,7 +61,7 @@ TEST(admin, a_set_goes_to_the_board_and_is_answered_with_the_cycle_of_its_frame)
 	CHECK_EQ(fake.event[0].arg[1], USER);
 }
 
-TEST(admin, one_bad_item_leaves_the_whole_board_as_it_was)
+TEST(admin, one_bad_item_leaves_the_whole_board_unchanged)
 {
 	struct fake fake;
 	struct admin_request rq = fake_request(ADMIN_SET);

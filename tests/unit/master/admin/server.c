@@ -149,7 +149,7 @@ TEST(admin_server, a_set_is_answered_only_after_the_cycle_took_it)
 	fd = connect_and_set(&b);
 	second = bench_connect(&b);
 	CHECK(!has_answer(fd));
-	ask(second, &other); /* nobody waits for the first one's answer */
+	ask(second, &other); /* the first one's answer is not waited for */
 	CHECK_EQ(service(&b), 1);
 	CHECK_EQ(answer(second).result, 0);
 	fake_cycle(&b.fake, 99);
@@ -162,7 +162,7 @@ TEST(admin_server, a_set_is_answered_only_after_the_cycle_took_it)
 	bench_close(&b);
 }
 
-TEST(admin_server, a_cycle_that_does_not_answer_is_given_up_after_a_second)
+TEST(admin_server, a_set_that_the_cycle_does_not_take_times_out_after_a_second)
 {
 	struct bench b;
 	int fd;
@@ -178,7 +178,7 @@ TEST(admin_server, a_cycle_that_does_not_answer_is_given_up_after_a_second)
 	bench_close(&b);
 }
 
-TEST(admin_server, damaged_messages_are_answered_and_strangers_closed)
+TEST(admin_server, damaged_messages_are_answered_and_foreign_ones_close_the_connection)
 {
 	struct bench b;
 	struct admin_request rq = fake_request(99);
@@ -198,7 +198,7 @@ TEST(admin_server, damaged_messages_are_answered_and_strangers_closed)
 	bench_close(&b);
 }
 
-TEST(admin_server, the_seventeenth_client_is_told_so_and_the_others_go_on)
+TEST(admin_server, the_seventeenth_client_is_rejected_and_the_others_continue)
 {
 	struct bench b;
 	struct admin_request rq = fake_request(ADMIN_PING);
@@ -230,7 +230,7 @@ TEST(admin_server, the_seventeenth_client_is_told_so_and_the_others_go_on)
 	bench_close(&b);
 }
 
-TEST(admin_server, a_client_that_vanishes_while_it_waits_harms_nobody)
+TEST(admin_server, a_client_that_disconnects_while_it_waits_does_no_harm)
 {
 	struct bench b;
 	int fd;
@@ -244,7 +244,7 @@ TEST(admin_server, a_client_that_vanishes_while_it_waits_harms_nobody)
 	bench_close(&b);
 }
 
-TEST(admin_server, a_path_that_cannot_be_had_is_one_line)
+TEST(admin_server, a_path_that_cannot_be_bound_is_reported_in_one_line)
 {
 	struct admin_server *server = NULL;
 	char error[256];
@@ -255,7 +255,7 @@ TEST(admin_server, a_path_that_cannot_be_had_is_one_line)
 	CHECK(server == NULL);
 }
 
-TEST(admin_server, the_board_is_given_to_each_who_connects_to_its_own_socket)
+TEST(admin_server, each_client_of_the_board_socket_gets_the_board)
 {
 	struct bench b;
 	char path[100];
@@ -300,5 +300,5 @@ TEST(admin_server, the_board_is_given_to_each_who_connects_to_its_own_socket)
 	}
 	board_unmap(board);
 	close(board_fd);
-	bench_close(&b); /* both sockets are gone with the server */
+	bench_close(&b); /* the server removes both sockets */
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A session as the admin commands see it: four channels on two slaves, and what was asked of it. */
+/* A session as the admin commands see it: four channels on two slaves, and the requests it got. */
 #ifndef TESTS_UNIT_ADMIN_TARGET_H
 #define TESTS_UNIT_ADMIN_TARGET_H
 

@@ -27,7 +27,7 @@ static struct config *make_config(size_t slaves)
 	return &cfg;
 }
 
-TEST(compare, nothing_expected_takes_anything)
+TEST(compare, no_expected_slaves_accept_any)
 {
 	char error[256] = "";
 
@@ -35,7 +35,7 @@ TEST(compare, nothing_expected_takes_anything)
 	CHECK_STR(error, "");
 }
 
-TEST(compare, what_is_expected_is_welcome_and_more_behind_it_too)
+TEST(compare, expected_slaves_are_accepted_and_more_behind_them)
 {
 	char error[256] = "";
 
@@ -43,7 +43,7 @@ TEST(compare, what_is_expected_is_welcome_and_more_behind_it_too)
 	CHECK_EQ(compare_slaves(make_config(1), found, 2, error, sizeof(error)), 0);
 }
 
-TEST(compare, wrong_slave_is_told_with_both_identities)
+TEST(compare, wrong_slave_is_reported_with_both_identities)
 {
 	struct config *cfg = make_config(2);
 	char error[256] = "";
@@ -70,7 +70,7 @@ TEST(compare, wrong_revision_and_wrong_alias_count)
 	CHECK(strstr(error, "alias 7") != NULL);
 }
 
-TEST(compare, missing_slave_is_told_by_name_and_count)
+TEST(compare, missing_slave_is_reported_with_name_and_count)
 {
 	struct config *cfg = make_config(3);
 	char error[256] = "";
@@ -83,7 +83,7 @@ TEST(compare, missing_slave_is_told_by_name_and_count)
 			 "revision any");
 }
 
-TEST(compare, one_too_many_is_told_where_exactly_those_listed_are_wanted)
+TEST(compare, unexpected_slave_is_reported_with_presence_exact)
 {
 	struct config *cfg = make_config(1);
 	char error[256] = "";

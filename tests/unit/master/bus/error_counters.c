@@ -17,7 +17,7 @@ TEST(error_counters, deltas_are_summed_and_a_counter_that_went_down_was_cleared)
 	CHECK_EQ(ec.is_short, 0);
 }
 
-TEST(error_counters, half_way_a_counter_wants_to_be_cleared)
+TEST(error_counters, a_counter_at_half_range_is_to_be_cleared)
 {
 	struct error_counters ec = { 0 };
 	const uint8_t raw[ERROR_LINK_BYTES] = { 0, 0, 128, 0 };
@@ -27,7 +27,7 @@ TEST(error_counters, half_way_a_counter_wants_to_be_cleared)
 	CHECK_EQ(ec.is_short, 0);
 }
 
-TEST(error_counters, one_that_stood_at_its_end_is_said_to_be_short)
+TEST(error_counters, a_saturated_counter_is_marked_incomplete)
 {
 	struct error_counters ec = { 0 };
 	struct slave_status page = { 0 };

@@ -151,7 +151,7 @@ TEST(exchange, doubled_frame_is_counted_once_and_never_taken)
 }
 
 /* One change to an otherwise good answer. */
-static void check_thrown_away(size_t at, uint8_t flip, int shorten_by)
+static void check_dropped(size_t at, uint8_t flip, int shorten_by)
 {
 	struct exchange_plan plan = small_plan();
 	struct bench *b = bench_create(&plan);
@@ -179,18 +179,18 @@ static void check_thrown_away(size_t at, uint8_t flip, int shorten_by)
 
 TEST(exchange, damaged_frames_are_foreign_and_an_undamaged_one_is_not)
 {
-	check_thrown_away(0, 0, 0);
-	check_thrown_away(6, 0x02, 0);  /* never passed a slave */
-	check_thrown_away(12, 0x01, 0); /* not EtherCAT */
-	check_thrown_away(14, 0x01, 0); /* length of the frame */
-	check_thrown_away(16, 0x01, 0); /* command */
-	check_thrown_away(18, 0x01, 0); /* logical address */
-	check_thrown_away(22, 0x01, 0); /* length of the datagram */
-	check_thrown_away(23, 0x80, 0); /* no more datagrams */
-	check_thrown_away(57, 0x80, 0); /* sequence out of this world */
-	check_thrown_away(58, 0x01, 0); /* another reference clock */
-	check_thrown_away(0, 0, 1);     /* cut */
-	check_thrown_away(0, 0, 62);
+	check_dropped(0, 0, 0);
+	check_dropped(6, 0x02, 0);  /* never passed a slave */
+	check_dropped(12, 0x01, 0); /* not EtherCAT */
+	check_dropped(14, 0x01, 0); /* length of the frame */
+	check_dropped(16, 0x01, 0); /* command */
+	check_dropped(18, 0x01, 0); /* logical address */
+	check_dropped(22, 0x01, 0); /* length of the datagram */
+	check_dropped(23, 0x80, 0); /* no more datagrams */
+	check_dropped(57, 0x80, 0); /* sequence out of this world */
+	check_dropped(58, 0x01, 0); /* another reference clock */
+	check_dropped(0, 0, 1);     /* cut */
+	check_dropped(0, 0, 62);
 }
 
 TEST(exchange, low_or_high_wkc_leaves_the_image)
@@ -213,7 +213,7 @@ TEST(exchange, low_or_high_wkc_leaves_the_image)
 	bench_destroy(b);
 }
 
-TEST(exchange, send_error_is_told_and_does_not_wait)
+TEST(exchange, send_error_is_returned_without_waiting)
 {
 	struct exchange_plan plan = small_plan();
 	struct bench *b = bench_create(&plan);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* An exchange on a scripted wire, with slaves that answer as they are told. */
+/* An exchange on a scripted wire, with slaves that answer as scripted. */
 #ifndef TESTS_UNIT_BUS_EXCHANGE_BENCH_H
 #define TESTS_UNIT_BUS_EXCHANGE_BENCH_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The reference clock in the cyclic frame: followed, gone, back, not to be believed. */
+/* The reference clock in the cyclic frame: followed, lost, back, implausible. */
 #include "bus/exchange_dc.h"
 
 #include "unit/master/bus/exchange_bench.h"
@@ -22,7 +22,7 @@ TEST(exchange, frmw_carries_where_the_reference_should_be)
 	bench_destroy(b);
 }
 
-TEST(exchange, frmw_stops_when_the_reference_is_gone_and_resumes_with_it)
+TEST(exchange, frmw_stops_while_the_reference_is_lost_and_resumes_with_it)
 {
 	struct exchange_plan plan = small_plan();
 	struct bench *b = bench_create(&plan);
@@ -57,7 +57,7 @@ TEST(exchange, reference_that_returns_with_another_time_is_not_passed_on)
 	bench_destroy(b);
 }
 
-/* Slaves behind the reference still count when it is gone: the payload comes back as it went. */
+/* Slaves behind the reference still count when it is lost: the payload comes back unchanged. */
 static void answer_without_reference(struct fake_wire *wire, uint8_t *frame, size_t len)
 {
 	struct bench *b = wire->user;
@@ -78,7 +78,7 @@ static void answer_without_reference(struct fake_wire *wire, uint8_t *frame, siz
 	}
 }
 
-TEST(exchange, payload_that_nobody_overwrote_is_no_time)
+TEST(exchange, payload_that_no_slave_overwrote_is_no_time)
 {
 	struct exchange_plan plan = small_plan();
 	struct bench *b = bench_create(&plan);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Frames that nobody waits for, faster than they can be read: the deadline holds all the same. */
+/* A flood of unexpected frames, faster than they can be read: the deadline is kept. */
 #include "bus/exchange.h"
 
 #include "unit/master/bus/exchange_bench.h"

@@ -75,7 +75,7 @@ TEST(exchange, split_image_sends_each_slave_its_outputs)
 	bench_destroy(b);
 }
 
-TEST(exchange, split_image_takes_what_is_good_and_names_who_is_not)
+TEST(exchange, split_image_takes_the_good_parts_and_names_the_bad_slaves)
 {
 	struct exchange_plan plan = split_plan();
 	struct bench *b = start(&plan);

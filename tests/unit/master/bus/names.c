@@ -82,7 +82,7 @@ TEST(names, index_and_number_make_the_last_ones_differ)
 	CHECK_STR(name[0], "inputs_value_6000_01");
 }
 
-TEST(names, modules_without_pdo_names_are_told_apart_by_their_slots)
+TEST(names, modules_without_pdo_names_are_distinguished_by_their_slots)
 {
 	const struct pdo_entry e[] = {
 		entry("", "Channel 1 Data", 0x6000, 1), entry("", "Channel 2 Data", 0x6000, 2),

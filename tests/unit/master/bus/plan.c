@@ -141,7 +141,8 @@ TEST(plan, split_gives_each_slave_its_own_datagrams_in_one_frame)
 TEST(plan, split_keeps_together_what_shares_a_byte_or_is_one_slave_s)
 {
 	struct exchange_plan plan = plan_of(12);
-	/* Two slaves with four bits each in byte 0; a third with two SMs; a byte of nobody. */
+	/* Two slaves with four bits each in byte 0; a third with two SMs; a byte without an owner.
+	 */
 	const struct plan_area area[] = { area_of(0, 1, 0, 1), area_of(0, 1, 1, 1),
 					  area_of(1, 5, 2, 1), area_of(5, 8, 2, 0),
 					  area_of(9, 12, 3, 0) };

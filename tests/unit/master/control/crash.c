@@ -110,12 +110,12 @@ static void check_comes_back(enum kind how, int number)
 	bench_done();
 }
 
-TEST(control, a_wild_pointer_comes_back)
+TEST(control, a_wild_pointer_is_returned)
 {
 	check_comes_back(NO_PAGE, SIGSEGV);
 }
 
-TEST(control, a_bus_error_comes_back)
+TEST(control, a_bus_error_is_returned)
 {
 	int fd = memfd_create("ecdaq-test", MFD_CLOEXEC);
 
@@ -125,22 +125,22 @@ TEST(control, a_bus_error_comes_back)
 	check_comes_back(BUS_ERROR, SIGBUS);
 }
 
-TEST(control, a_stack_that_runs_over_comes_back)
+TEST(control, a_stack_overflow_is_returned)
 {
 	check_comes_back(OVERFLOW, SIGSEGV);
 }
 
-TEST(control, abort_and_a_failed_assertion_come_back)
+TEST(control, abort_and_a_failed_assertion_are_returned)
 {
 	check_comes_back(ABORT, SIGABRT);
 }
 
-TEST(control, an_arithmetic_error_comes_back)
+TEST(control, an_arithmetic_error_is_returned)
 {
 	check_comes_back(DIVISION, SIGFPE);
 }
 
-TEST(control, a_crash_is_told_in_one_line)
+TEST(control, a_crash_is_reported_in_one_line)
 {
 	char text[320];
 	enum control_result result;
@@ -220,7 +220,7 @@ TEST(control, a_crash_elsewhere_ends_the_process)
 	CHECK(status_of(crash_after_its_end) != 0);
 }
 
-TEST(control, a_signal_that_somebody_sends_ends_the_process)
+TEST(control, a_signal_sent_by_a_process_ends_the_process)
 {
 	CHECK(status_of(crash_by_somebody) != 0);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What can be wrong with a program before its first cycle, and that it is said in one line. */
+/* Errors of a program before its first cycle, each reported in one line. */
 #include <errno.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -18,14 +18,14 @@ static void check_refused(const char *path, int r, const char *why)
 	CHECK(bench.control == NULL);
 }
 
-TEST(control, a_file_that_is_missing_is_said)
+TEST(control, a_missing_file_is_reported)
 {
 	check_refused("/nowhere/at/all.so", -ENOENT, "No such file or directory");
 	check_refused("/tmp", -EINVAL, "is not a file");
 	check_refused("blink", -EINVAL, "expected a path with a slash (control.program)");
 }
 
-TEST(control, a_file_that_is_no_shared_object_is_said)
+TEST(control, a_file_that_is_no_shared_object_is_reported)
 {
 	char path[] = "/tmp/ecdaq-test-control-XXXXXX";
 	int fd = mkstemp(path);
@@ -49,19 +49,19 @@ TEST(control, a_file_that_anyone_may_write_is_not_loaded)
 	unlink(path);
 }
 
-TEST(control, an_object_without_the_symbol_is_said)
+TEST(control, an_object_without_the_symbol_is_reported)
 {
 	check_refused(ECDAQ_TEST_PROGRAMS "/no_symbol.so", -ENOEXEC,
 		      "has no symbol ecdaq_program: no control program");
 }
 
-TEST(control, an_object_that_lacks_a_function_is_said)
+TEST(control, an_object_that_lacks_a_function_is_reported)
 {
 	check_refused(ECDAQ_TEST_PROGRAMS "/missing_symbol.so", -ENOEXEC,
 		      "undefined symbol: function_that_is_nowhere");
 }
 
-TEST(control, another_version_of_the_header_is_said)
+TEST(control, another_version_of_the_header_is_reported)
 {
 	check_refused(ECDAQ_TEST_PROGRAMS "/other_abi.so", -ENOEXEC,
 		      "was built for version 2 of ecdaq/control.h, this ecdaqd has 1: rebuild it");
@@ -103,7 +103,7 @@ static void check_find(const char *channel, int is_output, int r, const char *wh
 	bench_done();
 }
 
-TEST(control, a_channel_that_cannot_be_had_is_named_with_the_reason)
+TEST(control, an_unusable_channel_is_named_with_the_reason)
 {
 	check_find("a.adc", 0, 0, "");
 	check_find("a.led", 0, 0, ""); /* an output can be read */
@@ -137,7 +137,7 @@ static void count_exit(void *state)
 	exits++;
 }
 
-TEST(control, what_a_failing_init_says_is_one_plain_line)
+TEST(control, the_reason_of_a_failing_init_is_one_printable_line)
 {
 	struct probe *probe = bench_configure();
 
@@ -203,7 +203,7 @@ static void check_options_refused(const char *options, const char *why)
 	bench_done();
 }
 
-TEST(control, options_are_told_by_their_keys)
+TEST(control, options_are_found_by_their_keys)
 {
 	CHECK_EQ(begin_with(""), 0);
 	CHECK(kp == 1.0);
@@ -215,7 +215,7 @@ TEST(control, options_are_told_by_their_keys)
 	bench_done();
 }
 
-TEST(control, options_that_cannot_be_meant_are_refused)
+TEST(control, malformed_and_unknown_options_are_rejected)
 {
 	check_options_refused("kp=1x",
 			      "init() failed: kp: the value in control.options is not a number");

@@ -162,7 +162,7 @@ static int set_raw_and_release(const struct ecdaq_cycle *cy, void *state)
 	return ECDAQ_GO_ON;
 }
 
-TEST(control, an_output_stays_until_it_is_set_anew_or_released)
+TEST(control, an_output_stays_until_it_is_set_again_or_released)
 {
 	begin(set_raw_and_release);
 	for (int i = 0; i < 2; i++) {
@@ -202,7 +202,7 @@ static int use_wild_handles(const struct ecdaq_cycle *cy, void *state)
 	return ECDAQ_GO_ON;
 }
 
-TEST(control, handles_that_nobody_gave_do_no_harm)
+TEST(control, invalid_handles_do_no_harm)
 {
 	begin(use_wild_handles);
 	CHECK_EQ(bench_run(), CONTROL_DONE);
@@ -225,7 +225,7 @@ static int set_led(const struct ecdaq_cycle *cy, void *state)
 	return verdict;
 }
 
-TEST(control, a_pause_starts_it_anew)
+TEST(control, after_a_pause_the_next_call_is_a_first_one)
 {
 	begin(set_led);
 	verdict = ECDAQ_GO_ON;
@@ -247,7 +247,7 @@ TEST(control, a_pause_starts_it_anew)
 	bench_done();
 }
 
-TEST(control, a_program_may_ask_for_fail_safe_and_go_on_later)
+TEST(control, a_program_can_request_fail_safe_and_continue_later)
 {
 	begin(set_led);
 	verdict = ECDAQ_MAKE_SAFE;
@@ -298,7 +298,7 @@ TEST(control, an_overrun_is_counted)
 	bench_done();
 }
 
-TEST(control, an_overrun_can_park_it_until_the_bus_comes_to_op_anew)
+TEST(control, an_overrun_can_park_it_until_the_bus_reaches_op_again)
 {
 	begin(take_time);
 	bench.cfg.control_overrun = CONFIG_OVERRUN_FAIL_SAFE;
@@ -346,7 +346,7 @@ static int ask_busy(const struct ecdaq_cycle *cy, void *state)
 	return ECDAQ_GO_ON;
 }
 
-TEST(control, how_long_it_has_been_inside_can_be_asked_from_outside)
+TEST(control, the_duration_of_a_running_call_can_be_read_from_another_thread)
 {
 	begin(ask_busy);
 	CHECK_EQ(control_busy_ns(bench.control, (mono_t){ 5000 }), 0);

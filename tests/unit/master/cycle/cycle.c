@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The whole cycle against a scripted exchange: what it does with what the bus says. */
+/* The whole cycle against a scripted exchange: its reaction to what the bus returns. */
 #include "cycle/cycle.h"
 
 #include <pthread.h>
@@ -24,7 +24,7 @@ static struct {
 	int64_t dc_offset_ns; /* DC time minus host time */
 	int64_t transit_ns;
 	int64_t hold_ns; /* between the sending and the wire, in no round trip */
-	int is_timeless; /* the reference's time in the frame is not to be believed */
+	int is_timeless; /* the reference's time in the frame is implausible */
 	uint64_t slaves_low;
 	unsigned late;
 	unsigned doubled;
@@ -354,7 +354,7 @@ TEST(cycle, a_sample_carries_the_phase_error_of_its_frame)
 	CHECK(histogram_max_magnitude(&stats.phase) >= 6800);
 }
 
-TEST(cycle, a_wake_three_periods_late_leaves_three_skipped_samples_and_goes_on_in_step)
+TEST(cycle, a_wake_three_periods_late_leaves_three_skipped_samples_and_keeps_the_phase)
 {
 	uint64_t cycle;
 
@@ -392,7 +392,7 @@ TEST(cycle, a_stall_too_long_for_placeholders_jumps_the_numbers_by_exactly_the_s
 	CHECK_EQ(count_events(EVENT_NUMBERING_JUMP), 0);
 }
 
-TEST(cycle, a_counter_that_stands_still_is_a_bad_sample_of_that_slave_alone)
+TEST(cycle, a_counter_that_does_not_advance_makes_the_sample_of_that_slave_alone_bad)
 {
 	struct got s;
 
@@ -498,7 +498,7 @@ TEST(cycle, an_output_goes_out_in_op_only_and_is_answered_with_its_cycle)
 	CHECK_EQ(stats.is_fail_safe, 1);
 }
 
-TEST(cycle, an_output_that_is_not_there_is_one_clear_line)
+TEST(cycle, a_missing_output_is_reported_in_one_line)
 {
 	char error[256] = "";
 	struct cycle_spec spec = { .cfg = &cfg,
@@ -616,7 +616,7 @@ TEST(cycle, a_late_frame_that_is_held_past_the_next_edge_moves_the_deadline_with
 	CHECK_EQ(stats.samples_bad, 2 * 3);
 }
 
-TEST(cycle, a_number_behind_the_edges_is_set_right_once_and_the_deadline_stays)
+TEST(cycle, a_number_behind_the_edges_is_corrected_once_and_the_deadline_stays)
 {
 	uint64_t cycle;
 
@@ -638,7 +638,7 @@ TEST(cycle, a_number_behind_the_edges_is_set_right_once_and_the_deadline_stays)
 	CHECK_EQ(stats.samples_bad, 2);
 }
 
-TEST(cycle, a_number_behind_by_three_edges_and_a_wake_late_by_two_are_set_right_together)
+TEST(cycle, a_number_behind_by_three_edges_and_a_wake_late_by_two_are_corrected_together)
 {
 	int64_t step_ns;
 	uint64_t skipped;
@@ -656,7 +656,7 @@ TEST(cycle, a_number_behind_by_three_edges_and_a_wake_late_by_two_are_set_right_
 	CHECK(llabs(world.now.ns - step_ns - 20 * (int64_t)PERIOD_NS) < 100000);
 }
 
-/* Master and slaves were held up together: the frame is back, its time too far off to be believed.
+/* Master and slaves were delayed together: the frame is back, its time too far off to be plausible.
  */
 TEST(cycle, a_frame_without_a_time_is_late_and_never_taken_for_the_current_one)
 {

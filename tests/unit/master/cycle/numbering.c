@@ -14,7 +14,7 @@ static struct numbering make(void)
 	return n;
 }
 
-TEST(numbering, the_first_frame_lays_the_grid_on_whole_periods)
+TEST(numbering, the_first_frame_sets_the_grid_to_whole_periods)
 {
 	struct numbering n;
 
@@ -55,7 +55,7 @@ TEST(numbering, a_frame_before_its_edge_is_not_trusted_and_never_counts_back)
 	CHECK(!p.is_in_window);
 }
 
-TEST(numbering, another_reference_clock_lays_the_grid_anew_after_a_while)
+TEST(numbering, another_reference_clock_rebases_the_grid_after_a_while)
 {
 	struct numbering n = make();
 	struct numbering_place p;

@@ -72,7 +72,7 @@ TEST(dc_servo, it_locks_within_a_second_from_any_phase_and_any_drift)
 	}
 }
 
-TEST(dc_servo, a_late_wake_is_not_taken_for_drift)
+TEST(dc_servo, a_late_wake_is_not_mistaken_for_drift)
 {
 	struct plant p = make_plant(1, 1e9, 0, 0);
 
@@ -98,7 +98,7 @@ TEST(dc_servo, one_wild_frame_moves_the_deadline_by_less_than_two_microseconds)
 	CHECK_EQ(p.servo.state, DC_LOCKED);
 }
 
-TEST(dc_servo, it_keeps_the_frequency_over_an_outage_and_says_when_the_lock_is_gone)
+TEST(dc_servo, it_keeps_the_frequency_over_an_outage_and_reports_the_loss_of_lock)
 {
 	struct plant p = make_plant(7, 1e9, 80.0, 0);
 	double before;

@@ -5,7 +5,7 @@
 
 #include "harness/test.h"
 
-TEST(daemon_failure, absence_is_transient_and_a_mistake_is_not)
+TEST(daemon_failure, absence_is_transient_and_a_configuration_error_is_not)
 {
 	CHECK_EQ(failure_is_transient(EXIT_CODE_NO_SLAVE), 1);
 	CHECK_EQ(failure_is_transient(EXIT_CODE_INTERFACE), 1);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A bus and an exchange that a test rules, in place of bus/ (the linker takes these first): one
- * slave with an LED and an ADC, a reference clock that runs 50 ppm fast, on a clock that moves when
- * told.
+ * A bus and an exchange that a test controls, in place of bus/ (the linker takes these first): one
+ * slave with an LED and an ADC, a reference clock that runs 50 ppm fast, on a clock that the test
+ * advances.
  */
 #ifndef TESTS_UNIT_DAEMON_FAKE_BUS_H
 #define TESTS_UNIT_DAEMON_FAKE_BUS_H
@@ -32,12 +32,12 @@ struct fake_bus {
 	int is_doubled;         /* every frame comes back twice */
 	int is_dc_running_away; /* the reference is 5 % fast */
 	struct bus_watch_report report;
-	uint8_t led;         /* as it was on the wire last */
+	uint8_t led;         /* last value on the wire */
 	char steps[512];     /* what was called, in order, with a blank behind each */
 	unsigned transports; /* open ones */
 	int is_link_up;
 	uint64_t exchanges;
-	void (*led_back)(void *ctx); /* called by bus_lead_back(); NULL: nobody */
+	void (*led_back)(void *ctx); /* called by bus_lead_back(); NULL: none */
 	void *led_back_ctx;
 };
 

@@ -64,13 +64,13 @@ TEST(daemon_notify, readiness_and_status_reach_the_manager)
 	notify_send(&notify, "STATUS=%u slaves in OP", 2u);
 	check_heard(fd, "STATUS=2 slaves in OP");
 	notify_alive(&notify, (mono_t){ 1 });
-	check_heard(fd, NULL); /* no watchdog was asked for */
+	check_heard(fd, NULL); /* no watchdog is configured */
 	close(fd);
-	notify_send(&notify, "STOPPING=1"); /* nobody there any more */
+	notify_send(&notify, "STOPPING=1"); /* the receiver is closed */
 	notify_close(&notify);
 }
 
-TEST(daemon_notify, the_watchdog_is_fed_twice_as_often_as_it_bites)
+TEST(daemon_notify, the_watchdog_is_fed_twice_per_timeout)
 {
 	struct notify notify;
 	char name[64];
@@ -96,7 +96,7 @@ TEST(daemon_notify, the_watchdog_is_fed_twice_as_often_as_it_bites)
 	close(fd);
 }
 
-TEST(daemon_notify, addresses_that_are_none_are_ignored)
+TEST(daemon_notify, invalid_addresses_are_ignored)
 {
 	struct notify notify;
 	char longest[200];

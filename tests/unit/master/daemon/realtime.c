@@ -24,7 +24,7 @@ static void hear(void *ctx, enum event_rt which, int err, const char *text)
 	snprintf(heard->text, sizeof(heard->text), "%s", text);
 }
 
-TEST(daemon_realtime, what_was_not_asked_for_is_not_reported)
+TEST(daemon_realtime, what_was_not_requested_is_not_reported)
 {
 	static struct config cfg;
 	struct realtime rt;

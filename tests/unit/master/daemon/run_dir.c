@@ -74,7 +74,7 @@ TEST(run_dir, it_makes_a_directory_for_owner_and_group_with_page_and_ring)
 	bench_close(&b);
 }
 
-TEST(run_dir, a_second_instance_is_refused_and_leaves_the_first_one_s_page_alone)
+TEST(run_dir, a_second_instance_is_rejected_and_leaves_the_page_of_the_first_unchanged)
 {
 	static struct bench b;
 	struct run_dir first;
@@ -97,7 +97,7 @@ TEST(run_dir, a_second_instance_is_refused_and_leaves_the_first_one_s_page_alone
 	bench_close(&b);
 }
 
-TEST(run_dir, who_is_of_the_group_may_add_files_and_take_away_only_his_own)
+TEST(run_dir, group_members_can_add_files_and_remove_only_their_own)
 {
 	static struct bench b;
 	struct run_dir run;
@@ -116,7 +116,7 @@ TEST(run_dir, who_is_of_the_group_may_add_files_and_take_away_only_his_own)
 	bench_close(&b);
 }
 
-TEST(run_dir, a_group_that_is_not_there_is_an_error_of_the_configuration)
+TEST(run_dir, an_unknown_group_is_a_configuration_error)
 {
 	static struct bench b;
 	struct run_dir run;
@@ -174,7 +174,7 @@ TEST(run_dir, a_directory_of_another_user_is_not_trusted)
 	bench_close(&b);
 }
 
-TEST(run_dir, a_path_that_cannot_be_made_is_named)
+TEST(run_dir, a_path_that_cannot_be_created_is_named)
 {
 	static struct bench b;
 	struct run_dir run;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The session against a bus that fails where the test wants it to. */
+/* The session against a bus that fails where the test chooses. */
 #include "daemon/session.h"
 
 #include <errno.h>
@@ -60,7 +60,7 @@ static int has_cycle_ended(void *ctx)
 	return b->ends_after == 1;
 }
 
-static void let_pass(void *ctx, mono_t until)
+static void advance_clock(void *ctx, mono_t until)
 {
 	struct bench *b = ctx;
 
@@ -90,7 +90,7 @@ static void bench_open(struct bench *b)
 			   .cycle_start = start_cycle,
 			   .cycle_end = end_cycle,
 			   .cycle_has_ended = has_cycle_ended,
-			   .wait = let_pass,
+			   .wait = advance_clock,
 			   .warn = warn,
 			   .ctx = b },
 		.segment = RUN_DIR_SIMULATED,
@@ -128,16 +128,16 @@ static uint32_t state_of(const struct bench *b)
 
 static const char *message_of(const struct bench *b)
 {
-	return session_page(b->session)->message; /* nobody writes it meanwhile */
+	return session_page(b->session)->message; /* no other writer at this time */
 }
 
-/* @steps cycles with the service loop between them; its last news. */
+/* @steps cycles with the service loop between them; its last result. */
 static int run(struct bench *b, unsigned steps, struct failure *failure)
 {
 	int r = SESSION_GOES_ON;
 
 	for (unsigned i = 0; i < steps && r == SESSION_GOES_ON; i++) {
-		let_pass(b, (mono_t){ fake_bus.mono_ns + NS_PER_MS });
+		advance_clock(b, (mono_t){ fake_bus.mono_ns + NS_PER_MS });
 		r = session_service(b->session, failure);
 	}
 	return r;
@@ -224,7 +224,7 @@ TEST(session, a_failed_one_can_be_brought_up_again)
 	bench_close(&b);
 }
 
-TEST(session, frames_that_all_come_back_twice_are_said_once)
+TEST(session, duplicate_frames_are_reported_once)
 {
 	static struct bench b;
 	struct failure failure;
@@ -245,7 +245,7 @@ TEST(session, frames_that_all_come_back_twice_are_said_once)
 	bench_close(&b);
 }
 
-TEST(session, op_is_not_asked_for_without_lock)
+TEST(session, op_is_not_requested_without_lock)
 {
 	static struct bench b;
 	struct failure failure;
@@ -262,7 +262,7 @@ TEST(session, op_is_not_asked_for_without_lock)
 	bench_close(&b);
 }
 
-TEST(session, op_is_not_asked_for_while_frames_get_lost)
+TEST(session, op_is_not_requested_while_frames_are_lost)
 {
 	static struct bench b;
 	struct failure failure;
@@ -276,7 +276,7 @@ TEST(session, op_is_not_asked_for_while_frames_get_lost)
 	bench_close(&b);
 }
 
-TEST(session, told_to_stop_on_the_way_up_it_goes_down_in_order)
+TEST(session, a_stop_request_during_bring_up_takes_the_bus_down_in_order)
 {
 	static struct bench b;
 	struct failure failure;
@@ -341,21 +341,21 @@ TEST(session, a_slave_that_falls_is_shown_and_its_return_too)
 	bench_close(&b);
 }
 
-static void check_nobody_takes_samples(void *ctx)
+static void check_no_samples_are_taken(void *ctx)
 {
 	CHECK_EQ(state_of(ctx), BUS_RECOVERING);
 	fake_bus.led_back = NULL;
 }
 
 /* On its way through INIT the working counter is low: that must not look like bad samples. */
-TEST(session, a_slave_is_led_back_only_after_the_cycle_has_left_op)
+TEST(session, a_slave_is_restored_only_after_the_cycle_has_left_op)
 {
 	static struct bench b;
 	struct failure failure;
 
 	bench_open(&b);
 	CHECK_EQ(session_bring_up(b.session, &failure), 0);
-	fake_bus.led_back = check_nobody_takes_samples;
+	fake_bus.led_back = check_no_samples_are_taken;
 	fake_bus.led_back_ctx = &b;
 	fake_bus.report = (struct bus_watch_report){ .slaves_op = 0, .is_all_op = 0 };
 	CHECK_EQ(run(&b, 150, &failure), SESSION_GOES_ON);
@@ -363,7 +363,7 @@ TEST(session, a_slave_is_led_back_only_after_the_cycle_has_left_op)
 	bench_close(&b);
 }
 
-TEST(session, all_slaves_lost_for_long_asks_for_a_new_start)
+TEST(session, all_slaves_lost_for_long_requests_a_restart)
 {
 	static struct bench b;
 	struct failure failure;
@@ -480,7 +480,7 @@ TEST(session, an_output_set_through_the_socket_is_on_the_wire_and_safe_at_the_en
 	bench_close(&b);
 }
 
-TEST(session, clear_zeroes_counters_and_keeps_the_cycle_s_place)
+TEST(session, clear_zeroes_counters_and_keeps_the_cycle_number)
 {
 	static struct bench b;
 	struct failure failure;
@@ -524,7 +524,7 @@ TEST(session, stop_through_the_socket_is_answered_and_reported)
 	bench_close(&b);
 }
 
-TEST(session, samples_tell_what_they_are)
+TEST(session, the_ring_describes_its_samples)
 {
 	static struct bench b;
 	struct failure failure;

@@ -66,7 +66,7 @@ TEST(line, lost_frame_costs_the_timeout_and_no_more)
 	line_destroy(line);
 }
 
-TEST(line, answer_to_an_earlier_index_is_thrown_away)
+TEST(line, answer_to_an_earlier_index_is_dropped)
 {
 	struct fake_wire wire = { 0 };
 	struct line *line = line_on(&wire);
@@ -236,7 +236,7 @@ TEST(line, riding_frame_is_sent_by_the_cycle_and_answered)
 	line_destroy(ride.line);
 }
 
-TEST(line, riding_frame_that_is_lost_times_out_and_its_late_answer_harms_nobody)
+TEST(line, riding_frame_that_is_lost_times_out_and_its_late_answer_does_no_harm)
 {
 	struct fake_wire wire = { .drop = 1 };
 	struct ride ride = { .wire = &wire, .line = line_on(&wire) };
@@ -259,7 +259,7 @@ TEST(line, riding_frame_that_is_lost_times_out_and_its_late_answer_harms_nobody)
 	line_destroy(ride.line);
 }
 
-TEST(line, nothing_rides_when_nobody_asks)
+TEST(line, nothing_rides_without_a_request)
 {
 	struct fake_wire wire = { 0 };
 	struct line *line = line_on(&wire);
@@ -272,7 +272,7 @@ TEST(line, nothing_rides_when_nobody_asks)
 	line_destroy(line);
 }
 
-TEST(line, sleep_lets_cycles_run_while_riding)
+TEST(line, cycles_run_during_sleep_while_riding)
 {
 	struct fake_wire wire = { 0 };
 	struct ride ride = { .wire = &wire, .line = line_on(&wire) };
@@ -385,7 +385,7 @@ static void count_call(void *ctx)
 	(*(unsigned *)ctx)++;
 }
 
-TEST(line, who_attends_hears_of_every_frame_and_every_pause_even_on_a_dead_wire)
+TEST(line, the_keepalive_is_called_for_every_frame_and_pause_even_on_a_dead_wire)
 {
 	struct fake_wire wire = { .drop = 1 };
 	struct line *line = line_on(&wire);

@@ -143,7 +143,7 @@ TEST(osal, timers_and_sleep_run_on_the_lines_clock)
 	nic_destroy(nic);
 }
 
-TEST(nicdrv, a_slow_wire_is_waited_for_as_long_as_the_line_says)
+TEST(nicdrv, a_slow_wire_is_waited_for_up_to_the_timeout_of_the_line)
 {
 	struct nic *nic = nic_create();
 	uint16 value = 0;

@@ -19,7 +19,7 @@
 #include "harness/test.h"
 #include "wire/datagram.h"
 
-TEST(packet_socket, unknown_interface_is_told_with_those_there_are)
+TEST(packet_socket, unknown_interface_is_reported_with_a_list_of_existing_ones)
 {
 	struct transport transport = { 0 };
 	char error[PACKET_ERROR_BYTES];
@@ -33,7 +33,7 @@ TEST(packet_socket, unknown_interface_is_told_with_those_there_are)
 	CHECK(transport.send == NULL);
 }
 
-TEST(packet_socket, name_that_is_none_is_refused)
+TEST(packet_socket, invalid_name_is_rejected)
 {
 	struct transport transport = { 0 };
 	char error[PACKET_ERROR_BYTES];
@@ -188,7 +188,7 @@ static int make_interface(const char *name)
 	return tap;
 }
 
-TEST(packet_socket, an_interface_that_is_deleted_and_made_anew_is_used_again)
+TEST(packet_socket, an_interface_that_is_deleted_and_recreated_is_used_again)
 {
 	static const char name[] = "ecdaqtest0";
 	struct transport transport;
