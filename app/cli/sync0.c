@@ -11,7 +11,6 @@
 #include "cli/bars.h"
 #include "cli/cli.h"
 #include "cli/running.h"
-#include "cli/source.h"
 #include "cli/sync0_source.h"
 #include "cli/text.h"
 #include "program/args.h"

@@ -6,7 +6,6 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "program/exit_code.h"
 #include "program/json.h"
 #include "record/log.h"
 #include "record/log_common.h"

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* Rings that another member of the group truncates or overwrites while they are recorded. */
-#include <fcntl.h>
 #include <string.h>
 #include <unistd.h>
 

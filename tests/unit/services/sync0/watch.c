@@ -11,7 +11,6 @@
 #include <unistd.h>
 
 #include "base/clock.h"
-#include "base/status.h"
 #include "base/sync0.h"
 #include "harness/test.h"
 #include "reader/page.h"
