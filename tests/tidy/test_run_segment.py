@@ -154,12 +154,11 @@ def test_a_run_that_is_killed_leaves_nothing_behind(bench: Bench) -> None:
 
 
 def test_the_run_directory_is_removed_unless_it_is_given(bench: Bench, tmp_path: Path) -> None:
-    before = set(Path("/dev/shm").glob("ecdaq-run-*"))
     bench.make_it("ecdaqd", 'echo "run dir $ECDAQ_RUN_DIR" >> "$LOG"; exit 0')
     assert bench.start("--seconds", "1").wait(20) == 0
     (line,) = [entry for entry in bench.log if entry.startswith("run dir ")]
+    # Others on this machine may make and remove theirs meanwhile.
     assert not Path(line.removeprefix("run dir ")).exists()
-    assert set(Path("/dev/shm").glob("ecdaq-run-*")) <= before
 
 
 @pytest.mark.parametrize("page", ['{"pid":1,"samples_good":7,}', '{"pid":PID,"samples_good":0,}'])
