@@ -61,7 +61,7 @@ usage: ./build.sh test [--fail-fast | --keep-going] [--only PATTERN] [--fuzz-sec
 
 Without GROUP all groups run, the fast ones first:
   unit     app/, module by module; also under ASan+UBSan, and what threads share under TSan
-  tidy     the rules of the source tree: include table, banned calls, sizes, formatting, lint
+  tidy     the rules of the source tree: include table, banned calls, sizes, formatting, links, lint
   cli      the operator's tool and the programs' command lines; also under ASan+UBSan
   replay   captures of real buses against the simulated segment
   sim      the whole master on virtual time; also under ASan+UBSan
@@ -69,7 +69,7 @@ Without GROUP all groups run, the fast ones first:
   recipes  the image's recipes and layers, parsed by BitBake, and their rules
   live     everything over a veth pair, in real time
   dds      samples and commands over DDS between two namespaces
-  docs     links and paths of all pages; the commands of README and the tutorials, in a fresh clone
+  docs     the commands of README and of the tutorials, in a fresh clone
   boot     the images, built, inspected and booted in QEMU; skipped, with a message, without root
 Only when named:
   control  the tests of control programs in unit, sim, cli and live

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -63,49 +62,3 @@ def test_tests_named_by_the_pitfalls_page_exist() -> None:
     named = [name for name in re.findall(r"`(\w+\.\w+)`", page) if not name.startswith("bus.")]
     assert len(named) > 30
     assert [name for name in named if name not in defined and name != "cycle.period"] == []
-
-
-def tracked() -> list[Path]:
-    listing = subprocess.run(
-        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True
-    )
-    return [ROOT / name for name in listing.stdout.split("\0") if name]
-
-
-def anchors(page: Path) -> set[str]:
-    titles = re.findall(r"^#+ (.*)$", page.read_text(), re.MULTILINE)
-    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
-
-
-def test_every_relative_link_leads_to_a_file_and_a_heading() -> None:
-    broken: list[str] = []
-    count = 0
-    for page in (path for path in tracked() if path.suffix == ".md"):
-        for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
-            if re.match(r"[a-z]+:", link):
-                continue
-            name, _, anchor = link.partition("#")
-            target = (page.parent / name).resolve() if name else page
-            count += 1
-            if not target.exists() or (
-                anchor and target.suffix == ".md" and anchor not in anchors(target)
-            ):
-                broken.append(f"{page.relative_to(ROOT)}: {link}")
-    assert count > 150
-    assert broken == []
-
-
-def test_every_path_of_the_tree_that_a_page_names_exists() -> None:
-    missing: list[str] = []
-    count = 0
-    for page in (path for path in tracked() if path.suffix == ".md"):
-        for name in re.findall(r"`((?:app|tests|recipes|layers)/[\w./-]+)`", page.read_text()):
-            is_placeholder = re.search(r"[A-Z]{4}", name)  # NNNN, MODULE
-            is_fetched = name in ("app/third_party/soem/", "app/third_party/libgpiod/")
-            if is_placeholder or is_fetched:
-                continue
-            count += 1
-            if not (ROOT / name).exists():
-                missing.append(f"{page.relative_to(ROOT)}: {name}")
-    assert count > 60
-    assert missing == []

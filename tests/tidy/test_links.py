@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Every link and every path that a page names leads somewhere."""
+"""Every relative link and every path of the tree that a page names exists."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def pages() -> list[str]:
 
 
 def anchors(page: Path) -> set[str]:
-    """Of its headings, as the usual viewers make them."""
+    """The anchors of its headings, as GitHub and GitLab make them."""
     text = FENCE.sub("", page.read_text())
     headings = re.findall(r"^#+ +(.*)$", text, re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", h.lower()).replace(" ", "-") for h in headings}
@@ -45,7 +45,7 @@ def problems(page: Path, text: str) -> list[str]:
             found.append(f"link to {target}: no such file")
         elif anchor and to.suffix == ".md" and anchor not in anchors(to):
             found.append(f"link to {target}: no such heading")
-    # What a download makes is not in a fresh clone; NNNN and NAME are placeholders.
+    # Downloaded sources are not in a fresh clone; NNNN and NAME are placeholders.
     found += [
         f"path {name}: no such file"
         for name in PATH.findall(plain)
@@ -54,10 +54,16 @@ def problems(page: Path, text: str) -> list[str]:
     return found
 
 
+def test_links_and_paths_are_recognized() -> None:
+    text = "".join((ROOT / name).read_text() for name in pages())
+    assert len(LINK.findall(text)) > 150
+    assert len(PATH.findall(text)) > 60
+
+
 @pytest.mark.parametrize("name", pages())
 def test_links_and_paths_of_a_page_exist(name: str) -> None:
     if name == "CHANGELOG.md":
-        return  # it names what has been
+        return  # it names files of earlier versions
     assert not problems(ROOT / name, (ROOT / name).read_text())
 
 
