@@ -71,13 +71,13 @@ static enum exit_code verb_program(struct cli *cli, int argc, char **argv)
 static const struct verb verbs[] = {
 	{ "status", "", "Bus, cycle, slaves and recorder on one screen.",
 	  "After ecdaqd has ended it shows the last known state, marked as such.\n", verb_status },
-	{ "top", "", "The same, live. Ends with q, Ctrl-C, or ecdaqd.",
-	  "Where standard output is no terminal it prints a line every interval instead.\n",
+	{ "top", "", "The same, live. Ends with q, Ctrl-C, or when ecdaqd ends.",
+	  "Where standard output is not a terminal it prints one line per interval.\n",
 	  verb_top },
-	{ "slaves", "", "The slaves: position, identity, AL state.", NULL, verb_slaves },
-	{ "channels", "", "The channel table: what the process image holds.", NULL, verb_channels },
-	{ "watch", "CHANNEL...", "Values of channels, every cycle.",
-	  "CHANNEL may hold * and ?: 'piccolo*.adc'. A sample that is not fresh is marked.\n",
+	{ "slaves", "", "The slaves: position, alias, AL state, name, device.", NULL, verb_slaves },
+	{ "channels", "", "The channel table: what the process image contains.", NULL, verb_channels },
+	{ "watch", "CHANNEL...", "Values of channels in every cycle.",
+	  "CHANNEL may contain * and ?: 'piccolo*.adc'. A value that is not good is marked !.\n",
 	  verb_watch },
 	{ "set", "OUTPUT=VALUE...", "Set outputs, all in the same cycle; prints its number.",
 	  "VALUE is physical, in the channel's unit; on, off, true, false for BOOL.\n", verb_set },
@@ -94,7 +94,7 @@ static const struct verb verbs[] = {
 	  "USINT UINT UDINT ULINT REAL LREAL, and for reading STRING.\n",
 	  verb_sdo },
 	{ "events", "", "What happened, oldest first.", NULL, verb_events },
-	{ "sync0", "[calibrate]", "The SYNC0 pulses on GPIO lines, as ecdaq-sync0 sees them.",
+	{ "sync0", "[calibrate]", "Results of ecdaq-sync0: the SYNC0 pulses on GPIO lines.",
 	  "calibrate: the same signal is on the first two lines: measure the noise of this "
 	  "board's\n"
 	  "GPIO path and store it (sync0.calibration). ecdaq-sync0 must not run meanwhile.\n",
@@ -136,7 +136,7 @@ static void help(void)
 	     "  --help          print this text; after a verb: its options\n"
 	     "  --version       print the version\n"
 	     "\n"
-	     "Every reading verb takes --json: one JSON value a line.\n");
+	     "Every verb that reads has --json: one JSON value per line.\n");
 	exit_code_help(stdout, EXIT_CODE_COMMON | EXIT_CODE_BIT(CONFIG) |
 				       EXIT_CODE_BIT(PERMISSION) | EXIT_CODE_BIT(NO_DAEMON) |
 				       EXIT_CODE_BIT(REFUSED));

@@ -166,6 +166,11 @@ def test_a_verb_whose_program_is_missing_is_named(verb: str, tmp_path: Path) -> 
     one_line("ecdaq", result, FAILED, f"{tmp_path}/ecdaq-{verb}: not installed")
 
 
+def test_an_invalid_configuration_of_log_is_exit_code_3() -> None:
+    result = run("ecdaq", "log", "list", "--config", "/nowhere/ecdaq.yaml")
+    one_line("ecdaq", result, CONFIG, "log: --config: /nowhere/ecdaq.yaml: ")
+
+
 def test_ecdaq_itself_links_neither_openssl_nor_zstd() -> None:
     libraries = subprocess.run(
         ["ldd", BIN / "ecdaq"], capture_output=True, text=True, check=True

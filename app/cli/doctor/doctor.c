@@ -285,7 +285,7 @@ enum exit_code verb_doctor(struct cli *cli, int argc, char **argv)
 		  "the EtherCAT port, if not as configured" },
 		{ "strict", 0, args_flag, &d->is_strict, NULL, "a WARN fails, too" },
 		{ "root", 0, args_text, &d->root, "DIR",
-		  "judge the copy of another machine's files in DIR" },
+		  "check a copy of another machine's files in DIR" },
 		{ "json", 0, args_flag, &d->is_json, NULL, "all of it as a JSON object" },
 	};
 	struct args args = { .options = options, .option_count = 4 };

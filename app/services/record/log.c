@@ -47,18 +47,18 @@ static void help(FILE *out)
 	      "  check    read all: CRC of each chunk, cycle numbers without a gap in and between "
 	      "files\n"
 	      "  recover  repair an incomplete recording; --output copies what is intact\n"
-	      "  export   a table with a row a cycle, as CSV (pandas.read_csv takes it as it is)\n"
+	      "  export   a table with one row per cycle, as CSV (pandas.read_csv reads it)\n"
 	      "\n"
 	      "  --dir DIR        the recordings' directory (default: record.dir)\n"
 	      "  --config FILE    ecdaq.yaml, for record.dir\n"
 	      "  --channels LIST  only these, as `ecdaq channels` names them\n"
 	      "  --from, --to     first and last cycle\n"
-	      "  --raw            values as on the wire (default: physical, raw * scale + offset)\n"
-	      "  --output FILE    where to (export: default is standard output)\n"
-	      "  --json           JSON (export: an object a line)\n"
+	      "  --raw            raw values (default: physical, raw * scale + offset)\n"
+	      "  --output FILE    file to write (export: default is standard output)\n"
+	      "  --json           JSON (export: one object per line)\n"
 	      "\n",
 	      out);
-	exit_code_help(out, EXIT_CODE_COMMON);
+	exit_code_help(out, EXIT_CODE_COMMON | EXIT_CODE_BIT(CONFIG));
 	fputs("check: 1 for gaps or damage.\n", out);
 }
 
@@ -126,8 +126,8 @@ static int find_dir(const struct arguments *a, char *dir, size_t dir_bytes)
 	config_defaults(&cfg);
 	if (a->dir == NULL && a->config_path != NULL &&
 	    config_load(a->config_path, &cfg, error, sizeof(error)) < 0) {
-		error_print(program, "%s", error);
-		return EXIT_CODE_FAILED;
+		error_print(program, "--config: %s", error);
+		return EXIT_CODE_CONFIG;
 	}
 	snprintf(dir, dir_bytes, "%s", a->dir != NULL ? a->dir : cfg.record_dir);
 	return EXIT_CODE_OK;
