@@ -8,7 +8,8 @@
  * included, disturbs the master, and no damage of the shared memory harms it.
  *
  * Context: one thread at a time for each reader. Pointers that a function returns belong to the
- * reader and are valid until the next call of ecdaq_reader_next() or ecdaq_events_next().
+ * reader and are valid until the next call of ecdaq_reader_next() or ecdaq_events_next(), those to
+ * slaves and channels until the next ECDAQ_READ_SESSION.
  */
 #ifndef ECDAQ_READER_H
 #define ECDAQ_READER_H
@@ -35,7 +36,8 @@ enum ecdaq_read {
 	ECDAQ_READ_SAMPLE = 1,  /* the next sample: ecdaq_reader_sample() */
 	ECDAQ_READ_LOST = 2,    /* too slow: ecdaq_reader_lost() samples were overwritten unread */
 	ECDAQ_READ_SESSION = 3, /* a session has begun: look up your channels */
-	ECDAQ_READ_ENDED = 4,   /* the session has ended and all of it was read */
+	ECDAQ_READ_ENDED = 4,   /* the session has ended and all of it was read; the next call waits
+				 * for the next session */
 };
 
 /* Why a sample is not good for some or all slaves, or what else is remarkable about it. */
@@ -113,9 +115,9 @@ struct ecdaq_reader;
 struct ecdaq_events;
 
 /**
- * Read the samples in @run_dir, the run directory of ecdaqd; NULL: $ECDAQ_RUN_DIR, else /run/ecdaq.
- * There need be no ecdaqd yet. 0; -ENOMEM; -ENAMETOOLONG (ret untouched on failure). Release with
- * ecdaq_reader_close().
+ * Read the samples in @run_dir, the run directory of ecdaqd; NULL or "": $ECDAQ_RUN_DIR, else
+ * /run/ecdaq. Succeeds without an ecdaqd; ecdaq_reader_next() then waits for one. 0; -ENOMEM;
+ * -ENAMETOOLONG (ret untouched on failure). Release with ecdaq_reader_close().
  */
 int ecdaq_reader_open(const char *run_dir, enum ecdaq_start start,
 		      struct ecdaq_reader **ret_reader);
@@ -124,11 +126,14 @@ void ecdaq_reader_close(struct ecdaq_reader *reader);
 
 /**
  * Take the next step; wait up to @timeout_ms for it (0: do not wait, -1: without limit). An enum
- * ecdaq_read, or -ENOMEM.
+ * ecdaq_read, or -ENOMEM; if at the start of a session, for all of its samples.
  */
 int ecdaq_reader_next(struct ecdaq_reader *reader, int timeout_ms);
 
-/** After ECDAQ_READ_TIMEOUT and ECDAQ_READ_ENDED: what is wrong, one line; "" if nothing is. */
+/**
+ * After ECDAQ_READ_TIMEOUT: why no session can be read. After ECDAQ_READ_ENDED: why it did not end
+ * in order. One line; "" if nothing is wrong.
+ */
 const char *ecdaq_reader_problem(const struct ecdaq_reader *reader);
 
 /** The sample that was read last; NULL before the first one of a session. */
@@ -147,7 +152,7 @@ uint64_t ecdaq_reader_period_ns(const struct ecdaq_reader *reader);
 /** Number of slaves and of channels; 0 without a session. */
 uint32_t ecdaq_reader_slave_count(const struct ecdaq_reader *reader);
 uint32_t ecdaq_reader_channel_count(const struct ecdaq_reader *reader);
-/** The slave at @position and the channel at @index; NULL: there is none. Valid for the session. */
+/** The slave at @position and the channel at @index; NULL: there is none. */
 const struct ecdaq_slave *ecdaq_reader_slave(const struct ecdaq_reader *reader, uint32_t position);
 const struct ecdaq_channel *ecdaq_reader_channel(const struct ecdaq_reader *reader, uint32_t index);
 /** Index of the channel called @name; -ENOENT: there is none, or no session. */
@@ -168,7 +173,7 @@ int ecdaq_events_open(const char *run_dir, enum ecdaq_start start,
 void ecdaq_events_close(struct ecdaq_events *events);
 /** The next event, or NULL if there is none yet. Never waits. */
 const struct ecdaq_event *ecdaq_events_next(struct ecdaq_events *events);
-/** Number of events that were overwritten before they could be read. */
+/** Number of events since ecdaq_events_open() that were overwritten before they could be read. */
 uint64_t ecdaq_events_lost(const struct ecdaq_events *events);
 
 /** Version of the library, "0.1.0". */

@@ -140,9 +140,10 @@ int reader_error(const struct reader *r)
 
 const char *reader_error_to_str(int error)
 {
-	return error == -EPROTO ? "not a sample ring of this version, or damaged"
-	       : error == -EIO  ? "truncated or overwritten while it was read"
-				: strerror(-error);
+	return error == -EPROTO  ? "not a sample ring of this version, or damaged"
+	       : error == -EIO   ? "truncated or overwritten while it was read"
+	       : error == -EPIPE ? "its ecdaqd ended without closing it"
+				 : strerror(-error);
 }
 
 const struct channel_table *reader_table(const struct reader *r)

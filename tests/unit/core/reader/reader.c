@@ -101,6 +101,7 @@ TEST(reader, a_ring_that_was_replaced_unclosed_is_read_to_its_end_first)
 	expect_sample(&b, 1);
 	expect(&b, READER_ENDED);
 	CHECK_EQ(reader_error(b.reader), -EPIPE);
+	CHECK_STR(reader_error_to_str(-EPIPE), "its ecdaqd ended without closing it");
 	expect(&b, READER_BEGUN);
 	CHECK_EQ(reader_table(b.reader)->meta.session, 2);
 	ring_destroy(first);
