@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The ESCs of the catalogue. Types, feature words, counts of FMMUs and SyncManagers and the kind of
- * clock are what captures of real devices show in 0x0000 to 0x0008 and by working counters; see
- * app/doc/reference/simulated-esc.md. The ports are the slave's own.
+ * clock are what captures of real devices show in 0x0000 to 0x0008 and by working counters; the IP
+ * core is not in a capture (app/doc/reference/simulated-esc.md). The ports are the slave's own.
  */
 #include <string.h>
 
