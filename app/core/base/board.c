@@ -92,7 +92,7 @@ void board_begin(struct board *board)
 {
 	uint64_t s = atomic_load_explicit(&board->sequence, RELAXED);
 
-	/* A writer that died half way left it odd; it stays so until this set is whole. */
+	/* A writer that died during a set left it odd; it stays odd until this set is complete. */
 	atomic_store_explicit(&board->sequence, s | 1, RELAXED);
 	atomic_thread_fence(memory_order_release);
 }

@@ -48,15 +48,15 @@ void board_init(struct board *board);
  */
 struct board *board_create_shared(int *ret_fd);
 /**
- * Map a board that was given to us. NULL with errno; EPROTO: not a board of this version, or one
- * that could be shortened under us. @fd may be closed. Context: blocking.
+ * Map a board received from another process. NULL with errno; EPROTO: not a board of this version,
+ * or one that could be truncated while mapped. @fd may be closed. Context: blocking.
  */
 struct board *board_map(int fd);
 void board_unmap(struct board *board);
 
 /** Put one value into the next set; board_commit() makes it visible. Context: the writer. */
 void board_put(struct board *board, unsigned output, uint64_t raw);
-/** Take the value of one output back in the next set: fail-safe from then on. Context: the writer.
+/** Withdraw the value of one output in the next set: fail-safe from then on. Context: the writer.
  */
 void board_unset(struct board *board, unsigned output);
 /** Begin (makes the page odd) and commit a set. Returns its sequence. Context: the writer. */

@@ -31,7 +31,7 @@ struct transport {
 	int (*send)(void *ctx, const uint8_t *frame, size_t frame_len);
 	/**
 	 * Take the next received frame. Returns its length; -EAGAIN when none came before
-	 * @deadline (a deadline in the past still looks once); another -errno on failure.
+	 * @deadline (a deadline in the past still polls once); another -errno on failure.
 	 * @ret_at, if not NULL, is when the frame was taken. RT-safe: polls, never blocks past
 	 * @deadline. On virtual time it advances the clock to the frame's arrival or @deadline.
 	 */

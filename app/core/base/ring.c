@@ -67,7 +67,7 @@ struct ring_reader {
 	int is_damaged; /* truncated or overwritten: nothing of it is read any more */
 	uint64_t cursor;
 	uint64_t head;      /* all slots before it were complete */
-	uint64_t *batch;    /* slots copied, and found whole, ahead of the cursor */
+	uint64_t *batch;    /* slots copied and checked ahead of the cursor */
 	uint64_t batch_max; /* slots that have room in it */
 	uint64_t batch_first;
 	uint64_t batch_count;

@@ -114,7 +114,8 @@ int status_read(const char *path, uint64_t magic, uint32_t bytes, size_t sequenc
 		return fd;
 	}
 	r = st.st_size == (off_t)bytes ? 0 : -EPROTO;
-	/* A writer that died half way leaves the sequence odd: take what is there after a while. */
+	/* A writer that died during a write leaves the sequence odd: accept the text after a while.
+	 */
 	for (int tries = 0; r == 0 && tries < READ_TRIES; tries++) {
 		r = read_once(fd, bytes, sequence_offset, ret_page);
 	}

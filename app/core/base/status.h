@@ -36,9 +36,9 @@ struct cycle_stats {
 	_Atomic uint64_t cycles;       /* exchanges made */
 	_Atomic uint64_t cycle_number; /* of the newest sample */
 	_Atomic uint64_t frames_sent;
-	_Atomic uint64_t frames_lost;    /* not back before the deadline, come later or not */
+	_Atomic uint64_t frames_lost;    /* not back before the deadline, later or never */
 	_Atomic uint64_t frames_late;    /* came in a later cycle, or passed the slaves outside its
-					    window: not taken */
+					    window: not used */
 	_Atomic uint64_t frames_doubled; /* duplicates, dropped */
 	_Atomic uint64_t frames_foreign; /* not ours, or damaged; dropped */
 	_Atomic uint64_t wkc_low;        /* cycles with a short working counter */
@@ -72,7 +72,7 @@ enum control_state {
 	CONTROL_PARKED,  /* took too long (control.overrun fail_safe) */
 	CONTROL_STOPPED, /* took too long (control.overrun stop) */
 	CONTROL_CRASHED,
-	CONTROL_STUCK, /* did not come back */
+	CONTROL_STUCK, /* cycle() did not return */
 };
 
 /* The control program. Texts: [service], before the cycle starts; numbers: [cycle]. */
@@ -175,7 +175,7 @@ struct dds_status {
 	_Atomic uint64_t session; /* of the master that is published; 0: none */
 	_Atomic uint64_t published_cycles;
 	_Atomic uint64_t missed_cycles;   /* had left the ring */
-	_Atomic uint64_t failed_messages; /* that DDS did not take */
+	_Atomic uint64_t failed_messages; /* rejected by DDS */
 	_Atomic uint64_t subscribers;     /* readers of samples and blocks */
 	_Atomic uint64_t commands_accepted;
 	_Atomic uint64_t commands_refused;

@@ -59,7 +59,7 @@ const char *sync0_state_to_str(uint32_t state)
 	return PICK(names, state);
 }
 
-/* Text that grows and never beyond its end. */
+/* Append to a text, never beyond its end. */
 struct text {
 	char *buf;
 	size_t room;

@@ -60,7 +60,7 @@ struct sync0_result {
 	int64_t mono_ns; /* end of the window, or when the shot was due: CLOCK_MONOTONIC */
 	int64_t tai_ns;  /* the same instant in CLOCK_TAI */
 	uint64_t first_cycle;
-	uint64_t cycles;        /* pulses that had to come */
+	uint64_t cycles;        /* expected pulses */
 	uint64_t edges;         /* taken as one of them */
 	uint64_t missing;       /* no edge within a quarter of the period of its time */
 	uint64_t extra;         /* edges that belong to no cycle */
@@ -127,7 +127,7 @@ struct sync0_line_status {
 	_Atomic uint64_t overflow;
 	_Atomic uint64_t steps;
 	_Atomic uint64_t shots;      /* commanded */
-	_Atomic uint64_t shots_lost; /* and did not come */
+	_Atomic uint64_t shots_lost; /* expected pulses without an edge */
 	_Atomic uint32_t is_lost;    /* now */
 	_Atomic uint32_t verdict;    /* of the newest window */
 	struct histogram deviation;  /* |period - nominal period| */

@@ -10,8 +10,8 @@ enum { BLOCKS = 40, PAIRS = 63, SLOPES = BLOCKS * (BLOCKS - 1) / 2 };
 
 #define BLOCK_NS (NS_PER_S / 4)
 #define PAIR_NS (BLOCK_NS / PAIRS)   /* pairs closer than this are left out */
-#define BLOCK_GAP_NS (10 * NS_PER_S) /* no pair for so long: the window is stale */
-#define SLEW_TIME_NS 2e9             /* an error is worn off over so long */
+#define BLOCK_GAP_NS (10 * NS_PER_S) /* without a pair for this long the window is stale */
+#define SLEW_TIME_NS 2e9             /* time over which an error is slewed to zero */
 #define SLEW_LIMIT 2e-3              /* never faster than this */
 #define RATE_LIMIT 1e-3              /* quartz is far better: a larger slope is noise */
 #define RATE_BLOCKS 8                /* a slope over less is noise */
@@ -198,7 +198,7 @@ static int64_t fit_offset(struct timemap *map, double rate, int64_t dc_ns, int64
 	return offset_ns;
 }
 
-/* Go on from where the map is, at a rate that wears the error off. */
+/* Continue from the present map, at a rate that reduces the error to zero. */
 static void slew_to_fit(struct timemap *map, int64_t dc_ns, int64_t latency_ns)
 {
 	int64_t scatter_ns;
@@ -280,7 +280,7 @@ enum timemap_news timemap_feed(struct timemap *map, int64_t dc_ns, int64_t tai_n
 		news = TIMEMAP_UPDATED;
 	}
 	if (dc_ns < map->block_start_ns || dc_ns - map->block_start_ns > BLOCK_GAP_NS) {
-		/* DC time was set, or nothing came for long: these pairs do not belong together. */
+		/* DC time was set, or pairs were missing for long: these two are unrelated. */
 		map->pair_count = 0;
 		map->block_count = 0;
 		map->block_start_ns = dc_ns;

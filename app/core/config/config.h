@@ -98,7 +98,7 @@ struct config {
 	char control_options[CONFIG_OPTIONS_BYTES]; /* "KEY=VALUE, ..."; "" = none */
 	int64_t control_budget_ns;
 	enum config_overrun control_overrun;
-	int64_t control_stuck_ns; /* so long inside one call: the process ends */
+	int64_t control_stuck_ns; /* timeout of one call: the process ends */
 	/* ring */
 	int64_t ring_depth_ns;
 	uint32_t event_depth;
@@ -109,7 +109,7 @@ struct config {
 	int64_t record_sync_period_ns;
 	int64_t record_rotate_period_ns;
 	uint64_t record_rotate_bytes;
-	uint64_t record_budget_bytes;  /* oldest files go above this; 0 = none */
+	uint64_t record_budget_bytes;  /* the oldest files are deleted above this; 0: none */
 	uint64_t record_reserve_bytes; /* stop with less than this free */
 	int32_t record_compression;    /* zstd level, 0 = none */
 	/* dds */
@@ -129,7 +129,7 @@ struct config {
 	char sync0_edges[CONFIG_PATH_BYTES]; /* edge file of ecdaq-sim instead of lines; "" = lines
 					      */
 	int64_t sync0_window_ns;
-	int64_t sync0_lost_ns; /* so long without an edge: lost */
+	int64_t sync0_lost_ns; /* time without an edge until it is lost */
 	uint32_t sync0_buffer; /* events that the kernel queues */
 	enum config_edge_clock sync0_clock;
 	int32_t sync0_cpu; /* -1 = do not pin */

@@ -134,7 +134,7 @@ static void write_comment(const char *lead, const char *text, FILE *out)
 
 static void write_value(const struct option *option, FILE *out)
 {
-	/* YAML 1.1 readers take a bare on or off for a boolean, which is what is meant. */
+	/* YAML 1.1 parsers read a bare on or off as a boolean, as intended. */
 	if (option->default_value[0] == '\0') {
 		fputs("\"\"", out);
 	} else {

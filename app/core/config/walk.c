@@ -34,7 +34,7 @@ static const char *text_of(const yaml_node_t *node)
 	return (const char *)node->data.scalar.value;
 }
 
-/* A plain scalar that YAML takes for "nothing". */
+/* A plain scalar that YAML reads as null. */
 static int is_null(const yaml_node_t *node)
 {
 	const char *text;

@@ -57,7 +57,7 @@ static int read_documents(struct walk *walk, yaml_parser_t *parser)
 	return r;
 }
 
-/* What a file holds, and what is set over it. */
+/* The contents of a file and the assignments over it. */
 struct source {
 	const char *name;
 	const char *text;

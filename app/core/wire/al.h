@@ -48,7 +48,7 @@ enum al_status_code {
 	AL_CODE_RESTARTED_LOCALLY = 0x0060,
 };
 
-/** "INIT", "PRE-OP", "BOOT", "SAFE-OP", "OP", "none"; the error bit is not looked at. */
+/** "INIT", "PRE-OP", "BOOT", "SAFE-OP", "OP", "none"; the error bit is ignored. */
 const char *al_state_to_str(uint16_t al_status);
 /** ETG.1020's text of an AL status code; "unknown" for one it does not list. */
 const char *al_status_code_to_str(uint16_t code);

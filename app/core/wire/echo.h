@@ -2,7 +2,7 @@
 /*
  * Is a received frame the answer to a frame that was sent? Slaves change data, working counters,
  * the IRQ field, the position of broadcast and auto-increment addresses, the circulating bit, and
- * set bit 0x02 in the first octet of the source address; all else comes back as it went. Context:
+ * set bit 0x02 in the first octet of the source address; all else comes back unchanged. Context:
  * any, RT-safe.
  */
 #ifndef WIRE_ECHO_H

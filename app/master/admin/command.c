@@ -119,7 +119,7 @@ static enum admin_outcome run_set(const struct admin_target *t, const struct adm
 
 /* --- one-shot: fire SYNC0 once, in one slave or in all that can, at one DC time --- */
 
-/* Of a slave with a one-shot mode: the DC time at which its SYNC0 shall fire. */
+/* Of a slave with a one-shot mode: the DC time at which its SYNC0 is to fire. */
 #define ONESHOT_ENTRY "oneshot_time"
 
 static int find_oneshot(const struct admin_target *t, uint16_t slave_pos)

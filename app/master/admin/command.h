@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What a request to the admin socket means: checked from the outside in, then done on a target,
+ * Requests to the admin socket: checked completely, then executed on a target,
  * which is the running session of ecdaqd (or a test's own). Nothing here knows sockets or threads.
  */
 #ifndef ADMIN_COMMAND_H
@@ -16,7 +16,7 @@
 #include "base/sample.h"
 #include "config/config.h"
 
-/* A one-shot time must be so many periods ahead: the value travels in the next frames first. */
+/* A one-shot time must be this many periods ahead: the next frames carry the value first. */
 enum { ADMIN_ONESHOT_MARGIN_CYCLES = 5 };
 /* Latest time of a one-shot from now: a later one is probably a typing error. */
 #define ADMIN_ONESHOT_AHEAD_NS (3600 * NS_PER_S)
@@ -44,13 +44,13 @@ struct admin_target {
 };
 
 enum admin_outcome {
-	ADMIN_DONE,     /* the reply is whole */
-	ADMIN_DEFERRED, /* whole as soon as the cycle has answered the board's set */
+	ADMIN_DONE,     /* the reply is complete */
+	ADMIN_DEFERRED, /* complete as soon as the cycle has answered the board's set */
 };
 
 /**
- * Copy and check @message as it came from a client. 0; -EMSGSIZE wrong length, -EPROTO no request
- * of ours, -EINVAL a field out of range, each with one line in @why (ADMIN_TEXT_BYTES);
+ * Copy and check @message as it came from a client. 0; -EMSGSIZE wrong length, -EPROTO not a
+ * request, -EINVAL a field out of range, each with one line in @why (ADMIN_TEXT_BYTES);
  * @ret_request is untouched then. Context: any.
  */
 int admin_request_parse(const void *message, size_t len, struct admin_request *ret_request,

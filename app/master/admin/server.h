@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The admin socket: SOCK_SEQPACKET, up to ADMIN_CLIENTS of them, driven from the service thread by
- * polling; it never blocks on a client. Who may connect is ruled by the socket's mode and group.
+ * polling; it never blocks on a client. The socket's mode and group decide who may connect.
  */
 #ifndef ADMIN_SERVER_H
 #define ADMIN_SERVER_H
@@ -13,7 +13,7 @@
 #include "base/clock.h"
 
 enum { ADMIN_CLIENTS = 16 };
-/* So long the cycle has to answer a set of outputs. */
+/* Timeout of the cycle's answer to a set of outputs. */
 #define ADMIN_ANSWER_TIMEOUT_NS (1 * NS_PER_S)
 
 struct admin_server;

@@ -32,7 +32,7 @@ struct bus;
 int bus_create(const struct config *cfg, struct line *line, struct bus **ret_bus);
 void bus_destroy(struct bus *bus);
 
-/** Where SDO aborts and CoE emergencies go, from any call below; nowhere at first. */
+/** Set the receiver of SDO aborts and CoE emergencies from any call below; none at first. */
 void bus_listen(struct bus *bus, void (*emit)(void *ctx, const struct event *ev), void *emit_ctx);
 
 /* --- bring-up, in this order --- */
@@ -51,7 +51,7 @@ int bus_dc_setup(struct bus *bus, char *error);
 
 /**
  * One common SYNC0 start for all slaves with cyclic SYNC0, at a multiple of the period after
- * @dc_now_ns with margin; verified by 0x0984 and read back (T10), tried again if it was missed.
+ * @dc_now_ns with margin; verified by 0x0984 and read back (T10), retried if it was missed.
  * One-shot slaves get 0x0980 = PDI. Call when the servo is locked.
  */
 int bus_sync0_start(struct bus *bus, int64_t dc_now_ns, char *error);
@@ -81,8 +81,8 @@ int bus_watch(struct bus *bus, struct status_page *page,
 	      struct bus_watch_report *ret_report);
 
 /**
- * Acknowledge errors and lead slaves that fell back to SAFE-OP or PRE-OP or were power-cycled to OP
- * again (with DC redone for a returned slave, T18), a step per call. After bus_watch(), when its
+ * Acknowledge errors and restore slaves that fell back to SAFE-OP or PRE-OP or were power-cycled to
+ * OP (with DC redone for a returned slave, T18), a step per call. After bus_watch(), when its
  * report has been acted on: a slave on its way through INIT takes the working counter from all.
  */
 void bus_lead_back(struct bus *bus, void (*emit)(void *ctx, const struct event *ev),

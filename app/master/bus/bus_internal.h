@@ -91,7 +91,7 @@ struct bus {
 	struct line *line;
 	char *error;      /* of the public call that runs */
 	uint8_t sequence; /* index byte of our own frames */
-	/* In bus_watch() or bus_lead_back(): what is lost is looked at again soon, so fewer tries.
+	/* In bus_watch() or bus_lead_back(): what is lost is polled again soon, so fewer tries.
 	 */
 	int is_looking;
 	struct bus_slave slave[LIMIT_SLAVES];
@@ -108,7 +108,7 @@ struct bus {
 	mono_t reference_at;
 	int64_t sync0_start_ns; /* common grid; 0: SYNC0 was not started */
 	enum al_state target;   /* state requested last */
-	size_t next_recovery;   /* whose turn it is first */
+	size_t next_recovery;   /* position served first */
 	/* SOEM */
 	ecx_contextt context;
 	ecx_portt port;
@@ -126,7 +126,7 @@ struct bus {
 	ec_PDOdesct pdo_description;
 	ec_eepromSMt sii_sm;
 	ec_eepromFMMUt sii_fmmu;
-	struct sii parsed; /* the SII looked at last */
+	struct sii parsed; /* the SII parsed last */
 	ec_ODlistt od_list;
 	ec_OElistt od_entries;
 };

@@ -2,7 +2,7 @@
 /*
  * Distributed clocks, in place of SOEM's: stop, filters, latch, delays, offsets, drift burst,
  * check. Every register access is checked; 0x0934 goes before 0x0930, which is written again after
- * the offsets, so that the loops start from nothing.
+ * the offsets, so that the loops start from zero.
  */
 #include <errno.h>
 #include <inttypes.h>
@@ -16,7 +16,7 @@ enum {
 	BURST_PER_FRAME = 1, /* a slave compares once a frame, at its end (ET1100 data sheet,
 				0x0910) */
 	DIFF_MAGNITUDE = 0x7fffffff,
-	SETTLE_FRAMES = 500, /* between two looks at 0x092C */
+	SETTLE_FRAMES = 500, /* between two reads of 0x092C */
 	GOOD_LOOKS = 2,
 	SILENT_FRAMES_MAX = 8, /* of the burst in a row, each tried as often as any access */
 };
@@ -166,8 +166,8 @@ static int64_t silence_ms(const struct bus *bus)
 }
 
 /*
- * One FRMW a frame: several in one frame measure the same moment and count as one. A frame that is
- * lost costs nothing but itself; only a wire that stays silent ends the burst.
+ * One FRMW a frame: several in one frame measure the same moment and count as one. A single lost
+ * frame does no harm; only a wire that stays silent ends the burst.
  */
 static int burst(struct bus *bus, uint32_t frames)
 {
@@ -226,7 +226,8 @@ static int find_straggler(struct bus *bus, int64_t *ret_diff_ns)
 	return straggler;
 }
 
-/* Rates have settled when the clocks stay together, not when they meet: two good looks in a row. */
+/* Rates have settled when the clocks stay together, not when they cross: two good reads in a row.
+ */
 static int settle(struct bus *bus)
 {
 	mono_t give_up = mono_add(bus_now(bus), (span_t){ bus->cfg->dc_lock_timeout_ns });

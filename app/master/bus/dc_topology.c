@@ -113,7 +113,8 @@ static int64_t loop_ns(const struct dc_node *n)
 	return last == n->entry_port ? 0 : (int64_t)(n->time_ns[last] - n->time_ns[n->entry_port]);
 }
 
-/* The frame's way through slaves without clocks: edges passed in all, and the timed slaves met. */
+/* The frame's way through slaves without clocks: edges passed in all, and the timed slaves on it.
+ */
 struct tour {
 	unsigned hops;
 	size_t met[LIMIT_SLAVES];

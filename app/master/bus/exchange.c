@@ -28,7 +28,8 @@ struct exchange {
 	unsigned missing;         /* bit per frame of this exchange that is not back */
 	uint8_t history[HISTORY]; /* by sequence: bit per frame that came back */
 	struct dc_track dc;
-	struct exchange_result result; /* being made; keeps what a ride met for the next one */
+	struct exchange_result result; /* result being built; keeps the counts of a ride for the
+					  next one */
 	struct exchange_frame frame[LIMIT_FRAMES];
 	uint8_t inputs[LIMIT_IMAGE_BYTES];
 	uint8_t received[LIMIT_FRAME_BYTES];
@@ -215,8 +216,8 @@ static int sort_frame(struct exchange *ex, unsigned number, uint16_t sequence, m
 	if (age < HISTORY) {
 		*came |= bit;
 	}
-	/* Outside exchange_run() nothing is missing any more: what comes then is late by one at
-	 * least. */
+	/* Outside exchange_run() no frame is pending: one that comes then is late by at least one
+	 * cycle. */
 	if (age == 0 && (ex->missing & bit) != 0) {
 		ex->missing &= ~(unsigned)bit;
 		keep_frame(ex, number);
@@ -235,7 +236,7 @@ static int sort_frame(struct exchange *ex, unsigned number, uint16_t sequence, m
 	return 0;
 }
 
-/* 1 if it was waited for, 0 if it only took time. */
+/* 1 if the frame was expected, 0 if not. */
 static int take_frame(struct exchange *ex, size_t len, mono_t at)
 {
 	for (unsigned i = 0; i < ex->frame_count; i++) {

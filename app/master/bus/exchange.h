@@ -53,7 +53,7 @@ void exchange_destroy(struct exchange *ex);
 /**
  * Send the outputs (first output_bytes of @image), take back the inputs (the rest of @image,
  * touched only with EXCHANGE_OK, or the good chunks of a split image) until @deadline. Answers to
- * service frames met on the way are handed over. Context: cycle thread.
+ * service frames received meanwhile are handed over. Context: cycle thread.
  */
 struct exchange_result exchange_run(struct exchange *ex, uint8_t *image, mono_t deadline);
 

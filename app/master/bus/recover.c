@@ -126,7 +126,8 @@ static void identify(struct bus *bus, size_t pos, const struct bus_emit *emit)
 		enter(bus, pos, RECOVERY_INIT);
 		return;
 	}
-	/* Its EEPROM may still be loading; a stranger gives the address back. */
+	/* Its EEPROM may still be loading; at the deadline a slave that is not identified loses the
+	 * address again. */
 	if (bus_now(bus).ns >= sl->step_deadline.ns) {
 		register_write(bus, pos, ESC_REG_STATION_ADDRESS, none, sizeof(none));
 		enter(bus, pos, RECOVERY_FIND);

@@ -114,7 +114,7 @@ static void name_device(struct bus *bus, size_t pos)
 	}
 }
 
-/* Configured; else what the slave is: by its kind, by its SII; else SYNC0 for whoever has a clock.
+/* As configured; else by the kind of slave or its SII; else SYNC0 for every slave with a clock.
  */
 static uint16_t choose_assign_activate(const struct bus *bus, size_t pos)
 {

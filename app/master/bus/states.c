@@ -27,7 +27,7 @@ static uint16_t code_of(const struct al_reading *al)
 }
 
 /*
- * AL control is a mailbox, too: a slave that has not looked at the last request yet does not take
+ * AL control is a mailbox, too: a slave that has not read the last request yet does not take
  * another (WKC 0). Write to those that have not taken @state; @taken marks the others.
  */
 static int write_control(struct bus *bus, enum al_state state, uint8_t *taken)

@@ -35,7 +35,7 @@ static int read_value(struct bus *bus, size_t pos, uint16_t index, uint8_t subin
 	return 0;
 }
 
-/* One that runs freely takes what is newest: the bus cannot be too fast for it. */
+/* A free-running slave takes the newest data: the bus cannot be too fast for it. */
 static int is_synchronised(const struct bus_slave *sl, uint64_t type)
 {
 	return type != TYPE_FREE_RUN || (sl->assign_activate >> 8 & ACTIVATION_SYNC0) != 0;

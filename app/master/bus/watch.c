@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A look at every slave, a few times a second: states, error counters, clock difference; and
- * a step on the way back for who needs it. */
+/* Poll every slave a few times a second: states, error counters, clock difference; and one step of
+ * recovery for those that need it. */
 #include <string.h>
 
 #include "base/bytes.h"
@@ -88,7 +88,7 @@ static void note_presence(struct bus *bus, size_t pos, int is_here, const struct
 
 	if (is_here) {
 		sl->misses = 0;
-		/* One that has just got its address again is not back before it has been
+		/* A slave that has just got its address again does not count as back until it is
 		 * identified. */
 		if (sl->is_lost && sl->step != RECOVERY_IDENTIFY) {
 			sl->is_lost = 0;

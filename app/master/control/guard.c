@@ -13,7 +13,7 @@ enum { NUMBERS = sizeof(numbers) / sizeof(numbers[0]) };
 
 static struct sigaction old_actions[NUMBERS];
 static unsigned installed; /* [service] */
-/* Whose net hangs under this thread now. */
+/* The guard that is active in this thread. */
 static _Thread_local struct guard *_Atomic armed;
 
 static void fill_set(sigset_t *set)
@@ -96,7 +96,7 @@ void guard_enter(struct guard *guard)
 	stack_t stack = { .ss_sp = guard->stack, .ss_size = sizeof(guard->stack) };
 	sigset_t set;
 
-	/* A fault while its signal is blocked ends the process without a word. */
+	/* A fault while its signal is blocked ends the process silently. */
 	fill_set(&set);
 	guard->is_entered = sigaltstack(&stack, &guard->old_stack) == 0 &&
 			    pthread_sigmask(SIG_UNBLOCK, &set, &guard->old_mask) == 0;

@@ -29,7 +29,7 @@ struct complaint {
 static int complain(const struct complaint *to, int r, const char *format, ...)
 	__attribute__((format(printf, 3, 4)));
 
-/* Printable and one line, whatever a user's text holds. */
+/* Printable and one line, whatever the user's text contains. */
 static int complain(const struct complaint *to, int r, const char *format, ...)
 {
 	char text[2 * CONTROL_TEXT_BYTES];

@@ -35,7 +35,7 @@ struct check_fault {
 
 void check_init(struct check *check, const struct config *cfg, const struct slave_info *slaves,
 		size_t slave_count, const struct channel *channels);
-/** Take the next fresh sample as it is: entering OP, or after one that was wrong. */
+/** Accept the next fresh sample without check: entering OP, or after a wrong one. */
 void check_restart(struct check *check);
 /** The same for the slaves of @slaves, a bit each. */
 void check_restart_some(struct check *check, uint64_t slaves);

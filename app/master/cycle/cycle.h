@@ -30,7 +30,7 @@ int cycle_has_stopped(const struct cycle *cycle, int *ret_result);
 void cycle_stop(struct cycle *cycle);
 
 /*
- * What the bus is in, as the service thread knows it. Outputs are real only in CYCLE_OP, samples
+ * Phase of the bus, as known to the service thread. Outputs are real only in CYCLE_OP, samples
  * are judged only in CYCLE_OP.
  */
 enum cycle_phase {

@@ -5,7 +5,7 @@
 #include "control/program.h"
 #include "cycle/cycle_internal.h"
 
-/* So many more frames carry the fail-safe values of all outputs before the cycle ends. */
+/* Number of frames with fail-safe values of all outputs before the cycle ends. */
 enum { LAST_CYCLES = 4 };
 
 static void end_safely(struct cycle *cy, int result)

@@ -4,8 +4,8 @@
 #include "cycle/cycle_internal.h"
 
 enum {
-	EVENT_WINDOW_CYCLES = 1000, /* in so many cycles ... */
-	EVENT_WINDOW_LIMIT = 20,    /* ... at most so many events of one kind */
+	EVENT_WINDOW_CYCLES = 1000, /* in this many cycles ... */
+	EVENT_WINDOW_LIMIT = 20,    /* ... at most this many events of one kind */
 };
 
 void cycle_emit(struct cycle *cycle, struct event *ev)

@@ -81,7 +81,7 @@ static uint64_t passed_before_sending(const struct cycle *cy, const struct excha
 	uint64_t late = numbering_skipped(cy->period.ns, cy->set_point_ns, late_ns);
 
 	/* Locked, a punctual frame passes at the set point, half a period from being misjudged: one
-	 * that was sent just before an edge, and held up past it, is late. */
+	 * that was sent just before an edge, and delayed past it, is late. */
 	if (cy->servo.state == DC_LOCKED) {
 		return whole_periods(cy, since_edge_ns - late_ns - cy->set_point_ns +
 						 cy->period.ns / 2);

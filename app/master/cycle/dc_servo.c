@@ -11,9 +11,10 @@
 #define FILTER_SHARE (1.0 / 16.0)
 
 enum {
-	LOSS_CYCLES = 200, /* so long out of the window, far off or without a measurement is lost */
-	LEAK_CYCLES = 2,   /* what one cycle in the wrong place takes back */
-	CLAMP_LIMITS = 5,  /* one frame counts for at most so many lock limits */
+	LOSS_CYCLES = 200, /* lock is lost after this long outside the window, far off or without a
+			      measurement */
+	LEAK_CYCLES = 2,   /* subtracted for one cycle in the wrong place */
+	CLAMP_LIMITS = 5,  /* one frame counts for at most this many lock limits */
 };
 
 void dc_servo_init(struct dc_servo *servo, const struct dc_servo_spec *spec)
@@ -60,8 +61,8 @@ static struct dc_servo_result jump(struct dc_servo *servo, int64_t error_ns)
 }
 
 /*
- * Lock is won by the smoothed error, which one wild frame does not move; it is lost, and never won,
- * by raw errors that are large most of the time: noise without a clock behind it smooths to
+ * Lock is gained by the smoothed error, which one wild frame does not move; it is lost, and never
+ * gained, by raw errors that are large most of the time: noise without a clock behind it smooths to
  * nothing, too.
  */
 static void judge(struct dc_servo *servo, int64_t error_ns)

@@ -20,7 +20,7 @@ struct dc_servo_spec {
 	int64_t set_point_ns;    /* of the frame after SYNC0, in (0, period) */
 	int64_t lock_limit_ns;   /* lock: filtered |error| below this, and the raw one not above
 				    unlock_limit, */
-	uint32_t lock_cycles;    /* for so many cycles (leaky) */
+	uint32_t lock_cycles;    /* number of cycles (leaky) */
 	int64_t unlock_limit_ns; /* lock lost: |error| above this for 200 cycles (leaky) */
 	int64_t slew_ns;         /* largest correction a cycle, after the jump */
 	double kp;

@@ -12,8 +12,8 @@
 enum {
 	NUMBERING_SKIP_LIMIT = 1000,   /* skipped cycles that get a sample each; above, the numbers
 					  jump */
-	NUMBERING_REBASE_CYCLES = 100, /* so many frames off the grid in a row: the reference has
-					  changed */
+	NUMBERING_REBASE_CYCLES = 100, /* this many consecutive frames off the grid: the reference
+					  has changed */
 };
 
 struct numbering {

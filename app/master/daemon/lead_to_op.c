@@ -9,7 +9,7 @@
 
 /* Consecutive cycles with a frame before OP is requested (T07). */
 enum { FLOWING_CYCLES = 10 };
-/* So many looks in a row at clocks that agree, before SYNC0 is started (T23). */
+/* Consecutive reads of clocks that agree before SYNC0 is started (T23). */
 enum { AGREEING_LOOKS = 20 };
 #define LOOK_SPAN ((span_t){ 5 * NS_PER_MS })
 

@@ -13,7 +13,7 @@
 
 /* Command-line settings that are not in the configuration. */
 struct options {
-	uint64_t cycles;  /* stop after so many in OP; 0: no limit */
+	uint64_t cycles;  /* stop after this many in OP; 0: no limit */
 	uint64_t seconds; /* the same in seconds */
 	int can_wait;     /* retry while there is no slave or no link */
 	int is_simulated;

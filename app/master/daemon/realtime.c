@@ -155,7 +155,7 @@ static void raise_memory_limit(void)
 
 /*
  * With a limit, MCL_FUTURE would make a later allocation of the service thread fail when it is
- * reached; so only what there is now gets locked. All that the cycle touches is there now.
+ * reached; so only the present memory is locked. All that the cycle uses is allocated by now.
  */
 static void lock_memory(struct realtime *rt)
 {

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What the machine gives the cycle: a thread of its own with a stack that is there already, a
- * SCHED_FIFO priority, a core, locked memory, no deep CPU sleep. Each comes from the configuration;
- * each that cannot be had is reported once, with what to do, and the cycle runs without it.
- * Context: service thread.
+ * Real-time resources of the cycle: a thread of its own with a prefaulted stack, a SCHED_FIFO
+ * priority, a core, locked memory, no deep CPU sleep. Each is set in the configuration; each that
+ * is not available is reported once, with the remedy, and the cycle runs without it. Context:
+ * service thread.
  */
 #ifndef DAEMON_REALTIME_H
 #define DAEMON_REALTIME_H

@@ -105,8 +105,8 @@ static int make_dir(struct run_dir *run, struct failure *failure)
 	if (!S_ISDIR(st.st_mode)) {
 		return fail(failure, run->dir, ENOTDIR);
 	}
-	/* In a directory of somebody else, our files could be swapped under us (/dev/shm is open to
-	 * all). */
+	/* In another user's directory our files could be replaced (/dev/shm is writable for all).
+	 */
 	if (st.st_uid != geteuid() && st.st_uid != 0) {
 		return failure_set(failure, EXIT_CODE_PERMISSION, -EPERM,
 				   "%s: belongs to user %u, not to this one", run->dir, st.st_uid);

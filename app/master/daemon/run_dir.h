@@ -36,7 +36,7 @@ enum run_dir_segment { RUN_DIR_REAL, RUN_DIR_SIMULATED };
  */
 int run_dir_open(struct run_dir *run, const struct config *cfg, const struct platform *platform,
 		 enum run_dir_segment segment, struct failure *failure);
-/** The files stay for readers; the lock goes. */
+/** Release the lock; the files stay for readers. */
 void run_dir_close(struct run_dir *run);
 
 /** The path of @file inside. 0 or -ENAMETOOLONG. */

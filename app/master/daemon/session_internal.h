@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What session.c, bring_up.c, take_down.c and watch.c share; nobody else includes it. */
+/* What session.c, bring_up.c, take_down.c and watch.c share; private to them. */
 #ifndef DAEMON_SESSION_INTERNAL_H
 #define DAEMON_SESSION_INTERNAL_H
 
@@ -66,7 +66,7 @@ int session_step(struct session *s, int r, enum exit_code late, const char *erro
 /** The cycle runs: lock, SYNC0, SAFE-OP, OP. */
 int session_lead_to_op(struct session *s, struct failure *failure);
 
-/** Stop the cycle and give the transport back; its result. */
+/** Stop the cycle and take the transport back; the result of cycle_run(). */
 int session_cycle_end(struct session *s);
 
 /** The cycle has ended without a stop request: release it and report why. */
@@ -75,7 +75,7 @@ int session_report_ended(struct session *s, struct failure *failure);
 void session_listen(struct session *s);
 /** Of @frames sent, @twice came back a second time: warn if that is nearly all of them. */
 void session_judge_doubled(struct session *s, uint64_t frames, uint64_t twice);
-/** Look after the bus; an enum session_result. */
+/** Supervise the bus, one step; an enum session_result. */
 enum session_result session_watch(struct session *s);
 
 #endif

@@ -8,7 +8,7 @@
 #include "base/platform.h"
 #include "control/program.h"
 
-/* Looks in so many parts of the limit. */
+/* Checks per limit. */
 enum { LOOKS = 8 };
 
 static struct timespec timespec_of(mono_t t)

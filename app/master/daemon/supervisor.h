@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A thread that looks whether the control program comes back, while the cycle runs. It shares
+ * A thread that checks whether the control program returns, while the cycle runs. It shares
  * nothing with the service thread, which may be waiting for the cycle itself.
  */
 #ifndef DAEMON_SUPERVISOR_H
@@ -13,7 +13,7 @@
 struct control;
 
 struct supervisor_spec {
-	struct control *control; /* NULL: there is nothing to look after */
+	struct control *control; /* NULL: nothing to supervise */
 	int64_t limit_ns;
 	/* Inside one call for longer than the limit. Context: the supervisor's thread. */
 	void (*stuck)(void *ctx, int64_t busy_ns);

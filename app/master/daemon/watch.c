@@ -9,7 +9,7 @@
 /* No frame back for this long: the cable at the master, or the first slave, is disconnected. */
 #define SILENCE_NS (50 * NS_PER_MS)
 #define WATCH_PERIOD_NS (100 * NS_PER_MS)
-/* Recovery goes one step a look. */
+/* Recovery does one step per poll. */
 #define RECOVERY_PERIOD_NS (20 * NS_PER_MS)
 /* All slaves lost for this long: their clocks may have been reset, restart from bring-up. */
 #define LOST_LIMIT_NS (5 * NS_PER_S)
@@ -149,7 +149,7 @@ static uint64_t silence_limit(const struct session *s)
 	return (uint64_t)(SILENCE_NS / s->spec.cfg->cycle_period_ns);
 }
 
-/* The cycle knows first whether anything comes back. */
+/* The cycle is the first to detect that no frame comes back. */
 static void count_silence(struct session *s)
 {
 	const struct cycle_stats *st = &s->run.page->cycle;
@@ -237,7 +237,7 @@ static void watch_doubled(struct session *s)
 	s->doubled_since = cycles;
 }
 
-/* Has the working counter been low for longer than is waited for? Then look at once. */
+/* 1 once bus.wkc_miss_limit cycles had a low working counter: poll at once. */
 static int is_wkc_alarming(struct session *s)
 {
 	uint64_t low = atomic_load_explicit(&s->run.page->cycle.wkc_low, memory_order_relaxed);

@@ -12,9 +12,9 @@
 #include "wire/echo.h"
 
 /*
- * Who may touch the slot's buffers in which state:
- *   FREE      service: request       WAITING   nobody, until the cycle takes it
- *   TAKING    cycle: reads request   OUT       nobody; the service may give up (-> FREE)
+ * Which thread may touch the slot's buffers in which state:
+ *   FREE      service: request       WAITING   none, until the cycle takes it
+ *   TAKING    cycle: reads request   OUT       none; the service may give up (-> FREE)
  *   ANSWERING cycle: writes answer   ANSWERED  service: reads answer (-> FREE)
  */
 enum ride_state { RIDE_FREE, RIDE_WAITING, RIDE_TAKING, RIDE_OUT, RIDE_ANSWERING, RIDE_ANSWERED };
@@ -189,7 +189,7 @@ static int move_state(struct line *line, int from, int to)
 						       memory_order_acq_rel, memory_order_acquire);
 }
 
-/* Take the frame back. 0 if the answer came in that very moment. The cycle's hold lasts one memcpy.
+/* Withdraw the frame. 0 if the answer came at that moment. The cycle holds the slot for one memcpy.
  */
 static int withdraw(struct line *line)
 {

@@ -65,7 +65,7 @@ span_t line_timeout(const struct line *line, unsigned try);
 /** @attend is called whenever this thread sends or waits: its keepalive. NULL: none. */
 void line_set_keepalive(struct line *line, void (*attend)(void *ctx), void *ctx);
 
-/** Frames that line_transact() met and threw away in direct mode. */
+/** Frames that line_transact() dropped in direct mode. */
 uint64_t line_discarded(const struct line *line);
 /** Transactions of direct mode that were answered. */
 uint64_t line_answered(const struct line *line);

@@ -21,9 +21,9 @@ enum packet_wait {
 enum { PACKET_ERROR_BYTES = 256 };
 
 /**
- * Open @interface. 0; or -errno and one line in @error: -ENODEV no such NIC (it lists those there
- * are), -EPERM (what is missing), another. With 0, @error holds a warning (link down) or is empty.
- * Nothing is allocated afterwards. Context: blocking.
+ * Open @interface. 0; or -errno and one line in @error: -ENODEV no such NIC (@error lists those
+ * present), -EPERM (@error names the missing right), another. With 0, @error holds a warning (link
+ * down) or is empty. Nothing is allocated afterwards. Context: blocking.
  */
 int packet_socket_open(const char *interface, enum packet_wait wait,
 		       struct transport *ret_transport, char *error, size_t error_bytes);

@@ -43,7 +43,7 @@ int ecx_setupnic(ecx_portt *port, const char *ifname, int secondary);
 int ecx_closenic(ecx_portt *port);
 uint8 ecx_getindex(ecx_portt *port);
 void ecx_setbufstat(ecx_portt *port, uint8 idx, int bufstat);
-/** Mark the frame to go out; it does when its answer is waited for. */
+/** Mark the frame for sending; it is sent when its answer is waited for. */
 int ecx_outframe(ecx_portt *port, uint8 idx, int sock);
 int ecx_outframe_red(ecx_portt *port, uint8 idx);
 /** Send once and wait @timeout us: WKC of the last datagram, or EC_NOFRAME. */
