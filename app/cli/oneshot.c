@@ -196,7 +196,7 @@ static enum exit_code wait_for_all(struct oneshot *one)
 	return EXIT_CODE_OK;
 }
 
-static void say_text(const struct oneshot *one, const struct shot *shot)
+static void print_text(const struct oneshot *one, const struct shot *shot)
 {
 	char value[TEXT_BYTES];
 
@@ -212,7 +212,7 @@ static void say_text(const struct oneshot *one, const struct shot *shot)
 	}
 }
 
-static void say_json(const struct oneshot *one)
+static void print_json(const struct oneshot *one)
 {
 	struct json js;
 
@@ -262,11 +262,11 @@ static enum exit_code run(struct oneshot *one, const char *word)
 		return result;
 	}
 	if (one->is_json) {
-		say_json(one);
+		print_json(one);
 	}
 	for (unsigned i = 0; i < one->count; i++) {
 		if (!one->is_json) {
-			say_text(one, &one->shot[i]);
+			print_text(one, &one->shot[i]);
 		}
 		if (one->is_wait && !one->shot[i].is_done) {
 			result = cli_fail(one->cli, EXIT_CODE_FAILED, "%s: no conversion received",

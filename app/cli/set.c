@@ -75,7 +75,7 @@ static enum exit_code take_word(struct setting *setting, const char *word, struc
 	return EXIT_CODE_OK;
 }
 
-static void say_text(const struct setting *setting, uint64_t cycle)
+static void print_text(const struct setting *setting, uint64_t cycle)
 {
 	for (uint32_t i = 0; i < setting->request.count; i++) {
 		const struct admin_item *item = &setting->request.item[i];
@@ -89,7 +89,7 @@ static void say_text(const struct setting *setting, uint64_t cycle)
 	}
 }
 
-static void say_json(const struct setting *setting, uint64_t cycle)
+static void print_json(const struct setting *setting, uint64_t cycle)
 {
 	struct json js;
 
@@ -126,9 +126,9 @@ static enum exit_code run(struct setting *setting, const struct args *args)
 		return result;
 	}
 	if (setting->is_json) {
-		say_json(setting, reply.cycle);
+		print_json(setting, reply.cycle);
 	} else {
-		say_text(setting, reply.cycle);
+		print_text(setting, reply.cycle);
 	}
 	return EXIT_CODE_OK;
 }

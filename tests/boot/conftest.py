@@ -49,7 +49,7 @@ def machine(
         files["authorized_keys"] = key.with_suffix(".pub").read_text()
     failed_before = request.session.testsfailed
     try:
-        vm.lay_boot_files(files)
+        vm.write_boot_files(files)
         if getattr(module, "WIRE", False):
             vm.start(options=vm.wire_options(), ahead=AHEAD)
         else:

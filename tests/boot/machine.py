@@ -53,7 +53,7 @@ def wait_for(what: str, seconds: float, probe: Callable[[], Any]) -> Any:
 
 
 def free_port() -> int:
-    """A TCP port of the loopback address that nobody has."""
+    """A free TCP port of the loopback address."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
@@ -72,7 +72,7 @@ class Space:
             text=True,
         )
         assert self.holder.stdout is not None
-        assert self.holder.stdout.readline() == "ready\n", "no network namespace to be had"
+        assert self.holder.stdout.readline() == "ready\n", "no network namespace available"
         self.enter = ["nsenter", "--target", str(self.holder.pid), "--net"]
         self.run("ip", "link", "set", "lo", "up")
         for tap in ("lan", "ecat"):
@@ -120,7 +120,7 @@ class Machine:
             [TOOLS / "qemu.sh", self.folder, *command], check=True, capture_output=True, text=True
         )
 
-    def lay_boot_files(self, files: Mapping[str, str]) -> None:
+    def write_boot_files(self, files: Mapping[str, str]) -> None:
         """Put files into ecdaq/ of the boot partition, which starts at 4 MiB."""
         for name, text in files.items():
             (self.folder / "file").write_text(text)
@@ -201,7 +201,7 @@ class Machine:
         return str(wait_for(f"console shows /{pattern}/", seconds, seen))
 
     def wait_for_login(self) -> None:
-        """Until the machine is up, as its console says."""
+        """Until the console shows that the machine is up."""
         self.wait_for_console(r"\S+ login:")
 
     def ssh_command(self, *options: str) -> list[str]:
@@ -235,7 +235,7 @@ class Machine:
         return json.loads(self.run(command))
 
     def answer(self, command: str) -> dict[str, Any]:
-        """What a command in the guest printed, as JSON; {} where it had nothing to say yet."""
+        """What a command in the guest printed, as JSON; {} while it prints nothing."""
         result = self.try_run(command)
         found: dict[str, Any] = json.loads(result.stdout) if result.returncode == 0 else {}
         return found
@@ -245,7 +245,7 @@ class Machine:
         return self.answer("ecdaq status --json")
 
     def sync0(self) -> dict[str, Any]:
-        """What ecdaq-sync0 has to say."""
+        """The report of ecdaq-sync0."""
         return self.answer("ecdaq sync0 --json")
 
     def wait_until(self, what: str, command: str, seconds: float = COMMAND_S) -> None:

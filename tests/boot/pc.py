@@ -13,23 +13,23 @@ import sys
 import ecdaq
 
 LED = "piccolo0.led"
-PATIENCE_S = 120.0
+TIMEOUT_S = 120.0
 
 
 def led_follows(link: ecdaq.Link, value: int) -> dict[str, int]:
     """Command the LED; the first sample from that cycle on, and what the LED was in it."""
     place = link.channels()[LED].place
-    cycle = link.command({LED: value}, seconds=PATIENCE_S)
-    for sample in link.subscribe(PATIENCE_S, slave=0):
+    cycle = link.command({LED: value}, seconds=TIMEOUT_S)
+    for sample in link.subscribe(TIMEOUT_S, slave=0):
         if sample.cycle >= cycle:
-            return {"wanted": value, "cycle": cycle, "seen": int(sample.raw[place])}
-    return {"wanted": value, "cycle": cycle, "seen": -1}
+            return {"expected": value, "cycle": cycle, "seen": int(sample.raw[place])}
+    return {"expected": value, "cycle": cycle, "seen": -1}
 
 
 def main() -> None:
     interface, domain, seconds = sys.argv[1], int(sys.argv[2]), float(sys.argv[3])
     with ecdaq.connect(interface, domain=domain) as link:
-        names = [c.name for c in link.channels(PATIENCE_S)]
+        names = [c.name for c in link.channels(TIMEOUT_S)]
         taken = sum(1 for _ in link.subscribe(seconds))
         result = {
             "channels": names,

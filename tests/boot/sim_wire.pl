@@ -3,15 +3,15 @@
 #
 # sim_wire.pl carry PIPE LOG SLAVE=PULL[+PULL]...   each edge of ecdaq-sim --edges PIPE pulls the
 #                                                   lines of its slave up and down again
-# sim_wire.pl tell SOCKET LINE                      say LINE to ecdaq-sim --control SOCKET
+# sim_wire.pl send SOCKET LINE                      send LINE to ecdaq-sim --control SOCKET
 use strict;
 use warnings;
 use Socket;
 
 sub pull {
-	my ($file, $way) = @_;
+	my ($file, $direction) = @_;
 	sysseek($file, 0, 0);
-	defined syswrite($file, $way) or warn "pull: $!\n";
+	defined syswrite($file, $direction) or warn "pull: $!\n";
 }
 
 sub carry {
@@ -38,7 +38,7 @@ sub carry {
 	}
 }
 
-sub tell_segment {
+sub send_line {
 	my ($path, $line) = @_;
 	my $mine = "$path.$$";
 	umask 0;
@@ -51,4 +51,4 @@ sub tell_segment {
 }
 
 my $what = shift // '';
-$what eq 'carry' ? carry(@ARGV) : $what eq 'tell' ? tell_segment(@ARGV) : die "carry or tell\n";
+$what eq 'carry' ? carry(@ARGV) : $what eq 'send' ? send_line(@ARGV) : die "carry or send\n";

@@ -13,7 +13,7 @@ from machine import TOP, Machine
 
 BOOT_FILES = {"hostname": "bench-7\r\n"}
 HERE = Path(__file__).parent
-# What systemd-analyze says today; a unit may get better, never worse (0 is best, 10 worst).
+# What systemd-analyze prints today; a unit may get better, never worse (0 is best, 10 worst).
 EXPOSURE_LIMITS = {
     "ecdaqd.service": 2.0,
     "ecdaq-record.service": 1.5,
@@ -82,7 +82,7 @@ def test_only_ssh_listens(machine: Machine) -> None:
     assert {line.split()[3].rpartition(":")[2] for line in udp.splitlines()} <= {"68", "546"}
 
 
-def test_nobody_has_a_password(machine: Machine) -> None:
+def test_no_user_has_a_password(machine: Machine) -> None:
     shadow = machine.run("sudo cat /etc/shadow").splitlines()
     assert shadow
     assert [line for line in shadow if line.split(":")[1][:1] not in ("!", "*")] == []
@@ -109,7 +109,7 @@ def test_the_watchdog_is_fed_by_systemd(machine: Machine) -> None:
 
 @pytest.mark.parametrize("unit", sorted(EXPOSURE_LIMITS))
 def test_the_exposure_of_a_service_is_bounded(machine: Machine, unit: str) -> None:
-    said = machine.run(f"systemd-analyze security --no-pager {unit} | tail -n 1")
-    figure = float(re.findall(r": ([\d.]+) ", said)[0])
+    message = machine.run(f"systemd-analyze security --no-pager {unit} | tail -n 1")
+    figure = float(re.findall(r": ([\d.]+) ", message)[0])
     print(f"{unit}: {figure}")
     assert figure <= EXPOSURE_LIMITS[unit]

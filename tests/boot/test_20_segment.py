@@ -2,7 +2,7 @@
 """The bus comes to OP by itself, on its own core, and every cycle is recorded.
 
 In guest time (app/tools/image/virt.sh): the guest's clock counts instructions, so that a cycle of
-1 ms holds whatever the host does. All times printed here are guest time and say nothing of a board.
+1 ms holds whatever the host does. All times printed here are guest time, not those of a board.
 
 ECDAQ_BOOT_CYCLES: how many cycles are looked at (60,000).
 """
@@ -21,7 +21,7 @@ OP_S = 900
 SETTLE_S = 3
 
 
-def test_two_slaves_come_to_op_without_a_hand_on_it(machine: Machine) -> None:
+def test_two_slaves_reach_op_without_operator_action(machine: Machine) -> None:
     wait_for("OP", OP_S, lambda: machine.status().get("state") == "OP")
     found = machine.status()
     assert found["slaves"] == 2
@@ -46,8 +46,8 @@ def test_the_boot_is_split_by_phase(machine: Machine) -> None:
     assert at["slaves in OP"] < 30
 
 
-def test_cycles_go_on_without_loss(machine: Machine) -> None:
-    """CYCLES of them, nobody logged in but who waits for the end."""
+def test_cycles_continue_without_loss(machine: Machine) -> None:
+    """CYCLES of them, with no login but the one that waits for the end."""
     before = machine.status()
     until = before["cycle_number"] + CYCLES
     machine.run(
@@ -88,7 +88,7 @@ def test_the_doctor_finds_nothing_that_fails(machine: Machine) -> None:
     assert result.returncode == 0
 
 
-def test_nobody_had_to_be_started_twice(machine: Machine) -> None:
+def test_no_service_was_restarted(machine: Machine) -> None:
     for unit in ("ecdaqd", "ecdaq-record", "ecdaq-segment"):
         restarts = machine.run(f"systemctl show --property=NRestarts --value {unit}")
         assert restarts.strip() == "0", unit
@@ -157,7 +157,7 @@ def test_systemd_watches_the_master_with_ten_seconds(machine: Machine) -> None:
     assert machine.run("systemctl show --property=WatchdogUSec --value ecdaqd").strip() == "10s"
 
 
-def test_a_killed_master_comes_back_by_itself(machine: Machine) -> None:
+def test_a_killed_master_is_restarted(machine: Machine) -> None:
     was = machine.run("pgrep -x ecdaqd").strip()
     machine.run("sudo kill -KILL " + was)
     wait_for(

@@ -27,7 +27,7 @@ def test_the_journal_has_the_same_messages(machine: Machine) -> None:
     assert "is not used" in journal
 
 
-def test_the_built_in_settings_hold(machine: Machine) -> None:
+def test_the_built_in_settings_are_used(machine: Machine) -> None:
     assert "colour" not in machine.run("cat /run/ecdaq-boot/ecdaq.yaml")
     assert machine.run("systemctl is-active ecdaq-boot-config").strip() == "active"
     assert "$(" not in machine.run("cat /run/ecdaq-boot/chrony.d/boot.sources")

@@ -17,7 +17,7 @@ def test_no_login_is_accepted(machine: Machine) -> None:
     assert result.returncode == 255
 
 
-def test_the_bus_runs_all_the_same(machine: Machine) -> None:
+def test_the_bus_runs_with_the_built_in_settings(machine: Machine) -> None:
     machine.wait_for_console(r"ecat0: entered promiscuous mode")
     machine.wait_for_console(r"Started .*ecdaqd.service")
     assert "ecdaq-preinit: memory instead" not in machine.console()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A machine whose system manager stands still is reset by its hardware watchdog and comes back.
+"""A machine whose system manager hangs is reset by its hardware watchdog and boots again.
 
-QEMU's i6300ESB; a reset ends QEMU, and the test plays the power supply. On the host's clock: the
-guest's own runs ahead where the machine waits for its disk, and then the watchdog bites too early.
+QEMU's i6300ESB; a reset ends QEMU, and the test starts it again. On the host's clock: the
+guest's own runs ahead while the machine waits for its disk, and the watchdog expires too early.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from machine import Machine, profile, wait_for
 TIMING = "host"
 # The image's 15 s (test_10_system.py) are less than a busy emulator may take to start systemd.
 TIMEOUT_S = 120
-# The image's manager restarts the machine itself when it crashes; here it stands still.
+# The image's manager restarts the machine itself when it crashes; here it freezes.
 START = {
     "options": ("-device", "i6300esb"),
     "append": f"systemd.watchdog_sec={TIMEOUT_S} systemd.crash_action=freeze",
@@ -28,12 +28,12 @@ def test_systemd_feeds_it(machine: Machine) -> None:
     assert machine.run(f"cat {WATCHDOG}/timeout").strip() == str(TIMEOUT_S)
 
 
-def test_a_machine_whose_manager_stands_still_is_reset(machine: Machine) -> None:
+def test_a_machine_whose_manager_hangs_is_reset(machine: Machine) -> None:
     wait_for("OP", OP_S, lambda: machine.status().get("state") == "OP")
     assert machine.process is not None
     process = machine.process
     machine.run("sudo kill -SEGV 1")
-    # The kernel's words: the manager has let go of the watchdog, which counts on.
+    # The kernel's message: the manager has closed the watchdog, which keeps counting.
     wait_for("its end", OP_S, lambda: "watchdog did not stop" in machine.console())
     assert process.poll() is None
     wait_for("the watchdog's reset", RESET_S, lambda: process.poll() is not None)
@@ -42,7 +42,7 @@ def test_a_machine_whose_manager_stands_still_is_reset(machine: Machine) -> None
     assert "Kernel panic" not in machine.console(), "the kernel itself rebooted, not the watchdog"
 
 
-def test_it_comes_back_and_goes_on(machine: Machine) -> None:
+def test_it_boots_again_and_continues(machine: Machine) -> None:
     machine.process = None
     machine.start(**START)
     machine.wait_for_login()

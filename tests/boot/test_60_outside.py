@@ -89,8 +89,8 @@ def test_interrupts_of_the_port_are_on_the_core_of_the_cycle_above_it(machine: M
     for irq in irqs:
         assert machine.run(f"cat /proc/irq/{irq}/smp_affinity_list").strip() == "1"
         thread = machine.run(f"pgrep -x 'irq/{irq}-.*'").strip()
-        said = machine.run(f"chrt --pid {thread}")
-        assert "SCHED_FIFO" in said and "priority: 85" in said, said
+        message = machine.run(f"chrt --pid {thread}")
+        assert "SCHED_FIFO" in message and "priority: 85" in message, message
 
 
 def test_every_frame_is_accounted_for_and_the_recording_has_no_gap(machine: Machine) -> None:
@@ -111,7 +111,7 @@ def test_every_frame_is_accounted_for_and_the_recording_has_no_gap(machine: Mach
     assert abs(came - after["frames_sent"]) <= 1, after
 
 
-def test_the_publisher_says_in_the_run_directory_that_it_is_there(machine: Machine) -> None:
+def test_the_publisher_has_a_status_page_in_the_run_directory(machine: Machine) -> None:
     """It is another user than the master's, in a directory of their group."""
     wait_for("the publisher", 300, lambda: (machine.status()["dds"] or {}).get("running"))
     found = machine.status()["dds"]
@@ -128,7 +128,7 @@ def gaps_of(path: Path) -> tuple[int, int]:
     return sum(map(len, cycles.values())), gaps
 
 
-def test_subscribers_on_the_host_miss_nothing_and_the_led_obeys(machine: Machine) -> None:
+def test_subscribers_on_the_host_miss_nothing_and_set_the_led(machine: Machine) -> None:
     assert machine.space is not None
     kit = str(BIN.parent / "share" / "ecdaq" / "python")
     program = [sys.executable, Path(__file__).parent / "pc.py", "lan", DOMAIN, str(SECONDS)]

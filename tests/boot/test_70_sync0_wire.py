@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""SYNC0 on a true wire: the segment's pulses on the host raise inputs of the machine's PL061; its
-kernel takes the interrupt and the time, libgpiod the edge, ecdaq-sync0 says what is missing.
+"""SYNC0 on a real wire: the segment's pulses on the host raise inputs of the machine's PL061; its
+kernel takes the interrupt and the time, libgpiod the edge, ecdaq-sync0 reports what is missing.
 
-On the host's clock: counts and identity are judged, not times. The emulator may be late by more
-than the quarter of a cycle that ecdaq-sync0 allows. An experiment that does not come out exact is
-made again if both sides' books show such an edge just there; else it has failed.
+On the host's clock: counts and identity are checked, not times. The emulator may be late by more
+than the quarter of a cycle that ecdaq-sync0 allows. An experiment with an inexact result is
+repeated if the logs of both sides show such an edge at that place; else it has failed.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ WINDOWS_S = 600
 PERIOD_NS = 10 * NS_PER_MS
 LATE_NS = 1.0 * NS_PER_MS  # ecdaq-sync0 allows 2.5, less its own error
 TRIES = 8
-SHORT, LONG = 3, 20  # pulses that are kept in the chip: LONG lasts beyond sync0.lost
-NEAR = 2  # cycles before and after them that have to be undisturbed
+SHORT, LONG = 3, 20  # pulses that are suppressed: LONG lasts beyond sync0.lost
+NEAR = 2  # cycles before and after them that must be on time
 MERGED_SHARE = 0.02
 WINDOW_CYCLES = 500
-TOLD_LIMIT = 16  # runs of missing edges that ecdaq-sync0 tells in one window
+REPORTED_LIMIT = 16  # runs of missing edges that ecdaq-sync0 reports in one window
 RUN = "/usr/bin/ecdaq-sync0 --config /run/ecdaq-boot/ecdaq.yaml"
 DUMP = "/run/ecdaq/sync0.dump"
 DROP_IN = f"""[Service]
@@ -71,9 +71,9 @@ def another_window(machine: Machine) -> None:
 
 def test_the_kernel_has_the_lines_and_the_power_button_keeps_its_own(machine: Machine) -> None:
     wait_for("OP", OP_S, lambda: machine.status().get("state") == "OP")
-    said = machine.run("sudo gpioinfo --chip gpiochip0")
-    print("\n" + said)
-    lines = [line for line in said.splitlines() if line.startswith("\tline")]
+    message = machine.run("sudo gpioinfo --chip gpiochip0")
+    print("\n" + message)
+    lines = [line for line in message.splitlines() if line.startswith("\tline")]
     assert [("edges=rising consumer=ecdaq-sync0" in line) for line in lines[:2]] == [True, True]
     assert "consumer" not in lines[2]
     assert "GPIO Key Poweroff" in lines[3]
@@ -93,13 +93,13 @@ def test_edges_come_by_interrupts_of_the_pl061(machine: Machine) -> None:
         assert int(words[2]) == 0, "an interrupt on the core of the cycle"
 
 
-def test_what_a_gpio_cannot_say_uncalibrated_is_unresolved(machine: Machine) -> None:
+def test_what_an_uncalibrated_gpio_cannot_measure_is_unresolved(machine: Machine) -> None:
     assert machine.sync0()["noise_p99_ns"] is None
 
     def unresolved() -> bool:
         windows = [line["window"] for line in machine.sync0()["lines"]]
         checks = [window["checks"] for window in windows]
-        # Where the emulator stood still there is nothing to judge, or a step: never a figure.
+        # Where the emulator paused there is no result, or a step: never a figure.
         assert all(c["skew"] in ("-", "UNRESOLVED") for c in checks), checks
         assert all(
             c["phase"] in ("-", "UNRESOLVED") or window["step_ns"] != 0
@@ -115,7 +115,7 @@ def test_what_a_gpio_cannot_say_uncalibrated_is_unresolved(machine: Machine) -> 
 
 
 class Trial:
-    """Two faults at slave 1, and what both sides wrote of it."""
+    """Two faults at slave 1, and the logs of both sides."""
 
     NAMES = ("sync0_missing", "sync0_lost", "sync0_back")
 
@@ -123,36 +123,36 @@ class Trial:
         machine.run("sudo systemctl restart ecdaq-sync0")
         wait_for_windows(machine, 1)
         for count in (SHORT, LONG):
-            # Nobody logs in or asks while it happens: that alone can hold up the emulator.
+            # No login or query meanwhile: that alone can delay the emulator.
             wire.fault(f"at=2s sync0-lost slave=1 count={count}")
             machine.run("sleep 5")
             another_window(machine)
-        self.told = events(machine, *self.NAMES)
+        self.events = events(machine, *self.NAMES)
         machine.run("sudo systemctl stop ecdaq-sync0")
         self.books = Books(wire.log.read_text(), machine.run(f"cat {DUMP}"), PERIOD_NS)
         machine.run("sudo systemctl start ecdaq-sync0")
         self.silent = self.books.silent(slave=1, other=0)
-        newest = max(e["value"] for e in self.told) if self.told else 0
+        newest = max(e["value"] for e in self.events) if self.events else 0
         self.silent = [c for c in self.silent if c <= newest]
         self.late = {s: self.books.displaced(s, LATE_NS) for s in (0, 1)}
 
     def wrong(self) -> str:
-        """What is told otherwise than it was; empty: all is exact."""
+        """What is reported wrongly; empty: all is exact."""
         if len(self.silent) != SHORT + LONG:
-            return f"{len(self.silent)} pulses were kept back, or not all is told"
+            return f"{len(self.silent)} pulses were suppressed, or not all are reported"
         short, long = self.silent[:SHORT], self.silent[SHORT:]
         assert long == list(range(long[0], long[0] + LONG))
-        told = [(e["event"], e["slave"], e["value"], e["arg"][0]) for e in self.told]
-        if ("sync0_missing", 1, short[0], SHORT) not in told:
+        reported = [(e["event"], e["slave"], e["value"], e["arg"][0]) for e in self.events]
+        if ("sync0_missing", 1, short[0], SHORT) not in reported:
             return f"cycle {short[0]}: {SHORT} in a row"
-        if [e[1] for e in told if e[0] == "sync0_lost" and e[2] == long[0]] != [1]:
+        if [e[1] for e in reported if e[0] == "sync0_lost" and e[2] == long[0]] != [1]:
             return f"cycle {long[0]}: lost"
-        if ("sync0_back", 1, long[-1] + 1, LONG) not in told:
+        if ("sync0_back", 1, long[-1] + 1, LONG) not in reported:
             return f"cycle {long[-1] + 1}: back after {LONG}"
         return ""
 
     def excuse(self) -> str:
-        """Why it could not be told: the emulator was late just there, by the books of both sides.
+        """Why it could not be reported: the emulator was late there, by the logs of both sides.
         Empty: there is none."""
         pulses = sum(map(len, self.books.lateness_ns.values()))
         merged = sum(self.books.merged.values())
@@ -162,15 +162,15 @@ class Trial:
         if near & (self.late[0] | self.late[1]):
             return f"late: cycles {sorted(near & (self.late[0] | self.late[1]))}"
         runs = [c for c in self.missing(1) if abs(c - self.silent[0]) <= WINDOW_CYCLES]
-        if len(runs) >= TOLD_LIMIT:
+        if len(runs) >= REPORTED_LIMIT:
             return f"{len(runs)} late edges in the same window"
         return ""
 
     def missing(self, slave: int) -> set[int]:
-        """Cycles that are told to be without an edge of the slave, by whichever event."""
+        """Cycles reported to be without an edge of the slave, by any event."""
         return {
             cycle
-            for e in self.told
+            for e in self.events
             if e["slave"] == slave
             for cycle in {
                 "sync0_missing": range(e["value"], e["value"] + e["arg"][0]),
@@ -187,10 +187,10 @@ class Trial:
                 f" edges off by p50 {late[len(late) // 2] / NS_PER_MS:.3f} ms,"
                 f" p99 {late[len(late) * 99 // 100] / NS_PER_MS:.3f} ms,"
                 f" max {late[-1] / NS_PER_MS:.3f} ms;"
-                f" {len(self.missing(slave))} told missing"
+                f" {len(self.missing(slave))} reported missing"
             )
-        print(f"kept in the chip of slave 1: {self.silent}")
-        print("\n".join(e["text"] for e in self.told if e["event"] != "sync0_missing"))
+        print(f"suppressed at slave 1: {self.silent}")
+        print("\n".join(e["text"] for e in self.events if e["event"] != "sync0_missing"))
 
 
 def exact_trial(machine: Machine, wire: Wire) -> Trial:
@@ -211,11 +211,9 @@ def exact_trial(machine: Machine, wire: Wire) -> Trial:
     pytest.fail(f"in {TRIES} trials the emulator was never on time")
 
 
-def test_pulses_that_stay_in_the_chip_are_told_with_slave_and_cycle(
-    machine: Machine, wire: Wire
-) -> None:
+def test_suppressed_pulses_are_reported_with_slave_and_cycle(machine: Machine, wire: Wire) -> None:
     trial = exact_trial(machine, wire)
-    # Every edge is a pulse's; the kernel dropped none; and what else is told, the emulator did.
+    # Every edge is a pulse's; the kernel dropped none; all other reports are late edges.
     assert [len(trial.books.invented(slave)) for slave in (0, 1)] == [0, 0]
     assert [trial.books.dropped(slave) for slave in (0, 1)] == [0, 0]
     for slave in (0, 1):
@@ -224,7 +222,7 @@ def test_pulses_that_stay_in_the_chip_are_told_with_slave_and_cycle(
         assert trial.missing(slave) - kept - near_late == set()
 
 
-def test_the_check_may_be_restarted_or_killed_and_the_cycle_goes_on(machine: Machine) -> None:
+def test_the_cycle_continues_when_the_check_is_restarted_or_killed(machine: Machine) -> None:
     def grown(before: dict[str, Any], after: dict[str, Any]) -> dict[str, int]:
         names = ("cycles", "frames_sent", "frames_lost", "overruns", "cycles_skipped")
         return {name: after[name] - before[name] for name in names}
@@ -248,15 +246,15 @@ def test_the_check_may_be_restarted_or_killed_and_the_cycle_goes_on(machine: Mac
     assert machine.run("systemctl is-active ecdaq-sync0").strip() == "active"
 
 
-def test_a_line_that_is_taken_is_one_clear_line(machine: Machine) -> None:
+def test_a_line_in_use_is_reported_in_one_line(machine: Machine) -> None:
     before = machine.status()
     for line, holder in ((3, "GPIO Key Poweroff"), (0, "ecdaq-sync0")):
         result = machine.try_run(
             "mkdir -p /tmp/other; sudo timeout 8 ecdaq-sync0 --run-dir /tmp/other"
             f" --set sync0.enable=on --set slaves[0].sync0_line={CHIP}:{line} 2>&1"
         )
-        said = [x for x in result.stdout.splitlines() if "not calibrated" not in x]
+        message = [x for x in result.stdout.splitlines() if "not calibrated" not in x]
         wanted = f"ecdaq-sync0: line '{CHIP}:{line}' of slave 0: already used by {holder}"
-        assert said == [wanted], said
+        assert message == [wanted], message
     after = machine.status()
     assert (after["pid"], after["state"]) == (before["pid"], "OP")

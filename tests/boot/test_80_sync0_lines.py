@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""SYNC0 on lines of gpio-sim, in guest time: what can go wrong with a chip or a line, and a wire as
-exact as the emulator's clock, so that what is missing is told to the cycle and nothing else.
+"""SYNC0 on lines of gpio-sim, in guest time: errors of a chip or a line, and a wire as exact as
+the emulator's clock: missing pulses are reported with their exact cycle, and nothing else.
 
 The simulated segment, in the machine, writes its edges into a pipe; sim_wire.pl pulls the lines.
 """
@@ -74,13 +74,13 @@ def root(machine: Machine, script: str) -> str:
     return machine.run(f"echo {text} | base64 -d | sudo sh")
 
 
-def told(machine: Machine) -> list[dict[str, Any]]:
+def sync0_events(machine: Machine) -> list[dict[str, Any]]:
     lines = machine.run("ecdaq events --json").splitlines()
     return [e for e in map(json.loads, lines) if e["event"].startswith("sync0_")]
 
 
-def said(machine: Machine, words: str) -> list[str]:
-    """What ecdaq-sync0 wrote to the journal with these words in it."""
+def journal_lines(machine: Machine, words: str) -> list[str]:
+    """What ecdaq-sync0 wrote to the journal with @words in it."""
     journal = machine.run("sudo journalctl --boot --unit=ecdaq-sync0 --output=cat --no-pager")
     return [line for line in journal.splitlines() if words in line]
 
@@ -131,7 +131,7 @@ def carry(machine: Machine, *pairs: str) -> None:
 
 
 def by_hand(machine: Machine, line: str, who: str = "sudo") -> list[str]:
-    """What a second ecdaq-sync0, started by a person, says of a line for slave 0."""
+    """What a second ecdaq-sync0, started by hand, reports of a line for slave 0."""
     result = machine.try_run(
         f"rm -rf /tmp/other; mkdir /tmp/other; {who} timeout 2 ecdaq-sync0 --run-dir /tmp/other"
         f" --set sync0.enable=on --set slaves[0].sync0_line={line} 2>&1"
@@ -156,7 +156,7 @@ def test_a_missing_chip_is_one_line_for_each_slave_and_the_master_runs(machine: 
     wait_for_op(machine)
     wait_for("its state", WINDOWS_S, lambda: machine.sync0().get("state") == "no line")
     machine.run("sleep 6")  # three more tries
-    journal = said(machine, "of slave")
+    journal = journal_lines(machine, "of slave")
     print("\n" + "\n".join(journal))
     assert journal == [
         f"ecdaq-sync0: line '{CHIP}:0' of slave 0: no chip of this label; there are: 9030000.pl061",
@@ -166,14 +166,14 @@ def test_a_missing_chip_is_one_line_for_each_slave_and_the_master_runs(machine: 
     assert machine.status()["state"] == "OP"
 
 
-def test_a_chip_that_comes_later_is_taken_by_itself(machine: Machine) -> None:
+def test_a_chip_that_appears_later_is_opened_automatically(machine: Machine) -> None:
     root(machine, PLUG)
     wait_for_lines(machine, 0, 1)
     assert machine.sync0()["message"] == ""
     print("\n" + machine.run("sudo gpioinfo"))
 
 
-def test_edges_of_the_segment_are_told_by_cycle_and_uncalibrated_is_unresolved(
+def test_edges_of_the_segment_are_assigned_to_cycles_and_uncalibrated_is_unresolved(
     machine: Machine,
 ) -> None:
     put(machine, f"{PLACE}/wire.pl", PERL)
@@ -189,7 +189,7 @@ def test_edges_of_the_segment_are_told_by_cycle_and_uncalibrated_is_unresolved(
     baseline(machine).write_text(json.dumps(wait_for_op(machine)))
     found = wait_for_windows(machine, 2)
     print("\n" + machine.run("ecdaq sync0; ecdaq sync0 --histogram"))
-    print("\n".join(e["text"] for e in told(machine)))
+    print("\n".join(e["text"] for e in sync0_events(machine)))
     for line in found["lines"]:
         # The emulator may have been late with one by a quarter of a cycle while all this started.
         assert line["missing"] == line["extra"] <= 2, line
@@ -212,7 +212,7 @@ def test_one_signal_on_two_lines_calibrates_the_board(machine: Machine) -> None:
     assert found["lines"][1]["window"]["checks"]["skew"] == "OK"
 
 
-def test_a_pulse_that_stays_in_the_chip_is_told_to_the_cycle_and_nothing_else(
+def test_a_suppressed_pulse_is_reported_with_its_cycle_and_nothing_else_is(
     machine: Machine,
 ) -> None:
     root(machine, f"systemctl stop ecdaq-sync0; systemctl restart wire; : > {PLACE}/log")
@@ -221,13 +221,13 @@ def test_a_pulse_that_stays_in_the_chip_is_told_to_the_cycle_and_nothing_else(
     wait_for_windows(machine, 1)
     for slave, count in zip((1, 0, 1), KEPT, strict=True):
         answer = machine.run(
-            f"sudo perl {PLACE}/wire.pl tell {PLACE}/control"
+            f"sudo perl {PLACE}/wire.pl send {PLACE}/control"
             f" 'at=0s sync0-lost slave={slave} count={count}'"
         )
         assert answer.strip() == "ok"
         wait_for_windows(machine, machine.sync0()["windows"] + 2)
-    # A step of the phase by the emulator's turns, 0.2 ms, is rightly told, too: pulses are judged.
-    events = [e for e in told(machine) if e["event"] in PULSES]
+    # A step of the phase by the emulator's turns, 0.2 ms, is reported, too: pulses are checked.
+    events = [e for e in sync0_events(machine) if e["event"] in PULSES]
     last = machine.sync0()
     root(machine, "systemctl stop ecdaq-sync0 wire")
     books = Books(
@@ -237,7 +237,7 @@ def test_a_pulse_that_stays_in_the_chip_is_told_to_the_cycle_and_nothing_else(
     root(machine, "systemctl start ecdaq-sync0")
     newest = max(e["value"] for e in events)
     kept = {s: [c for c in books.silent(s, other) if c <= newest] for s, other in ((0, 1), (1, 0))}
-    print(f"\nkept in the chip: slave 0 {kept[0]}, slave 1 {kept[1]}")
+    print(f"\nsuppressed: slave 0 {kept[0]}, slave 1 {kept[1]}")
     print("\n".join(e["text"] for e in events))
     for slave in (0, 1):
         late = sorted(abs(x) for x in books.lateness_ns[slave].values())
@@ -296,7 +296,7 @@ def test_a_line_in_use_a_wrong_name_and_a_wrong_number_are_one_line_each(machine
         assert lines in [[f"ecdaq-sync0: line '{line}' of slave 0: {why}"] for why in reasons]
 
 
-def test_who_may_not_open_a_chip_is_told_so(machine: Machine) -> None:
+def test_a_missing_permission_for_a_chip_is_reported(machine: Machine) -> None:
     """A person without rights, and the service itself when the rule for /dev is missing."""
     no_right = "no permission to open /dev/gpiochip*: be root or in their group"
     assert by_hand(machine, f"{CHIP}:0", who="") == [
@@ -306,17 +306,17 @@ def test_who_may_not_open_a_chip_is_told_so(machine: Machine) -> None:
     machine.run("sudo chown root /dev/gpiochip*; sudo systemctl restart ecdaq-sync0")
     wait_for("its state", WINDOWS_S, lambda: machine.sync0().get("state") == "no line")
     assert no_right in machine.sync0()["message"]
-    assert len(said(machine, no_right)) == 2
+    assert len(journal_lines(machine, no_right)) == 2
     machine.run("sudo udevadm trigger --settle --action=change --subsystem-match=gpio")
     wait_for_lines(machine, 0, 1)
 
 
-def test_a_chip_that_is_unplugged_is_told_and_taken_again_when_it_is_back(machine: Machine) -> None:
+def test_an_unplugged_chip_is_reported_and_opened_again_when_it_is_back(machine: Machine) -> None:
     wait_for_windows(machine, 1)
     root(machine, f"systemctl stop wire; echo 0 > {CONFIGFS}/live")
     wait_for_lines(machine)
     wait_for("its state", WINDOWS_S, lambda: machine.sync0().get("state") == "no line")
-    gone = said(machine, "its chip is gone")
+    gone = journal_lines(machine, "its chip is gone")
     print("\n" + "\n".join(gone))
     assert sorted(gone) == [
         "ecdaq-sync0: line 'SYNC_B' of slave 1: its chip is gone",
@@ -329,11 +329,11 @@ def test_a_chip_that_is_unplugged_is_told_and_taken_again_when_it_is_back(machin
     assert [line["window"]["missing"] for line in found["lines"]] == [0, 0]
 
 
-def test_the_master_has_noticed_nothing_of_all_this(machine: Machine) -> None:
+def test_the_master_lost_no_cycle_meanwhile(machine: Machine) -> None:
     grown = grown_since(machine, json.loads(baseline(machine).read_text()))
     print(f"\nguest time: {grown}")
     assert grown.pop("cycles") > 15000
-    # A slave without its SYNC0 says so in its samples.
+    # A slave without its SYNC0 is marked in its samples.
     assert grown.pop("samples_bad") <= sum(KEPT)
     assert not any(grown.values()), grown
     assert machine.run("systemctl show --property=NRestarts --value ecdaqd").strip() == "0"

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A time server for the machine: answers NTP (RFC 5905, client and server) with the host's clock.
 
-time_server.py ADDRESS; says "ready" when it listens, ends when its standard input does.
+time_server.py ADDRESS; prints "ready" when it listens, ends when its standard input does.
 """
 
 from __future__ import annotations

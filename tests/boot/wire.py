@@ -53,15 +53,15 @@ class Wire:
             raise
 
     def is_up(self) -> bool:
-        said = (self.folder / "wire.err").read_text()
-        assert self.processes[0].poll() is None, said
+        message = (self.folder / "wire.err").read_text()
+        assert self.processes[0].poll() is None, message
         return (self.folder / "edges").exists()
 
     def fault(self, line: str) -> None:
-        """Tell the segment of a fault; it says ok."""
-        tell = TOP / "app" / "tools" / "tell-segment.py"
+        """Inject a fault into the segment; it answers ok."""
+        tool = TOP / "app" / "tools" / "tell-segment.py"
         done = subprocess.run(
-            [tell, "--control", self.folder / "control", line],
+            [tool, "--control", self.folder / "control", line],
             capture_output=True,
             text=True,
             check=True,
@@ -93,7 +93,7 @@ class Edge:
 
 
 class Books:
-    """What went into the wire (log), and what ecdaq-sync0 --dump says of the same time.
+    """The edges sent (log), and what ecdaq-sync0 --dump has of the same time.
 
     The input keeps an edge until the machine takes it, and no second one beside it: the edge of a
     pulse is the first one after it. The clocks of both sides go alike and begin differently.

@@ -50,12 +50,12 @@ def ecdaq(run_dir: Path | None, *words: str, user: int | None = None, **more: st
     )
 
 
-def fails(result: Result, code: int, *said: str) -> None:
-    """It ended with this code and one line on standard error that says all of this."""
+def fails(result: Result, code: int, *message: str) -> None:
+    """It ended with this code and one line on standard error with all of @message."""
     assert result.returncode == code, (result.returncode, result.stderr)
     assert result.stderr.startswith("ecdaq: ")
     assert result.stderr.count("\n") == 1 and result.stderr.endswith("\n"), result.stderr
-    for text in said:
+    for text in message:
         assert text in result.stderr
 
 

@@ -2,7 +2,7 @@
 /*
  * An ecdaqd without a bus, for tests of `ecdaq`: status page, recorder's page, sample and event
  * ring of two FB1111-Piccolo slaves, and an admin socket that answers by simple rules. Cycles go by
- * the clock, SPEED times as fast as real ones. It says "ready" and ends at the end of standard
+ * the clock, SPEED times as fast as real ones. It prints "ready" and ends at the end of standard
  * input, by `ecdaq stop`, or by SIGKILL.
  *
  * usage: test_fake_daemon RUN_DIR [SPEED=N] [JUMP=1] [RECORDER=0] [ADMIN=mute|garbage|none]

@@ -26,7 +26,7 @@ record:
   reserve: 64MiB
 """
 
-# What there is nothing to say of while no ecdaqd runs.
+# Checks without a result while no ecdaqd runs.
 OF_A_RUNNING_ECDAQD = {"cycle_thread", "page_faults"}
 
 # A path that ends in a slash is a folder, one with -> a symbolic link, None takes a file away.

@@ -15,7 +15,7 @@ def value_of(daemon: Fake, channel: str) -> int | float:
     return sample["values"][channel]
 
 
-def test_set_says_in_which_cycle_it_took_effect(daemon: Fake) -> None:
+def test_set_prints_the_cycle_of_its_effect(daemon: Fake) -> None:
     before = json_of(daemon("status", "--json"))["cycle_number"]
     answer = json_of(daemon("set", "piccolo0.led=on", "--json"))
     assert answer["cycle"] > before
@@ -34,7 +34,7 @@ def test_set_takes_several_outputs_at_once_and_64_bits_exactly(daemon: Fake) -> 
 
 
 @pytest.mark.parametrize(
-    ("word", "code", "said"),
+    ("word", "code", "message"),
     [
         ("piccolo0.led", USAGE, "piccolo0.led: expected OUTPUT=VALUE"),
         ("=1", USAGE, "=1: expected OUTPUT=VALUE"),
@@ -48,8 +48,8 @@ def test_set_takes_several_outputs_at_once_and_64_bits_exactly(daemon: Fake) -> 
         ("piccolo1.led=1", REFUSED, "refused: piccolo1.led: owned by program"),
     ],
 )
-def test_set_refuses_with_a_reason(daemon: Fake, word: str, code: int, said: str) -> None:
-    fails(daemon("set", word), code, said)
+def test_set_refuses_with_a_reason(daemon: Fake, word: str, code: int, message: str) -> None:
+    fails(daemon("set", word), code, message)
 
 
 def test_a_wrong_word_keeps_all_others_from_being_set(daemon: Fake) -> None:
@@ -92,9 +92,9 @@ def test_oneshot_does_not_wait_for_a_bus_that_was_stopped(daemon: Fake) -> None:
     events = works(daemon("events", "--count", "1"))
     assert events
     daemon.end()
-    _, said = process.communicate(timeout=60)
+    _, message = process.communicate(timeout=60)
     assert process.returncode in (FAILED, NO_DAEMON)
-    assert said.startswith("ecdaq: oneshot: ") and said.count("\n") == 1
+    assert message.startswith("ecdaq: oneshot: ") and message.count("\n") == 1
 
 
 @pytest.mark.parametrize(
@@ -130,7 +130,7 @@ def test_sdo_write_is_read_back(daemon: Fake) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "code", "said"),
+    ("words", "code", "message"),
     [
         (["read", "0", "0x1234"], REFUSED, "0x1234:00: SDO abort 0x06020000: object"),
         (["write", "0", "0x8000:1", "1", "-t", "USINT"], REFUSED, "0x08000022: data cannot be"),
@@ -142,8 +142,10 @@ def test_sdo_write_is_read_back(daemon: Fake) -> None:
         (["read", "9", "0x1018:1"], FAILED, "9: no slave at this position, there are 2"),
     ],
 )
-def test_sdo_says_why_not(daemon: Fake, words: list[str], code: int, said: str) -> None:
-    fails(daemon("sdo", *words), code, said)
+def test_a_failed_sdo_is_reported_with_its_reason(
+    daemon: Fake, words: list[str], code: int, message: str
+) -> None:
+    fails(daemon("sdo", *words), code, message)
 
 
 def test_clear_sets_counters_to_zero(fake: Callable[..., Fake]) -> None:
@@ -157,12 +159,12 @@ def test_stop_waits_until_ecdaqd_is_gone(daemon: Fake) -> None:
     # Its parent, this test, has to take note of its end before it is gone altogether.
     process = daemon.start("stop", "--wait", "20s", stderr=-1)
     assert daemon.process.wait(20) == 0
-    _, said = process.communicate(timeout=60)
-    assert (process.returncode, said) == (OK, "")
+    _, message = process.communicate(timeout=60)
+    assert (process.returncode, message) == (OK, "")
     fails(daemon("stop"), NO_DAEMON, "no answer: is ecdaqd running?")
 
 
-def test_an_ecdaqd_that_hangs_up_is_named(fake: Callable[..., Fake]) -> None:
+def test_a_connection_closed_by_ecdaqd_is_named(fake: Callable[..., Fake]) -> None:
     fails(fake("ADMIN=mute")("clear"), NO_DAEMON, "ecdaqd: connection closed without an answer")
 
 
@@ -170,7 +172,7 @@ def test_an_answer_of_another_version_is_refused(fake: Callable[..., Fake]) -> N
     fails(fake("ADMIN=garbage")("clear"), FAILED, "the answer is from another version")
 
 
-def test_a_socket_that_nobody_serves_is_named(fake: Callable[..., Fake], run_dir: Path) -> None:
+def test_a_socket_without_a_server_is_named(fake: Callable[..., Fake], run_dir: Path) -> None:
     daemon = fake("ADMIN=none")
     fails(daemon("clear"), NO_DAEMON, "no answer")
     (run_dir / "admin").write_text("")

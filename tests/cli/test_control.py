@@ -29,7 +29,7 @@ def daemon(run_dir: Path, *settings: str) -> subprocess.CompletedProcess[str]:
 
 
 def last_line(result: subprocess.CompletedProcess[str]) -> str:
-    """The error; warnings about missing real-time rights may stand before it."""
+    """The error; warnings about missing real-time rights may precede it."""
     assert result.returncode == CONFIG, result.stderr
     line = result.stderr.splitlines()[-1]
     assert line.startswith("ecdaqd: ")
@@ -37,7 +37,7 @@ def last_line(result: subprocess.CompletedProcess[str]) -> str:
 
 
 @pytest.mark.parametrize(
-    ("program", "said"),
+    ("program", "message"),
     [
         ("/nowhere/blink.so", "No such file or directory"),
         ("blink.so", "expected a path with a slash"),
@@ -48,13 +48,15 @@ def last_line(result: subprocess.CompletedProcess[str]) -> str:
         (f"{PROGRAMS}/no_cycle.so", "ecdaq_program has no cycle()"),
     ],
 )
-def test_a_program_that_cannot_be_loaded_is_said(tmp_path: Path, program: str, said: str) -> None:
+def test_a_program_that_cannot_be_loaded_is_reported(
+    tmp_path: Path, program: str, message: str
+) -> None:
     line = last_line(daemon(tmp_path, f"control.program={program}"))
-    assert line.startswith(f"control: {program}: ") and said in line
+    assert line.startswith(f"control: {program}: ") and message in line
 
 
 @pytest.mark.parametrize(
-    ("settings", "said"),
+    ("settings", "message"),
     [
         (["control.budget=1ms"], "control.budget: must be below cycle.period"),
         (["control.options=kp"], 'control.options: "kp" is not KEY=VALUE'),
@@ -62,9 +64,11 @@ def test_a_program_that_cannot_be_loaded_is_said(tmp_path: Path, program: str, s
         (["control.stuck=1ms"], "control.stuck"),
     ],
 )
-def test_settings_that_do_not_fit_are_said(tmp_path: Path, settings: list[str], said: str) -> None:
+def test_settings_that_do_not_fit_are_reported(
+    tmp_path: Path, settings: list[str], message: str
+) -> None:
     program = f"control.program={PROGRAMS}/probe.so"
-    assert said in last_line(daemon(tmp_path, program, *settings))
+    assert message in last_line(daemon(tmp_path, program, *settings))
 
 
 @pytest.mark.parametrize("example", ["blink", "pi_loop", "loopback"])
@@ -81,9 +85,9 @@ def test_the_configuration_of_an_example_is_good(example: str) -> None:
     assert result.returncode == 0, result.stderr
 
 
-def test_options_without_a_program_are_said(tmp_path: Path) -> None:
+def test_options_without_a_program_are_reported(tmp_path: Path) -> None:
     line = last_line(daemon(tmp_path, "control.options=kp=1"))
-    assert "control.options: there is no control.program" in line
+    assert "control.options: requires control.program" in line
 
 
 def test_a_program_is_built_out_of_tree_with_pkg_config_alone(tmp_path: Path) -> None:
@@ -104,6 +108,6 @@ def test_a_program_is_built_out_of_tree_with_pkg_config_alone(tmp_path: Path) ->
     ).stdout
     names = [line.split()[-1] for line in symbols.splitlines()]
     assert [name for name in names if not name.startswith("__")] == ["ecdaq_program"]
-    # It loads: what is wrong next is the segment, on which nobody answers.
+    # It loads: what is wrong next is the segment, on which no slave answers.
     result = daemon(tmp_path, f"control.program={program}")
     assert "control:" not in result.stderr and result.returncode != CONFIG

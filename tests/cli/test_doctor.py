@@ -39,7 +39,7 @@ def test_a_good_machine_has_nothing_to_fix(machine: Machine) -> None:
     assert text.splitlines()[-1] == "30 checks: 28 ok, 0 warn, 0 fail, 2 skipped"
 
 
-# check, what is otherwise and still good, what is said
+# check, what is otherwise and still good, expected text
 ALSO_GOOD: list[tuple[str, Files, str]] = [
     ("idle_states", idle_state(10), "at most C6: exit latency 10 us"),
     ("idle_states", idle_state(133, is_disabled=1), "at most WFI: exit latency 1 us"),
@@ -96,14 +96,14 @@ ALSO_GOOD: list[tuple[str, Files, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("name", "other", "said"), ALSO_GOOD)
+@pytest.mark.parametrize(("name", "other", "message"), ALSO_GOOD)
 def test_what_is_good_in_another_way_is_ok(
-    machine: Machine, name: str, other: Files, said: str
+    machine: Machine, name: str, other: Files, message: str
 ) -> None:
     machine.change(other)
     check = checks(machine)[name]
     assert check["level"] == "OK" and check["mend"] is None, check
-    assert said in check["value"]
+    assert message in check["value"]
 
 
 def test_a_bare_machine_skips_and_never_crashes(tmp_path: Path) -> None:
@@ -171,21 +171,21 @@ RUNNING: list[tuple[str, tuple[str, ...], dict[str, Any], str, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("name", "settings", "thread_is", "level", "said"), RUNNING)
-def test_a_running_ecdaqd_is_judged(
+@pytest.mark.parametrize(("name", "settings", "thread_is", "level", "message"), RUNNING)
+def test_a_running_ecdaqd_is_checked(
     machine: Machine,
     fake: Callable[..., Fake],
     name: str,
     settings: tuple[str, ...],
     thread_is: dict[str, Any],
     level: str,
-    said: str,
+    message: str,
 ) -> None:
     running = fake(*settings)
     machine.change(running_threads(running.process.pid, **thread_is))
     check = checks(machine, running.run_dir)[name]
     assert check["level"] == level, check
-    assert said in f"{check['value']} -> {check['mend']}"
+    assert message in f"{check['value']} -> {check['mend']}"
 
 
 def test_refused_cpu_dma_latency_shows_in_idle_states(
@@ -207,7 +207,7 @@ def test_an_ecdaqd_without_a_cycle_or_gone_is_skipped(
     assert check["level"] == "SKIP" and "not running" in check["value"]
 
 
-def test_a_copy_with_an_ecdaqd_in_it_is_judged_without_a_status_page(machine: Machine) -> None:
+def test_a_copy_with_an_ecdaqd_in_it_is_checked_without_a_status_page(machine: Machine) -> None:
     machine.change(running_threads(500))
     found = checks(machine)
     assert found["cycle_thread"]["value"] == "SCHED_FIFO 80 on core 3"
@@ -217,7 +217,7 @@ def test_a_copy_with_an_ecdaqd_in_it_is_judged_without_a_status_page(machine: Ma
     assert checks(machine)["memory_lock"]["level"] == "FAIL"
 
 
-def test_a_status_page_of_another_version_says_so(machine: Machine, run_dir: Path) -> None:
+def test_a_status_page_of_another_version_is_reported(machine: Machine, run_dir: Path) -> None:
     (run_dir / "status").write_bytes(b"cdqstat1" + bytes(64))
     machine.change(running_threads(500))
     found = checks(machine, run_dir)
@@ -270,7 +270,7 @@ def test_a_port_in_a_network_of_ecdaqd_s_own_is_skipped(fake: Callable[..., Fake
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="becomes another user, which takes root")
-def test_who_is_not_root_is_told_what_could_not_be_read(fake: Callable[..., Fake]) -> None:
+def test_without_root_what_could_not_be_read_is_reported(fake: Callable[..., Fake]) -> None:
     running = fake("MODE=600")
     result = running("doctor", "--json", user=NOBODY)
     found = {check["name"]: check for check in report(result)["check"]}

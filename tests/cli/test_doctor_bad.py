@@ -265,15 +265,15 @@ BAD: list[tuple[str, Files, str, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("name", "wrong", "level", "said"), BAD)
+@pytest.mark.parametrize(("name", "wrong", "level", "message"), BAD)
 def test_what_is_wrong_is_named_with_its_remedy(
-    machine: Machine, name: str, wrong: Files, level: str, said: str
+    machine: Machine, name: str, wrong: Files, level: str, message: str
 ) -> None:
     machine.change(wrong)
     result = examine(machine, "--json")
     found = {check["name"]: check for check in report(result)["check"]}
     assert found[name]["level"] == level, found[name]
-    assert said in f"{found[name]['value']} -> {found[name]['mend']}"
+    assert message in f"{found[name]['value']} -> {found[name]['mend']}"
     assert found[name]["mend"]
     if level == "FAIL":
         fails(result, FAILED, "to fix:", name)

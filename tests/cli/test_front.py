@@ -106,7 +106,7 @@ def test_check_reports_a_valid_file(program: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("program", [p for p, switch in SERVICES.items() if switch is not None])
-def test_check_tells_a_disabled_program_from_an_invalid_file(program: str) -> None:
+def test_check_distinguishes_a_disabled_program_from_an_invalid_file(program: str) -> None:
     off = f"{SERVICES[program]}=off"
     one_line(program, run(program, "--check", "--set", off), DISABLED, "is off: nothing to do")
     result = run(program, "--set", off)

@@ -26,7 +26,7 @@ def flags(*words: str) -> list[str]:
     found = subprocess.run(
         ["pkg-config", *words, str(pc)], check=True, capture_output=True, text=True
     )
-    # Where it stands, the library is on no search path; installed to /usr it is.
+    # In the build folder the library is on no search path; installed to /usr it is.
     return [*found.stdout.split(), f"-Wl,-rpath,{pc.parents[1]}"]
 
 

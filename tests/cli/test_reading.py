@@ -58,7 +58,7 @@ def test_status_as_json_has_the_keys_that_scripts_rely_on(daemon: Fake, words: l
     assert status["rt_degraded"] == ["priority"]
     assert status["message"] == 'slave 1: "quoted"\ttext'
     assert status["session"] > 2**53
-    # The cycle goes on while its figures are read.
+    # The cycle continues while its figures are read.
     good = 2 * (status["cycles"] - status["frames_lost"])
     assert abs(status["samples_good"] - good) < 100
 
@@ -80,7 +80,7 @@ def test_status_lists_the_slaves(daemon: Fake) -> None:
 def test_status_is_one_screen(daemon: Fake) -> None:
     text = works(daemon("status"))
     assert len(text.splitlines()) <= 24
-    for said in (
+    for output in (
         "OP",
         "2 slaves on ecat0 (simulated)",
         "WKC ",
@@ -95,7 +95,7 @@ def test_status_is_one_screen(daemon: Fake) -> None:
         "recorder   running   5000 cycles, 1 gaps",
         "not granted: priority",
     ):
-        assert said in text
+        assert output in text
 
 
 def test_status_shows_the_control_program_where_there_is_one(fake: Callable[..., Fake]) -> None:
@@ -116,7 +116,7 @@ def test_status_shows_the_control_program_where_there_is_one(fake: Callable[...,
     assert json_of(daemon("histogram", "control", "--json"))["count"] == 5
 
 
-def test_status_without_a_recorder_says_so(fake: Callable[..., Fake]) -> None:
+def test_status_reports_a_missing_recorder(fake: Callable[..., Fake]) -> None:
     daemon = fake("RECORDER=0")
     assert "recorder   none" in works(daemon("status"))
     status = json_of(daemon("status", "--json"))
@@ -125,7 +125,9 @@ def test_status_without_a_recorder_says_so(fake: Callable[..., Fake]) -> None:
 
 
 @pytest.mark.parametrize("end", [Fake.end, Fake.kill], ids=["in order", "killed"])
-def test_status_works_after_the_end_and_says_so(daemon: Fake, end: Callable[[Fake], None]) -> None:
+def test_status_works_after_the_end_and_is_marked(
+    daemon: Fake, end: Callable[[Fake], None]
+) -> None:
     end(daemon)
     text = works(daemon("status"))
     assert text.startswith("ecdaqd has ended")
@@ -201,7 +203,7 @@ def test_watch_raw_gives_counts(daemon: Fake) -> None:
     assert isinstance(sample["values"]["piccolo0.adc"], int)
 
 
-def test_watch_thins_out(daemon: Fake) -> None:
+def test_watch_reduces_the_rate(daemon: Fake) -> None:
     for words in (["--every", "50"], ["--rate", "20"]):
         samples = json_lines(daemon("watch", "piccolo0.adc", "--count", "4", "--json", *words))
         cycles = [s["cycle"] for s in samples]
@@ -218,7 +220,7 @@ def test_watch_counts_jumps_of_the_cycle_number(fake: Callable[..., Fake]) -> No
     assert "# 5 samples missed: the cycle numbers jump" in text
 
 
-def test_watch_says_which_channel_is_not_there(daemon: Fake) -> None:
+def test_watch_names_an_unknown_channel(daemon: Fake) -> None:
     fails(daemon("watch", "piccolo0.acd"), 1, "piccolo0.acd: no such channel; did you mean pic")
     fails(daemon("watch", "zz*"), 1, "zz*: no such channel (see ecdaq channels)")
 
@@ -228,9 +230,9 @@ def test_watch_ends_when_ecdaqd_ends(daemon: Fake) -> None:
     assert process.stdout is not None
     process.stdout.readline()
     daemon.end()
-    _, said = process.communicate(timeout=60)
+    _, output = process.communicate(timeout=60)
     assert process.returncode == NO_DAEMON
-    assert re.match(r"ecdaq: watch: ecdaqd has ended after \d+ of 10000000 samples\n$", said)
+    assert re.match(r"ecdaq: watch: ecdaqd has ended after \d+ of 10000000 samples\n$", output)
 
 
 def test_watch_ends_with_a_signal(daemon: Fake) -> None:
@@ -238,8 +240,8 @@ def test_watch_ends_with_a_signal(daemon: Fake) -> None:
     assert process.stdout is not None
     process.stdout.readline()
     process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=60)
-    assert (process.returncode, said) == (OK, "")
+    _, output = process.communicate(timeout=60)
+    assert (process.returncode, output) == (OK, "")
 
 
 def plot(daemon: Fake, *words: str, **env: str) -> list[str]:
@@ -301,7 +303,7 @@ def test_events_can_be_followed_to_the_end(daemon: Fake) -> None:
 def test_histograms_agree_with_their_count(fake: Callable[..., Fake], name: str) -> None:
     daemon = fake("SPEED=1")
     histogram = json_of(daemon("histogram", name, "--json"))
-    # The writer goes on while the buckets are read.
+    # The writer continues while the buckets are read.
     total = sum(bucket["count"] for bucket in histogram["bucket"])
     assert histogram["count"] <= total <= histogram["count"] + 500
     assert all(b["from_ns"] < b["below_ns"] for b in histogram["bucket"])

@@ -65,11 +65,11 @@ class Bench:
         )  # fmt: skip
 
     def record_all(self, *options: str) -> str:
-        """Record a session that has ended; what was said."""
+        """Record a session that has ended; its messages."""
         process = self.record("--once", *options)
-        _, said = process.communicate(timeout=60)
-        assert process.returncode == 0, said
-        return said
+        _, output = process.communicate(timeout=60)
+        assert process.returncode == 0, output
+        return output
 
     def recorded_bytes(self) -> int:
         """Of all files; one that is renamed meanwhile does not count."""
@@ -177,8 +177,8 @@ def test_killed_again_and_again_it_misses_no_cycle(bench: Bench) -> None:
         assert recorder.wait(30) == -signal.SIGKILL
         assert list(bench.folder.glob("*.part"))
     assert producer.wait(60) == 0
-    said = bench.record_all()
-    assert "recovered" in said
+    output = bench.record_all()
+    assert "recovered" in output
     assert not list(bench.folder.glob("*.part"))
     assert [m.cycle for _, m in bench.messages("/ecdaq/cycle")] == list(range(4000))
     checked = bench.log("check", bench.folder)
@@ -232,8 +232,8 @@ def test_stopped_by_a_signal_it_leaves_a_finished_file(bench: Bench) -> None:
 
 def test_a_crashed_master_ends_the_session(bench: Bench) -> None:
     bench.produce("--cycles", "700", "--no-close").wait(60)
-    said = bench.record_all()
-    assert "producer gone" in said
+    output = bench.record_all()
+    assert "producer gone" in output
     assert [m.cycle for _, m in bench.messages("/ecdaq/cycle")] == list(range(700))
 
 
@@ -242,9 +242,9 @@ def test_a_second_recorder_is_refused_in_one_line(bench: Bench) -> None:
     wait_until("lock", lambda: bool((bench.folder / ".ecdaq-record.lock").exists()))
     wait_until("status", (bench.run_dir / "record-status").exists)
     second = bench.record()
-    _, said = second.communicate(timeout=30)
+    _, output = second.communicate(timeout=30)
     assert second.returncode == 6
-    assert said.count("\n") == 1 and "another ecdaq-record (process " in said
+    assert output.count("\n") == 1 and "another ecdaq-record (process " in output
 
 
 @pytest.mark.parametrize(
@@ -259,7 +259,7 @@ def test_a_second_recorder_is_refused_in_one_line(bench: Bench) -> None:
         (["--dir", "/dev/null/records"], 1, "/dev/null/records: Not a directory"),
     ],
 )
-def test_trouble_is_one_line_and_a_code(options: list[str], code: int, why: str) -> None:
+def test_an_error_is_one_line_and_a_code(options: list[str], code: int, why: str) -> None:
     ended = subprocess.run(
         [RECORD, *options], capture_output=True, text=True, timeout=60, check=False
     )
@@ -269,7 +269,7 @@ def test_trouble_is_one_line_and_a_code(options: list[str], code: int, why: str)
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="needs root to become somebody else")
-def test_a_folder_that_may_not_be_written_is_said(bench: Bench) -> None:
+def test_a_folder_that_may_not_be_written_is_reported(bench: Bench) -> None:
     folder = bench.run_dir / "records"
     folder.mkdir(mode=0o755)
     ended = subprocess.run(

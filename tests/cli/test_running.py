@@ -71,7 +71,7 @@ def test_the_one_that_runs_is_taken(place: Place, run_dir: str) -> None:
     assert "piccolo1" in works(place("slaves", "--run-dir", run_dir))
 
 
-def test_an_ended_one_is_passed_over(place: Place) -> None:
+def test_an_ended_one_is_skipped(place: Place) -> None:
     place.fake("/dev/shm/ecdaq-run-a").kill()
     place.fake("/dev/shm/ecdaq-run-b")
     assert "piccolo1" in works(place("slaves"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""ecdaq security: keys, and what is said when they cannot be made. (How they work: tests/dds.)"""
+"""ecdaq security: keys, and the errors when they cannot be made. (How they work: tests/dds.)"""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def security(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_a_store_is_made_filled_and_looked_at(tmp_path: Path) -> None:
+def test_a_store_is_created_filled_and_checked(tmp_path: Path) -> None:
     made = security(tmp_path, "init")
     assert made.returncode == 0, made.stderr
     assert "security/appliance: for the appliance" in made.stdout
@@ -34,7 +34,7 @@ def test_a_store_is_made_filled_and_looked_at(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "code", "said"),
+    ("words", "code", "message"),
     [
         ([], 2, "missing command: init, "),
         (["open"], 2, "open: unknown command"),
@@ -48,12 +48,14 @@ def test_a_store_is_made_filled_and_looked_at(tmp_path: Path) -> None:
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else None,
 )
-def test_what_is_wrong_is_one_line(tmp_path: Path, words: list[str], code: int, said: str) -> None:
+def test_what_is_wrong_is_one_line(
+    tmp_path: Path, words: list[str], code: int, message: str
+) -> None:
     ended = security(tmp_path, *words)
     assert ended.returncode == code, ended.stderr
     assert ended.stderr.count("\n") == 1
     assert ended.stderr.startswith("ecdaq: security: ")
-    assert said in ended.stderr
+    assert message in ended.stderr
 
 
 def test_the_appliance_s_keys_are_renewed_alone(tmp_path: Path) -> None:

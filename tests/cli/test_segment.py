@@ -66,11 +66,11 @@ def one_line(stderr: str) -> str:
     return stderr
 
 
-@pytest.mark.parametrize(("code", "words", "said"), MISTAKES)
-def test_a_mistake_is_one_line(code: int, words: list[str], said: str) -> None:
+@pytest.mark.parametrize(("code", "words", "message"), MISTAKES)
+def test_a_mistake_is_one_line(code: int, words: list[str], message: str) -> None:
     result = segment(*words)
     assert result.returncode == code, result.stderr
-    assert said in one_line(result.stderr)
+    assert message in one_line(result.stderr)
     assert result.stdout == ""
 
 
@@ -152,12 +152,14 @@ def test_io_lines_reach_the_terminals_while_it_runs(run_dir: Path) -> None:
             ("io slave=2 led=1", "led=1: unknown input or invalid value"),
         ):
             assert ask(control, run_dir / "me", line) == answer
-        tell = [ROOT / "app" / "tools" / "tell-segment.py", "--control", control]
-        said = subprocess.run([*tell, "io", "slave=1"], capture_output=True, text=True, check=True)
-        assert said.stdout == "slot1=0x00\n"
+        tool = [ROOT / "app" / "tools" / "tell-segment.py", "--control", control]
+        message = subprocess.run(
+            [*tool, "io", "slave=1"], capture_output=True, text=True, check=True
+        )
+        assert message.stdout == "slot1=0x00\n"
         running.send_signal(signal.SIGTERM)
         assert running.wait(10) == 0
-    gone = subprocess.run([*tell, "io slave=1"], capture_output=True, text=True, check=False)
+    gone = subprocess.run([*tool, "io slave=1"], capture_output=True, text=True, check=False)
     assert gone.returncode == FAILED
     assert gone.stderr == f"tell-segment: {control}: No such file or directory\n"
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""ecdaq-sync0 on recorded edges, and what it says when a line cannot be had."""
+"""ecdaq-sync0 on recorded edges, and its messages when a line is unavailable."""
 
 from __future__ import annotations
 
@@ -46,10 +46,10 @@ def check(*words: str, run_dir: Path | None = None) -> subprocess.CompletedProce
     )
 
 
-def one_line(result: subprocess.CompletedProcess[str], code: int, *said: str) -> None:
+def one_line(result: subprocess.CompletedProcess[str], code: int, *output: str) -> None:
     assert result.returncode == code, (result.returncode, result.stderr)
     assert result.stderr.startswith("ecdaq-sync0: ") and result.stderr.count("\n") == 1
-    for text in said:
+    for text in output:
         assert text in result.stderr
 
 
@@ -78,7 +78,7 @@ def test_clean_edges_are_good_and_what_cannot_be_seen_is_unresolved(tmp_path: Pa
     found = windows(got.stdout)
     assert [(m["slave"], m["edges"], m["missing"]) for m in found] == [(0, 10000, 0), (2, 10000, 0)]
     assert found[0]["verdict"] == "OK"
-    assert found[1]["skew"] == "UNRESOLVED"  # nobody has measured this board
+    assert found[1]["skew"] == "UNRESOLVED"  # this board is not calibrated
     text = check("--replay", file, "--set", none).stdout
     assert "skew < " in text and "(unresolved)" in text and "0 ns jitter" not in text
 
@@ -117,16 +117,16 @@ def shots(cycles: int, due: list[int], came: list[int]) -> Iterable[str]:
         yield from (f"1 {at} 0 {n + 1}" for n, c in enumerate(came) if c == cycle)
 
 
-def test_recorded_shots_are_judged_by_their_commands(tmp_path: Path) -> None:
+def test_recorded_shots_are_checked_against_their_commands(tmp_path: Path) -> None:
     file = tmp_path / "dump"
     file.write_text("\n".join(shots(12000, due=[2000, 5000, 11500], came=[2000, 11500])) + "\n")
     got = check("--replay", str(file), "--json")
     assert got.returncode == CHECK_FAILED, got.stderr
-    said = [json.loads(line) for line in got.stdout.splitlines()]
-    told = [(m["event"], m["value"] - 845 * 10**15) for m in said if "event" in m]
+    output = [json.loads(line) for line in got.stdout.splitlines()]
+    reported = [(m["event"], m["value"] - 845 * 10**15) for m in output if "event" in m]
     lost = ("sync0_shot_lost", 5000 * PERIOD)
     shot = [("sync0_shot", c * PERIOD) for c in (2000, 11500)]
-    assert told == [shot[0], lost, shot[1]]
+    assert reported == [shot[0], lost, shot[1]]
     assert [(m["slave"], m["edges"], m["missing"]) for m in windows(got.stdout)] == [(0, 10000, 0)]
     file.write_text("\n".join(shots(12000, due=[2000], came=[2000])) + "\n")
     assert check("--replay", str(file)).returncode == 0
@@ -176,10 +176,10 @@ def wait_for_message(run_dir: Path) -> dict[str, Any]:
         if report.get("message"):
             return report
         time.sleep(0.02)
-    raise AssertionError("ecdaq-sync0 said nothing")
+    raise AssertionError("ecdaq-sync0 printed nothing")
 
 
-def test_a_line_that_cannot_be_had_is_said_once_and_waited_for(run_dir: Path) -> None:
+def test_an_unavailable_line_is_reported_once_and_retried(run_dir: Path) -> None:
     options = ["--set", "sync0.enable=on", "--set", "slaves[0].sync0_line=pinctrl-none:17"]
     dev = run_dir / "dev"
     dev.mkdir()
@@ -198,14 +198,14 @@ def test_a_line_that_cannot_be_had_is_said_once_and_waited_for(run_dir: Path) ->
         assert process.poll() is None
     finally:
         process.send_signal(signal.SIGTERM)
-        _, said = process.communicate(timeout=60)
+        _, output = process.communicate(timeout=60)
     assert process.returncode == 0
-    assert said.count("this machine has no GPIO chip") == 1
+    assert output.count("this machine has no GPIO chip") == 1
     assert "(not running)" in works(ecdaq(run_dir, "sync0"))
     dev.rmdir()
 
 
-def test_without_ecdaq_sync0_the_verb_says_so(run_dir: Path) -> None:
+def test_without_ecdaq_sync0_the_verb_reports_it(run_dir: Path) -> None:
     fails(ecdaq(run_dir, "sync0"), NO_DAEMON, "is ecdaq-sync0 running?")
     fails(ecdaq(run_dir, "sync0", "measure"), USAGE, "calibrate")
     fails(ecdaq(run_dir, "sync0", "--json", "--histogram"), USAGE, "exclude each other")

@@ -135,7 +135,7 @@ def screens(text: str) -> list[list[str]]:
     return [frame.split("\n") for frame in plain]
 
 
-def test_top_draws_again_and_again_and_leaves_with_q(daemon: Fake, terminal: Terminal) -> None:
+def test_top_redraws_periodically_and_ends_with_q(daemon: Fake, terminal: Terminal) -> None:
     terminal.start(daemon, "top", "--interval", "20ms")
     terminal.wait_for(r"(?s)(\x1b\[H.*){4}")
     terminal.press("q")
@@ -169,7 +169,7 @@ def test_top_ends_with_ecdaqd_and_leaves_the_last_state(daemon: Fake, terminal: 
     assert "STOPPED" in terminal.text[terminal.text.rfind(LEAVE) :]
 
 
-def test_the_last_lines_say_what_q_does_and_what_a_second_terminal_calls(
+def test_the_last_lines_explain_q_and_the_command_for_a_second_terminal(
     daemon: Fake, terminal: Terminal
 ) -> None:
     fcntl.ioctl(terminal.slave, termios.TIOCSWINSZ, struct.pack("HHHH", 12, 400, 0, 0))
@@ -184,10 +184,10 @@ def test_the_last_lines_say_what_q_does_and_what_a_second_terminal_calls(
     label, _, command = frame[-1].partition(": ")
     assert label == "2nd terminal"
     assert f"--run-dir {daemon.run_dir} status" in command
-    said = subprocess.run(
+    message = subprocess.run(
         command, shell=True, env=environment(None), capture_output=True, text=True, check=True
     )
-    assert "2 slaves" in said.stdout and not said.stderr
+    assert "2 slaves" in message.stdout and not message.stderr
 
 
 @pytest.mark.parametrize("missing", [0, 1])
@@ -320,7 +320,7 @@ def test_a_live_plot_starts_full_and_scrolls(daemon: Fake, terminal: Terminal) -
     assert all(len(frame) <= 24 for frame in frames)
 
 
-def test_a_small_terminal_is_no_trouble(daemon: Fake, terminal: Terminal) -> None:
+def test_a_small_terminal_is_supported(daemon: Fake, terminal: Terminal) -> None:
     fcntl.ioctl(terminal.slave, termios.TIOCSWINSZ, struct.pack("HHHH", 3, 10, 0, 0))
     terminal.start(daemon, "watch", "piccolo*", "--plot")
     terminal.wait_for(r"(?s)(\x1b\[H.*){2}")
@@ -330,12 +330,12 @@ def test_a_small_terminal_is_no_trouble(daemon: Fake, terminal: Terminal) -> Non
         assert len(frame) <= 3 and all(len(line) <= 10 for line in frame)
 
 
-def test_without_ecdaqd_the_terminal_is_not_taken(daemon: Fake, terminal: Terminal) -> None:
+def test_without_ecdaqd_the_terminal_is_unchanged(daemon: Fake, terminal: Terminal) -> None:
     daemon.end()
     (daemon.run_dir / "status").unlink()
     terminal.start(daemon, "top", "--wait", "50ms")
-    code, said = terminal.end()
-    assert code == NO_DAEMON and said.startswith("ecdaq: top: ")
+    code, message = terminal.end()
+    assert code == NO_DAEMON and message.startswith("ecdaq: top: ")
     assert ENTER not in terminal.text
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""ecdaq before files that it may not read, or that are not what they should be."""
+"""ecdaq with files that it may not read, or that are damaged."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ needs_nobody = pytest.mark.skipif(
 @needs_nobody
 @pytest.mark.parametrize("words", READING, ids=" ".join)
 def test_what_may_not_be_read_is_named(daemon: Fake, words: list[str]) -> None:
-    said = "be root or in its group"
-    fails(daemon(*words, user=NOBODY), PERMISSION, "no permission to read", said)
+    remedy = "be root or in its group"
+    fails(daemon(*words, user=NOBODY), PERMISSION, "no permission to read", remedy)
 
 
 @needs_nobody
@@ -48,7 +48,7 @@ def test_what_may_not_be_read_is_named(daemon: Fake, words: list[str]) -> None:
     "words", [["set", "piccolo0.led=1"], ["clear"], ["stop"], ["oneshot", "all", "--in", "1s"]]
 )
 def test_commands_need_the_group_of_the_socket(daemon: Fake, words: list[str]) -> None:
-    # Everyone may read here, so that it is the socket that says no.
+    # Everyone may read here, so that it is the socket that rejects.
     for name in ("status", "samples", "events"):
         (daemon.run_dir / name).chmod(0o644)
     fails(
@@ -75,7 +75,7 @@ def test_a_damaged_file_is_refused(daemon: Fake, name: str, content: str) -> Non
     fails(daemon(*words), FAILED, f"{path} is of another version of ecdaq, or damaged")
 
 
-def test_a_ring_whose_description_lies_never_crashes_the_reader(daemon: Fake) -> None:
+def test_a_ring_with_a_wrong_description_never_crashes_the_reader(daemon: Fake) -> None:
     """Every byte of the header's and the meta area's first part, turned over one by one."""
     path = daemon.run_dir / "samples"
     daemon.end()
@@ -103,7 +103,7 @@ def test_an_event_of_an_unknown_kind_is_shown_as_such(daemon: Fake) -> None:
     path = daemon.run_dir / "events"
     daemon.end()
     whole = bytearray(path.read_bytes())
-    # The first slot's event: its number stands 40 bytes behind the slot's sequence.
+    # The first slot's event: its number is 40 bytes behind the slot's sequence.
     slot = 4096
     whole[slot + 8 + 40 : slot + 8 + 42] = b"\xff\x7f"
     path.write_bytes(whole)
@@ -117,7 +117,7 @@ def test_a_run_directory_with_too_long_a_path_is_refused() -> None:
     fails(ecdaq(None, "--run-dir", "/" + "y" * 300, "status"), 2, "--run-dir: the path is too long")
 
 
-def test_a_path_too_long_for_a_socket_is_said(daemon: Fake, tmp_path: Path) -> None:
+def test_a_path_too_long_for_a_socket_is_reported(daemon: Fake, tmp_path: Path) -> None:
     deep = tmp_path / ("z" * 120)
     deep.mkdir()
     fails(ecdaq(deep, "clear"), FAILED, "File name too long")

@@ -66,7 +66,7 @@ def test_versions_agree() -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         ([], "missing command"),
         (["frob"], "frob: unknown command"),
@@ -96,8 +96,8 @@ def test_versions_agree() -> None:
         (["line\nbreak"], "line?break: unknown command"),
     ],
 )
-def test_a_mistake_is_one_line_and_exit_code_2(words: list[str], said: str) -> None:
-    fails(ecdaq(Path("/nonexistent"), *words), USAGE, said)
+def test_a_mistake_is_one_line_and_exit_code_2(words: list[str], message: str) -> None:
+    fails(ecdaq(Path("/nonexistent"), *words), USAGE, message)
 
 
 def test_the_wrong_histogram_is_named(daemon: Fake) -> None:
@@ -109,12 +109,12 @@ def test_the_wrong_histogram_is_named(daemon: Fake) -> None:
 
 
 @pytest.mark.parametrize("words", READING, ids=" ".join)
-def test_without_ecdaqd_a_reading_verb_says_so(run_dir: Path, words: list[str]) -> None:
+def test_without_ecdaqd_a_reading_verb_reports_it(run_dir: Path, words: list[str]) -> None:
     fails(ecdaq(run_dir, *words), NO_DAEMON, str(run_dir), "is ecdaqd running?")
 
 
 @pytest.mark.parametrize("words", [["clear"], ["stop"]], ids=" ".join)
-def test_without_ecdaqd_a_command_says_so(run_dir: Path, words: list[str]) -> None:
+def test_without_ecdaqd_a_command_reports_it(run_dir: Path, words: list[str]) -> None:
     fails(ecdaq(run_dir, *words), NO_DAEMON, "admin", "is ecdaqd running?")
 
 
@@ -153,6 +153,6 @@ def test_a_broken_configuration_is_named_with_its_line(tmp_path: Path) -> None:
 def test_a_full_disk_is_a_failure(daemon: Fake) -> None:
     with Path("/dev/full").open("w") as full:
         process = daemon.start("slaves", stdout=full, stderr=-1)
-        _, said = process.communicate(timeout=60)
+        _, message = process.communicate(timeout=60)
     assert process.returncode != OK
-    assert said == "ecdaq: slaves: standard output: No space left on device\n"
+    assert message == "ecdaq: slaves: standard output: No space left on device\n"

@@ -110,13 +110,13 @@ class Bench:
         self.start_dds()
 
     def start_dds(self, sessions: int = 1) -> None:
-        """Returns when ecdaq-dds, this one or those before, have told of so many sessions."""
+        """Returns when ecdaq-dds, this one or those before, have reported so many sessions."""
         process = self.segment.start("dds", str(live.BIN / "ecdaq-dds"), *self.segment.options())
 
         def is_publishing() -> bool:
-            said = self.segment.log("dds")
-            assert process.poll() is None, said
-            return said.count("publishing session") >= sessions
+            message = self.segment.log("dds")
+            assert process.poll() is None, message
+            return message.count("publishing session") >= sessions
 
         wait_for("ecdaq-dds' session", is_publishing, 20)
 
@@ -142,7 +142,7 @@ class Bench:
         )
 
     def commander(self) -> Commander:
-        """A commander on the PC that does as it is told (command_python.py)."""
+        """A commander on the PC, driven by lines on its input (command_python.py)."""
         paths = os.pathsep.join(p for p in (str(KIT), os.environ.get("PYTHONPATH")) if p)
         program = str(Path(__file__).parent / "command_python.py")
         with (self.folder / "commander.log").open("ab") as errors:

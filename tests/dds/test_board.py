@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The board that ecdaq-dds writes may fall into wrong hands: the master goes on."""
+"""A hostile writer of the board of ecdaq-dds does not stop the master."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_hostile_writer_of_the_board_cannot_end_the_master(
     with mmap.mmap(board, size) as page:
         for n in range(200):
             page[:] = os.urandom(size)
-            page[24] = 2 * n % 256  # a whole set, as its number says
+            page[24] = 2 * n % 256  # a complete set, by its number
     fallocate = ctypes.CDLL(None, use_errno=True).fallocate64
     fallocate.argtypes = [ctypes.c_int, ctypes.c_int, ctypes.c_int64, ctypes.c_int64]
     for _ in range(20):

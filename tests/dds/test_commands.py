@@ -47,7 +47,7 @@ def test_answer_names_the_very_cycle_whose_frame_carried_the_value(
     sent_values = [(k % 2, commander.command({LED: k % 2})) for k in range(1, 101)]
     pairs = list(itertools.pairwise([(0, {"accepted": True}), *sent_values]))
     answers = [(value, answer) for value, answer in sent_values if answer["accepted"]]
-    # A master that a busy machine does not run for 200 ms says so, and takes the value back.
+    # A master that a busy machine does not run for 200 ms reports it, and reverts the value.
     assert all(
         answer["accepted"] or "not taken by the master in time" in answer["reason"]
         for _, answer in sent_values
@@ -104,7 +104,7 @@ def test_publisher_killed_leaves_the_output_fail_safe_and_its_successor_does_not
     set_at = commander.accepted({LED: 1})
     bench.segment.processes["dds"].kill()
     bench.segment.processes.pop("dds").wait(10)
-    # The status page is up to 20 ms old: only what it says next was said after the kill.
+    # The status page is up to 20 ms old: only the next one was written after the kill.
     killed_at = bench.segment.wait_for_cycles(1, 30)["cycle_number"]
     bench.segment.wait_for_cycles(1000, 30)
     bench.start_dds(sessions=2)

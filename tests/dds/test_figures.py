@@ -58,7 +58,7 @@ def phase_without(bench: Bench) -> Phase:
 
 
 def phase_with(bench: Bench, turn: int) -> tuple[Phase, list[Path]]:
-    """Eight subscribers, of which one stands still for four seconds."""
+    """Eight subscribers, one of them stopped for four seconds."""
     seconds = STOPPED_S + 4
     before = len(bench.started)
     kinds = [(start_c, "sample")] * 4 + [(start_c, "block")] * 2 + [(start_python, "sample")] * 2
@@ -70,12 +70,12 @@ def phase_with(bench: Bench, turn: int) -> tuple[Phase, list[Path]]:
     first = now_cycle(bench)
     stopped = bench.started[before]
     stopped.send_signal(signal.SIGSTOP)
-    still_since = time.monotonic()
-    wait_for("4 s of standing still", lambda: time.monotonic() - still_since > STOPPED_S, 60)
+    stopped_since = time.monotonic()
+    wait_for("4 s of stop", lambda: time.monotonic() - stopped_since > STOPPED_S, 60)
     stopped.send_signal(signal.SIGCONT)
     last = now_cycle(bench)
     wait_for_ends(bench, seconds + 60)
-    # Behind the one that stood still, whose own time passed meanwhile.
+    # Except the stopped one, whose own time passed meanwhile.
     return Phase(SUBSCRIBERS, first, last), files[1:]
 
 
@@ -101,12 +101,12 @@ class Verdict:
             )
 
     def is_good(self) -> bool:
-        """Alike, as far as a machine with other work to do can tell."""
+        """Equal within the noise of a loaded machine."""
         alike = all(each[SUBSCRIBERS] <= 3 * each[0] + 100 for each in self.p99_us.values())
         return alike and self.lost[SUBSCRIBERS] <= 2 * self.lost[0] + 0.002
 
 
-def test_cycle_does_not_notice_eight_subscribers_one_of_which_stands_still(
+def test_eight_subscribers_one_of_them_stopped_do_not_affect_the_cycle(
     make_bench: Callable[..., Bench],
 ) -> None:
     for attempt in (1, 2, 3):  # what depends on the machine is measured again
@@ -199,5 +199,5 @@ def test_latency_from_sync0_to_the_take_is_printed_and_no_sample_comes_before_it
     print(f"ecdaq-dds: {measured.cpu_percent:.1f} % of a core, {measured.cycles} cycles")
     newest = measured.by_name["C, block, newest cycle"]
     oldest = measured.by_name["C, block, oldest cycle"]
-    # Nineteen cycles lie between them, whatever the machine does.
+    # Nineteen cycles are between them, whatever the load.
     assert min(a - b for a, b in zip(oldest, newest, strict=True)) > 18_000

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Peers that mean no good: ecdaq-dds lives, serves the others, and the cycle does not notice.
 
-ECDAQ_DDS_SECONDS: how long each goes on (20). ECDAQ_DDS_SEED: of the fuzzer.
+ECDAQ_DDS_SECONDS: duration of each (20). ECDAQ_DDS_SEED: of the fuzzer.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def attacked(bench: Bench, seconds: float) -> tuple[float, float]:
     return lost_share(bench, quiet, quiet + 4000), lost_share(bench, first, last)
 
 
-def test_nearly_right_packets_wrong_types_and_garbage_are_no_matter(
+def test_malformed_packets_wrong_types_and_garbage_have_no_effect(
     make_bench: Callable[..., Bench],
 ) -> None:
     for attempt in (1, 2, 3):  # what depends on the machine is measured again

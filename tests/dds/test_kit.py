@@ -156,7 +156,7 @@ class FakeLink:
             yield found
 
 
-def test_report_says_where_the_gaps_are(capsys: pytest.CaptureFixture[str]) -> None:
+def test_report_names_the_gaps(capsys: pytest.CaptureFixture[str]) -> None:
     link: Any = FakeLink([1, 2, 5, 6, 7, 9])
     assert len(list(remote.with_progress(link, None))) == 6
     assert remote.report_gaps(link) == 1
@@ -224,7 +224,7 @@ def test_remote_tool_watches_records_sets_and_shows_status(
 
 
 def equals_the_recording_of_the_appliance(bench: Bench, folder: Path) -> None:
-    """`ecdaq log check` takes it, and it says the same as what was recorded on the appliance."""
+    """`ecdaq log check` accepts it, and it equals the recording of the appliance."""
     (file,) = folder.glob("*.mcap")
     checked = bench.segment.ecdaq("log", "check", "--json", str(file))
     checked_file = json.loads(checked.stdout)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The mirror for ROS 2: its names, its fields, and that it says the same as ecdaq/sample."""
+"""The mirror for ROS 2: its names, its fields, and that its values are those of ecdaq/sample."""
 
 # No "from __future__ import annotations": cyclonedds reads the annotations as they are.
 
@@ -55,7 +55,7 @@ def test_mirror_message_and_sample_have_the_same_fields() -> None:
     assert Sample.__idl__.idl_transformed_typename == "ecdaq_msgs::msg::dds_::Sample_"
 
 
-def test_mirror_says_what_was_recorded(
+def test_mirror_equals_the_recording(
     make_bench: Callable[..., Bench],
 ) -> None:
     bench = make_bench(**{"dds.ros2_mirror": "on"})

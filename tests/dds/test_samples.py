@@ -74,7 +74,7 @@ def of_subscriber(path: Path) -> dict[tuple[int, int], tuple[int, ...]]:
         for r in found
     }
     assert len(values) == len(found)
-    for r in found:  # what needs no decoder says the same as the raw values
+    for r in found:  # fields that need no decoder equal the raw values
         raw = [int(word) for word in r["raw"].split()]
         assert float(r["adc"]) == pytest.approx(raw[2] * 3.3 / 4095, abs=1e-12)
         assert (int(r["counter"]), int(r["sample_time_ns"])) == (raw[3], raw[4])
@@ -180,7 +180,7 @@ def sessions(path: Path) -> int:
     return len({r["session"] for r in rows(path)[:-1]}) if path.exists() else 0
 
 
-def test_hostile_peer_with_our_names_and_garbage_brings_nobody_down(
+def test_hostile_peer_with_our_names_and_garbage_stops_no_program(
     make_bench: Callable[..., Bench],
 ) -> None:
     bench = make_bench()

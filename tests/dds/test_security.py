@@ -22,7 +22,7 @@ SECURED = {
     "outputs[0].timeout": "4s",
 }
 # A handshake, the exchange of keys and the matching of encrypted endpoints, on a busy machine.
-PATIENCE_S = "30"
+TIMEOUT_S = "30"
 # So long somebody listens who is to hear nothing, after others were served on the same machine.
 SILENCE_S = "5"
 
@@ -66,13 +66,13 @@ def check_sync0(bench: Bench) -> None:
     segment.start("sync0", program, *segment.options(), *edges, "--set", "sync0.window=1s")
 
     def has_result() -> bool:
-        said = segment.ecdaq("sync0", "--json", check=False)
-        return said.returncode == 0 and json.loads(said.stdout)["windows"] > 0
+        message = segment.ecdaq("sync0", "--json", check=False)
+        return message.returncode == 0 and json.loads(message.stdout)["windows"] > 0
 
     live.wait_for("a window of ecdaq-sync0", has_result, 60)
 
 
-def test_only_who_has_a_key_hears_and_only_a_commanders_key_commands(
+def test_samples_need_a_key_and_commands_need_a_commanders_key(
     make_bench: Callable[..., Bench], store: Path, tmp_path: Path
 ) -> None:
     bench = make_bench(**SECURED, **{"dds.security": str(store / "appliance")})
@@ -81,8 +81,8 @@ def test_only_who_has_a_key_hears_and_only_a_commanders_key_commands(
     assert "do not allow" not in bench.segment.log("dds")
 
     friends = {
-        "alice": start(bench, "alice", store / "alice", PATIENCE_S),
-        "bob": start(bench, "bob", store / "bob", PATIENCE_S, LED, "1"),
+        "alice": start(bench, "alice", store / "alice", TIMEOUT_S),
+        "bob": start(bench, "bob", store / "bob", TIMEOUT_S, LED, "1"),
     }
     alice, bob = (result(bench, name, process) for name, process in friends.items())
     assert alice["samples"] > 100 and alice["results"] > 0, alice
@@ -106,7 +106,7 @@ def test_only_who_has_a_key_hears_and_only_a_commanders_key_commands(
 
     status = json.loads(bench.segment.ecdaq("status", "--json").stdout)["dds"]
     assert (status["secure"], status["commands"]) == (True, True)
-    # bob commands until one is accepted; nobody else's came as far as being refused.
+    # bob commands until one is accepted; commands of others are dropped before any reply.
     assert status["commands_accepted"] >= 1
     assert status["commands_accepted"] + status["commands_refused"] <= bob["sent"]
     assert bench.segment.stop("dds") == 0
@@ -116,7 +116,7 @@ def test_only_who_has_a_key_hears_and_only_a_commanders_key_commands(
     assert any(led)
 
 
-def test_a_subscribers_key_with_a_commanders_claims_is_not_believed(
+def test_a_subscribers_key_with_a_commanders_permissions_is_rejected(
     make_bench: Callable[..., Bench], store: Path, tmp_path: Path
 ) -> None:
     """Permissions are signed: alice cannot write herself others."""
@@ -126,9 +126,9 @@ def test_a_subscribers_key_with_a_commanders_claims_is_not_believed(
         (folder / file.name).write_bytes(file.read_bytes())
         (folder / file.name).chmod(0o600)
     (folder / "permissions.p7s").write_bytes((store / "bob" / "permissions.p7s").read_bytes())
-    said = security("check", str(folder), check=False)
-    assert said.returncode == 1
-    assert "is for CN=bob, but the certificate is for CN=alice" in said.stderr
+    message = security("check", str(folder), check=False)
+    assert message.returncode == 1
+    assert "is for CN=bob, but the certificate is for CN=alice" in message.stderr
 
 
 @pytest.mark.parametrize(
@@ -148,7 +148,7 @@ def test_a_subscribers_key_with_a_commanders_claims_is_not_believed(
         ),
     ],
 )
-def test_keys_that_are_not_fit_are_one_clear_line(
+def test_unusable_keys_are_reported_in_one_line(
     make_bench: Callable[..., Bench], tmp_path: Path, spoil: Callable[[Path], None], reason: str
 ) -> None:
     folder = tmp_path / "store"
@@ -185,7 +185,7 @@ def forget_sync0(store: Path) -> None:
 
 
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl to make old keys with")
-def test_keys_from_before_a_topic_are_told_and_all_else_is_published(
+def test_keys_older_than_a_topic_are_reported_and_the_rest_is_published(
     make_bench: Callable[..., Bench], tmp_path: Path
 ) -> None:
     folder = tmp_path / "store"
@@ -195,6 +195,6 @@ def test_keys_from_before_a_topic_are_told_and_all_else_is_published(
     bench = make_bench(**{"dds.security": str(folder / "appliance")})
     check_sync0(bench)
     assert "these keys do not allow ecdaq/sync0" in bench.segment.log("dds")
-    alice = result(bench, "alice", start(bench, "alice", folder / "alice", PATIENCE_S))
+    alice = result(bench, "alice", start(bench, "alice", folder / "alice", TIMEOUT_S))
     assert alice["samples"] > 100
     assert alice["results"] == 0

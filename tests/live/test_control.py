@@ -107,8 +107,8 @@ def test_after_a_crash_ecdaqd_ends_in_order_and_the_outputs_are_safe(
     assert end_of(segment) == CONTROL_EXIT
     wait_for("LED off", lambda: terminals(segment)["led"] == 0, 60)
     line = segment.log("daemon").splitlines()
-    said = [text for text in line if text.startswith("ecdaqd: control: ")]
-    assert len(said) == 1 and "crashed with SIGSEGV (at 0x10) in cycle" in said[0]
+    message = [text for text in line if text.startswith("ecdaqd: control: ")]
+    assert len(message) == 1 and "crashed with SIGSEGV (at 0x10) in cycle" in message[0]
     status = segment.status()
     assert status["state"] == "FAILED" and status["exit_code"] == CONTROL_EXIT
     assert status["control"]["state"] == "crashed"

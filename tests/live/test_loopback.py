@@ -10,7 +10,7 @@ from collections.abc import Callable
 from segment import BIN, ROOT, Segment, recorded, wait_for
 
 CONFIG = ROOT / "app" / "examples" / "loopback" / "ecdaq.yaml"
-TELL = ROOT / "app" / "tools" / "tell-segment.py"
+SEND_LINE = ROOT / "app" / "tools" / "tell-segment.py"
 LAMPS = 0xF8
 # SAMPLE_NOT_OP, SAMPLE_FAIL_SAFE: the frame carried none of the program's values.
 UNREAL = 0x08 | 0x10
@@ -29,8 +29,8 @@ def start(segment: Segment) -> None:
     segment.wait_for_op()
 
 
-def tell(segment: Segment, line: str) -> dict[str, str]:
-    command = [sys.executable, TELL, "--control", segment.run_dir / "segment", line]
+def send_line(segment: Segment, line: str) -> dict[str, str]:
+    command = [sys.executable, SEND_LINE, "--control", segment.run_dir / "segment", line]
     answer = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     return dict(word.split("=") for word in answer.split())
 
@@ -41,11 +41,11 @@ def test_inputs_come_out_of_the_coupler_a_cycle_later(
     segment = make_segment(slaves="wago_750_354")
     start(segment)
     for on in (1, 0, 1):
-        tell(segment, f"io slave=0 slot3.1={on}")
+        send_line(segment, f"io slave=0 slot3.1={on}")
         wanted = LAMPS if on else 0
         wait_for(
             f"digital outputs {wanted:#x}",
-            lambda wanted=wanted: int(tell(segment, "io slave=0")["slot4"], 0) == wanted,
+            lambda wanted=wanted: int(send_line(segment, "io slave=0")["slot4"], 0) == wanted,
             60,
         )
     segment.wait_for_cycles(2000, 60)

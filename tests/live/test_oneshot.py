@@ -27,12 +27,12 @@ def make(make_segment: Callable[..., Segment]) -> Checked:
 
 def fire(checked: Checked, ahead: str = AHEAD, *more: str) -> int:
     """Arm the slave; the DC time at which SYNC0 is to come."""
-    said = checked.segment.ecdaq("oneshot", str(SLAVE), "--in", ahead, "--json", *more)
-    at: int = json.loads(said.stdout)["dc_time_ns"]
+    message = checked.segment.ecdaq("oneshot", str(SLAVE), "--in", ahead, "--json", *more)
+    at: int = json.loads(message.stdout)["dc_time_ns"]
     return at
 
 
-def told(checked: Checked, event: str, count: int = 1) -> list[dict[str, Any]]:
+def wait_for_events(checked: Checked, event: str, count: int = 1) -> list[dict[str, Any]]:
     def enough() -> list[dict[str, Any]]:
         found = [e for e in checked.events() if e["event"] == event]
         return found if len(found) >= count else []
@@ -41,7 +41,7 @@ def told(checked: Checked, event: str, count: int = 1) -> list[dict[str, Any]]:
 
 
 def shots(checked: Checked) -> list[dict[str, Any]]:
-    """All that was said of shots, and of pulses that nobody had asked for."""
+    """All events of shots, and of pulses without a command."""
     return [e for e in checked.events() if e["slave"] == SLAVE]
 
 
@@ -51,17 +51,17 @@ def pulses(edges: Path) -> list[int]:
     return [int(line.split()[2]) for line in lines if line.startswith(f"{SLAVE} ")]
 
 
-def test_a_shot_is_timed_against_its_command_and_one_that_does_not_come_is_told(
+def test_a_shot_is_timed_against_its_command_and_a_missing_one_is_reported(
     make_segment: Callable[..., Segment],
 ) -> None:
     checked = make(make_segment)
     segment = checked.segment
     segment.start_recorder()
     came = fire(checked, AHEAD, "--wait")
-    (event,) = told(checked, "sync0_shot")
+    (event,) = wait_for_events(checked, "sync0_shot")
     assert (event["slave"], event["value"]) == (SLAVE, came)
     late, bound = event["arg"]
-    # The pulse is exact; what it is said to be off by is the error of the clocks' map.
+    # The pulse is exact; the reported deviation is the error of the clocks' map.
     assert came in pulses(checked.edges)
     assert abs(late) <= bound < MS
     line = checked.report()["lines"][SLAVE]
@@ -71,7 +71,7 @@ def test_a_shot_is_timed_against_its_command_and_one_that_does_not_come_is_told(
 
     checked.fault(f"at=0s sync0-lost slave={SLAVE} count=1")
     lost = fire(checked)
-    (event,) = told(checked, "sync0_shot_lost")
+    (event,) = wait_for_events(checked, "sync0_shot_lost")
     assert (event["slave"], event["value"]) == (SLAVE, lost)
     line = checked.report()["lines"][SLAVE]
     assert (line["shots"], line["shots_lost"], line["verdict"]) == (2, 1, "FAIL")
@@ -79,7 +79,7 @@ def test_a_shot_is_timed_against_its_command_and_one_that_does_not_come_is_told(
     assert lost not in pulses(checked.edges)
 
     again = fire(checked)
-    assert [e["value"] for e in told(checked, "sync0_shot", 2)] == [came, again]
+    assert [e["value"] for e in wait_for_events(checked, "sync0_shot", 2)] == [came, again]
     assert [e["event"] for e in shots(checked)] == ["sync0_shot", "sync0_shot_lost", "sync0_shot"]
     # The slave beside it is periodic, and none of its pulses is missing.
     assert checked.report()["lines"][OTHER]["missing"] == 0
@@ -90,24 +90,24 @@ def test_a_shot_is_timed_against_its_command_and_one_that_does_not_come_is_told(
     assert [(m.shot_dc_ns, m.missing) for m in kept] == [(came, 0), (lost, 1), (again, 0)]
 
 
-def test_another_command_withdraws_a_shot_and_a_check_that_starts_late_blames_nobody(
+def test_another_command_cancels_a_shot_and_a_check_that_starts_late_reports_nothing(
     make_segment: Callable[..., Segment],
 ) -> None:
     checked = make(make_segment)
     segment = checked.segment
-    withdrawn = fire(checked, "30s")
+    cancelled = fire(checked, "30s")
     first = fire(checked, AHEAD, "--wait")
-    told(checked, "sync0_shot")
-    # Nobody listens to this one, which the ring of the master still tells of.
+    wait_for_events(checked, "sync0_shot")
+    # No check runs for this one, which is still in the ring of the master.
     segment.stop("sync0", signal.SIGKILL)
-    unheard = fire(checked, AHEAD, "--wait")
-    wait_for("its pulse", lambda: unheard in pulses(checked.edges), 60)
+    unchecked = fire(checked, AHEAD, "--wait")
+    wait_for("its pulse", lambda: unchecked in pulses(checked.edges), 60)
     # And this one was commanded before the check began, to come when it listens.
     last = fire(checked, "10s")
     checked.start_check()
     pid = segment.processes["sync0"].pid
     wait_for("the second check", lambda: checked.report().get("pid") == pid, 60)
-    assert [e["value"] for e in told(checked, "sync0_shot")] == [last]
+    assert [e["value"] for e in wait_for_events(checked, "sync0_shot")] == [last]
     assert [e["event"] for e in shots(checked)] == ["sync0_shot"]
-    assert pulses(checked.edges) == [first, unheard, last]
-    assert withdrawn not in pulses(checked.edges)
+    assert pulses(checked.edges) == [first, unchecked, last]
+    assert cancelled not in pulses(checked.edges)

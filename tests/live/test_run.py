@@ -85,7 +85,7 @@ def test_a_minute_at_one_millisecond_loses_and_invents_nothing(
 
 
 def check_values(samples: dict[int, Any]) -> None:
-    """The counter went on by as many as the cycle; the ADC holds the 1 Hz sine of the generator."""
+    """The counter advanced as the cycle did; the ADC holds the 1 Hz sine of the generator."""
     numbers = sorted(samples)
     for before, after in itertools.pairwise(numbers):
         assert (samples[after].counter - samples[before].counter) % 65536 == (
@@ -153,7 +153,7 @@ def test_a_stopped_reader_of_the_ring_changes_nothing_for_the_cycle(
 
 
 def test_the_cycle_thread_is_alone_with_its_rights(make_segment: Callable[..., Segment]) -> None:
-    """SCHED_FIFO where it is to be had; the daemon's other threads keep their ordinary class."""
+    """SCHED_FIFO where permitted; the daemon's other threads keep the default policy."""
     segment = make_segment(settings={"cycle.priority": "70"})
     segment.start_all()
     daemon = segment.processes["daemon"].pid
@@ -169,7 +169,7 @@ def test_the_cycle_thread_is_alone_with_its_rights(make_segment: Callable[..., S
     assert others and all("SCHED_OTHER" in text for text in others)
 
 
-def test_an_output_set_by_the_operator_is_on_the_wire_in_the_cycle_it_is_told(
+def test_an_output_set_by_the_operator_is_on_the_wire_in_the_cycle_printed(
     make_segment: Callable[..., Segment],
 ) -> None:
     segment = make_segment()

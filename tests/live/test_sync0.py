@@ -78,7 +78,7 @@ def silent_cycles(dump: Path, edges: Path, slave: int, other: int) -> list[int]:
     return sorted(due[dc] for dc in seen[other] - seen[slave] if dc in due and dc < end)
 
 
-def test_pulses_that_do_not_come_are_told_with_slave_and_cycle(
+def test_missing_pulses_are_reported_with_slave_and_cycle(
     make_segment: Callable[..., Segment],
 ) -> None:
     checked = Checked(make_segment())
@@ -91,10 +91,10 @@ def test_pulses_that_do_not_come_are_told_with_slave_and_cycle(
     assert [e for e in checked.events() if e["event"] in pulses] == []
     checked.fault("at=0s sync0-lost slave=1 count=3")
 
-    def told() -> list[dict[str, Any]]:
+    def missing() -> list[dict[str, Any]]:
         return [e for e in checked.events() if e["event"] == "sync0_missing"]
 
-    events = wait_for("a missing pulse", told, 120)
+    events = wait_for("a missing pulse", missing, 120)
     assert len(events) == 1
     assert events[0]["slave"] == 1
     assert events[0]["arg"][0] == 3
@@ -116,7 +116,7 @@ def test_pulses_that_do_not_come_are_told_with_slave_and_cycle(
     assert names.count("sync0_missing") == 1
 
 
-def test_a_slave_that_loses_power_is_lost_and_the_check_may_die_without_harm(
+def test_a_slave_that_loses_power_is_lost_and_the_check_may_be_killed(
     make_segment: Callable[..., Segment],
 ) -> None:
     checked = Checked(make_segment())
@@ -140,7 +140,7 @@ def test_a_slave_that_loses_power_is_lost_and_the_check_may_die_without_harm(
     assert segment.stop("sync0") == 0
 
 
-def test_a_pipe_takes_the_edges_and_its_reader_may_go_and_come_back(
+def test_edges_go_to_a_pipe_whose_reader_may_be_replaced(
     make_segment: Callable[..., Segment],
 ) -> None:
     segment = make_segment()
@@ -160,7 +160,7 @@ def test_a_pipe_takes_the_edges_and_its_reader_may_go_and_come_back(
 
     first = read_edges(200)
     before = segment.status()
-    segment.wait_for_cycles(100, 60)  # with nobody at the other end
+    segment.wait_for_cycles(100, 60)  # with no reader
     second = read_edges(200)
     after = segment.status()
     for edges in (first, second):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The first lines of a user's trouble: one line, what and why, and an exit code that says which."""
+"""Errors of a first start: one line, what and why, and an exit code of its kind."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ def run_daemon(segment: Segment, *more: str) -> subprocess.CompletedProcess[str]
 
 
 def only_line(got: subprocess.CompletedProcess[str]) -> str:
-    """The one line of an error; warnings about missing real-time rights may stand before it."""
+    """The one line of an error; warnings about missing real-time rights may precede it."""
     assert got.returncode != 0
     lines = [line for line in got.stderr.splitlines() if line.strip()]
-    assert lines, "nothing was said"
+    assert lines, "no message"
     assert lines[-1].startswith("ecdaqd: ")
     return lines[-1]
 
@@ -53,7 +53,7 @@ def test_without_the_right_to_raw_sockets_the_line_names_it(
     assert "CAP_NET_RAW" in only_line(got)
 
 
-def test_a_bus_without_a_slave_says_so(make_segment: Callable[..., Segment]) -> None:
+def test_a_bus_without_a_slave_is_reported(make_segment: Callable[..., Segment]) -> None:
     segment = make_segment()
     assert "no slave" in only_line(run_daemon(segment))
 
@@ -83,7 +83,7 @@ def test_a_wrong_slave_is_named_by_position_and_identity(
 
 
 @pytest.mark.parametrize("wanted", [1, 3])
-def test_a_slave_too_many_or_too_few_is_said(
+def test_a_wrong_number_of_slaves_is_reported(
     make_segment: Callable[..., Segment], wanted: int
 ) -> None:
     segment = make_segment()
@@ -93,7 +93,7 @@ def test_a_slave_too_many_or_too_few_is_said(
     assert "2" in line and str(wanted) in line
 
 
-def test_a_second_instance_is_refused_and_the_first_goes_on(
+def test_a_second_instance_is_refused_and_the_first_continues(
     make_segment: Callable[..., Segment],
 ) -> None:
     segment = make_segment()
@@ -103,7 +103,7 @@ def test_a_second_instance_is_refused_and_the_first_goes_on(
     assert segment.wait_for_cycles(1000, 30)["state"] == "OP"
 
 
-def test_a_second_segment_at_one_interface_is_refused_and_the_first_goes_on(
+def test_a_second_segment_at_one_interface_is_refused_and_the_first_continues(
     make_segment: Callable[..., Segment],
 ) -> None:
     segment = make_segment()

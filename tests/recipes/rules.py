@@ -74,7 +74,7 @@ def soem_pin(recipe: Recipe, lock: Path) -> list[str]:
     wanted = dict(re.findall(r"^(\w+) = (.+)$", lock.read_text(), re.MULTILINE))
     pairs = (("package", "PYPI_PACKAGE"), ("version", "PYPI_VERSION"), ("sha256", "PYPI_SHA256"))
     return [
-        f"{recipe.file}: {variable} is {recipe.value(variable)}, {lock.name} says {wanted[name]}"
+        f"{recipe.file}: {variable} is {recipe.value(variable)}, {lock.name} has {wanted[name]}"
         for name, variable in pairs
         if recipe.value(variable) != wanted[name]
     ]
@@ -100,7 +100,7 @@ def boot_files(recipe: Recipe) -> list[str]:
 
 
 def field_order(name: str, text: str) -> list[str]:
-    """Fields stand in the order of the style guide; spaces round the sign, double quotes."""
+    """Fields are in the order of the style guide; spaces round the sign, double quotes."""
     found = []
     last = -1
     for number, line in enumerate(text.splitlines(), 1):

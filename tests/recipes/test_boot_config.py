@@ -71,7 +71,7 @@ def public_key(tmp_path: Path) -> str:
     return key.with_suffix(".pub").read_text()
 
 
-def test_without_a_folder_the_built_in_settings_hold(place: Place) -> None:
+def test_without_a_folder_the_built_in_settings_are_used(place: Place) -> None:
     place.source.rmdir()
     output = place.run()
     assert "no ecdaq/ folder on the boot partition" in output
@@ -102,7 +102,7 @@ def test_a_broken_file_is_named_and_not_used(place: Place) -> None:
 
 
 @pytest.mark.parametrize("text", ["", "x" * 70000])
-def test_an_empty_or_huge_file_is_left_out(place: Place, text: str) -> None:
+def test_an_empty_or_huge_file_is_ignored(place: Place, text: str) -> None:
     (place.source / "ecdaq.yaml").write_text(text)
     assert "ignored" in place.run()
     assert "period: 1ms" in (place.target / "ecdaq.yaml").read_text()

@@ -11,7 +11,7 @@ from graph import Graph, Task
 from metadata import Metadata
 
 
-def test_results_that_were_not_used_for_long_make_room(metadata: Metadata, tmp_path: Path) -> None:
+def test_results_not_used_for_long_are_removed(metadata: Metadata, tmp_path: Path) -> None:
     folder = tmp_path / "objects" / "ecdaq-image"
     for name in ("do_rootfs", "do_rootfs_base"):
         for age in range(RESULTS_KEPT + 2):
@@ -25,7 +25,7 @@ def test_results_that_were_not_used_for_long_make_room(metadata: Metadata, tmp_p
     assert left == wanted
 
 
-def test_a_disk_takes_the_room_of_what_is_written_on_it(tmp_path: Path) -> None:
+def test_a_disk_image_takes_the_space_of_its_data(tmp_path: Path) -> None:
     source = tmp_path / "source"
     source.mkdir()
     (source / "disk.img").write_bytes(bytes(16 << 20))

@@ -53,7 +53,7 @@ def test_boot_files_are_where_wic_looks(metadata: Metadata) -> None:
     assert rules.boot_files(image) == []
 
 
-def test_both_roads_build_the_same_soem(metadata: Metadata) -> None:
+def test_build_sh_and_the_image_build_the_same_soem(metadata: Metadata) -> None:
     soem = metadata.recipes["soem"]
     third_party = TOP / "app" / "third_party"
     assert rules.soem_pin(soem, third_party / "soem.lock") == []
@@ -66,7 +66,7 @@ def test_the_tasks_of_an_image_have_an_order(metadata: Metadata) -> None:
     assert len(hashes) == 2
 
 
-def test_what_the_machine_does_not_matter_for_is_made_once(tmp_path: Path) -> None:
+def test_what_does_not_depend_on_the_machine_is_built_once(tmp_path: Path) -> None:
     """Packages have the same hash on both machines; only the image itself differs."""
     hashes = []
     for machine in MACHINES:
@@ -79,7 +79,7 @@ def test_what_the_machine_does_not_matter_for_is_made_once(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("path", sorted((TOP / "recipes").rglob("*.bb")), ids=lambda p: p.stem)
-def test_fields_stand_in_order(path: Path) -> None:
+def test_fields_are_in_order(path: Path) -> None:
     assert rules.field_order(path.name, path.read_text()) == []
 
 
@@ -93,7 +93,7 @@ def test_no_registry_is_named() -> None:
     assert found == []
 
 
-def test_an_error_in_a_recipe_is_told_with_file_and_line(tmp_path: Path) -> None:
+def test_an_error_in_a_recipe_is_reported_with_file_and_line(tmp_path: Path) -> None:
     top = tree_copy(tmp_path)
     broken = top / "recipes" / "recipes-app" / "ecdaq" / "ecdaq_0.1.0.bb"
     broken.write_text(broken.read_text() + "\nthis is no assignment\n")
@@ -112,7 +112,7 @@ def test_an_error_in_a_recipe_is_told_with_file_and_line(tmp_path: Path) -> None
     ],
     ids=["command line", "function of the recipe", "function of the class"],
 )
-def test_a_change_in_what_the_disk_holds_makes_the_image_anew(
+def test_a_change_of_the_disk_contents_rebuilds_the_image(
     tmp_path: Path, name: str, old: str, new: str
 ) -> None:
     # Trees of their own: BitBake remembers files by their path.

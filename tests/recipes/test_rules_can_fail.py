@@ -126,7 +126,7 @@ def test_two_fragments_that_contradict_are_found(tmp_path: Path) -> None:
     assert differences(tmp_path / "config", [tmp_path / "a.cfg", tmp_path / "b.cfg"]) != []
 
 
-def test_a_fragment_line_that_says_nothing_is_an_error(tmp_path: Path) -> None:
+def test_a_fragment_line_without_a_symbol_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "a.cfg").write_text("CONFIG-A=y\n")
     with pytest.raises(ValueError, match=r"a\.cfg:1"):
         differences(tmp_path / "a.cfg", [])
@@ -168,7 +168,7 @@ def test_a_layout_is_read(tmp_path: Path) -> None:
         "something else",
     ],
 )
-def test_a_layout_that_is_wrong_is_told_by_line_or_file(tmp_path: Path, line: str) -> None:
+def test_an_error_in_a_layout_is_reported_with_line_or_file(tmp_path: Path, line: str) -> None:
     (tmp_path / "a.wks").write_text(GOOD + line + "\n")
     with pytest.raises(wks.WksError, match=r"a\.wks"):
         wks.parse(tmp_path / "a.wks")

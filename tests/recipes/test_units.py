@@ -21,7 +21,7 @@ def exit_code(name: str) -> str:
     return re.findall(rf"EXIT_CODE_{name} = (\d+),", text)[0]
 
 
-def test_the_master_is_not_started_again_after_it_was_told_to_stop_or_control_crashed() -> None:
+def test_the_master_is_not_restarted_after_a_requested_stop_or_a_crash_of_control() -> None:
     assert values("ecdaqd.service", "Restart") == ["always"]
     codes = [exit_code("OVERRUN"), exit_code("CONTROL")]
     assert values("ecdaqd.service", "RestartPreventExitStatus") == codes

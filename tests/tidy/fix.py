@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Let the formatters mend what they can: ./build.sh lint --fix."""
+"""Run the formatters on the tree: ./build.sh lint --fix."""
 
 from __future__ import annotations
 

@@ -212,7 +212,7 @@ def wing_may_include(wing: str, module: str) -> bool:
 
 
 def rule_known_module(source: Source) -> Iterable[Finding]:
-    """Every folder of C below app/ stands in the include table."""
+    """Every folder of C below app/ is in the include table."""
     if source.is_app_c and source.module not in INCLUDE_TABLE:
         yield Finding(source.path, 1, f"app/{source.module}/ is not in the include table")
 
@@ -303,7 +303,7 @@ def rule_function_size(source: Source) -> Iterable[Finding]:
 
 
 def rule_spdx(source: Source) -> Iterable[Finding]:
-    """The licence stands in the first line, or the second of a script."""
+    """The licence is in the first line, or the second of a script."""
     name = source.path.rsplit("/", 1)[-1]
     suffixes = (".c", ".h", ".py", ".sh", ".cmake", ".yaml", ".yml", ".bb", ".inc", ".toml")
     if not name.endswith(suffixes) and name not in ("CMakeLists.txt", "run"):
@@ -331,7 +331,7 @@ def rule_foreign_code(source: Source) -> Iterable[Finding]:
 
 
 def rule_patch_reason(source: Source) -> Iterable[Finding]:
-    """A patch is numbered and says why it is there before it says what it does."""
+    """A patch is numbered, and its text has the reason before the change."""
     if not source.path.endswith(".patch"):
         return
     name = source.path.rsplit("/", 1)[-1]
@@ -356,7 +356,7 @@ def rule_test_waits(source: Source) -> Iterable[Finding]:
 
 
 def python_sleeps(source: Source) -> Iterable[Finding]:
-    """time.sleep() outside a function that polls and says so by its name."""
+    """time.sleep() outside a function that polls, by its name."""
     tree = ast.parse(source.text)
     polling = [
         range(node.lineno, (node.end_lineno or node.lineno) + 1)

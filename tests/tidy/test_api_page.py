@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The page of the programming interface says what the installed headers say."""
+"""The page of the programming interface is generated from the installed headers."""
 
 from __future__ import annotations
 

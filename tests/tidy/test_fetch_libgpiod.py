@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""fetch-libgpiod.sh unpacks what the lock file pins, once, and says in one line why it cannot."""
+"""fetch-libgpiod.sh unpacks what the lock file pins, once; an error is one line with its reason."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""fetch-soem.sh unpacks what the lock file pins, once, and says in one line why it cannot."""
+"""fetch-soem.sh unpacks what the lock file pins, once; an error is one line with its reason."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def test_a_second_run_does_nothing(place: Place) -> None:
     assert (place.target / ".stamp").stat().st_ino == before
 
 
-def test_a_new_patch_unpacks_anew_and_is_applied(place: Place) -> None:
+def test_after_a_new_patch_the_sources_are_unpacked_again_and_patched(place: Place) -> None:
     assert place.fetch("--archive", place.archive).returncode == 0
     (place.patches / "0001-count-from-two.patch").write_text(PATCH)
     assert place.fetch("--archive", place.archive).returncode == 0
@@ -142,7 +142,7 @@ def test_a_registry_that_gives_another_archive_is_refused(place: Place) -> None:
     assert not place.target.exists()
 
 
-def test_an_unreachable_registry_is_said(place: Place) -> None:
+def test_an_unreachable_registry_is_reported(place: Place) -> None:
     nowhere = "http://127.0.0.1:9/simple"
     result = place.fetch(
         PIP_INDEX_URL=nowhere, PIP_FIND_LINKS="", PIP_RETRIES="0", PIP_CONFIG_FILE=os.devnull
@@ -151,7 +151,7 @@ def test_an_unreachable_registry_is_said(place: Place) -> None:
     assert not place.target.exists()
 
 
-def test_a_python_without_pip_is_said(place: Place) -> None:
+def test_a_python_without_pip_is_reported(place: Place) -> None:
     expect_one_line(place.fetch(PYTHON="/bin/false"), "has no pip")
 
 
@@ -162,7 +162,7 @@ def test_a_missing_tool_is_named(place: Place) -> None:
     expect_one_line(place.fetch("--archive", place.archive, PATH=str(tools)), "patch is not")
 
 
-def test_a_damaged_archive_is_said(place: Place) -> None:
+def test_a_damaged_archive_is_reported(place: Place) -> None:
     place.archive.write_bytes(place.archive.read_bytes()[:60])
     place.write_lock(hashlib.sha256(place.archive.read_bytes()).hexdigest())
     result = place.fetch("--archive", place.archive)

@@ -19,7 +19,7 @@ PLACE = "/" + "work/main/x"
 
 @dataclass(frozen=True)
 class Case:
-    """A rule, where the file stands, and what is wrong and right there."""
+    """A rule, the path of the file, and what is wrong and right there."""
 
     rule: rules.Rule
     path: str

@@ -15,7 +15,7 @@ import pytest
 from project import ROOT
 
 SCRIPT = ROOT / "app" / "tools" / "run-segment.sh"
-# A program that says when it starts and ends, and with what; SIGTERM ends it.
+# A program that logs its start and end, with the code; SIGTERM ends it.
 STAND_IN = """#!/bin/bash
 trap 'echo "end $(basename "$0")" >> "$LOG"; exit 0' TERM
 trap 'echo "interrupted $(basename "$0")" >> "$LOG"' INT
@@ -25,7 +25,7 @@ echo "start $(basename "$0") $*" >> "$LOG"
 {body}
 while :; do sleep 0.05; done
 """
-# Ends only when the others run: else they could be ended before they can say so.
+# Ends only when the others run: else they could be ended before they have logged it.
 WHEN_RUN = """until [ "$(grep -c '^start' "$LOG")" -ge {count} ]; do sleep 0.01; done
 """
 WHEN_ALL_RUN = WHEN_RUN.format(count=5)
@@ -89,7 +89,7 @@ class Bench:
 def bench(tmp_path: Path) -> Iterator[Bench]:
     how = ["unshare", "--net"] if os.geteuid() == 0 else ["unshare", "-r", "--net"]
     if subprocess.run([*how, "true"], capture_output=True, check=False).returncode != 0:
-        pytest.skip("no network namespace of one's own is to be had here")
+        pytest.skip("cannot create a network namespace here")
     yield Bench(tmp_path)
 
 
@@ -218,7 +218,7 @@ def test_dds_is_published_on_loopback_in_a_domain_and_with_a_tag_of_ones_own(ben
     assert f"ecdaq-remote --interface lo --domain 230 --tag {tag} watch" in err
 
 
-def test_dds_is_done_as_the_configuration_says_where_it_does(bench: Bench) -> None:
+def test_a_dds_section_of_the_configuration_is_used(bench: Bench) -> None:
     config = bench.folder / "mine.yaml"
     config.write_text("dds:\n  enable: on\n  interface: eth7\n")
     bench.make_it("ecdaqd", WHEN_ALL_RUN + "exit 0")
@@ -242,7 +242,7 @@ def test_without_dds_there_is_none(bench: Bench) -> None:
         ("#!/bin/sh\necho 'ecdaq-dds: why not' >&2\nexit 3\n", "ecdaq-dds: why not"),
     ],
 )
-def test_where_dds_cannot_be_had_one_line_says_so_and_the_run_goes_on(
+def test_an_unavailable_dds_is_one_line_and_the_run_continues(
     bench: Bench, program: str | None, reason: str
 ) -> None:
     if program is None:
@@ -292,7 +292,7 @@ def test_the_simulated_pulses_are_checked(bench: Bench) -> None:
         ("cycle:\n  period: 1ms\nsync0:\n  enable: off\nrecord:\n  enable: on\n", False),
     ],
 )
-def test_the_check_is_done_as_the_configuration_says_where_it_does(
+def test_a_sync0_section_of_the_configuration_is_used(
     bench: Bench, section: str, is_simulated: bool
 ) -> None:
     config = bench.folder / "mine.yaml"
@@ -310,7 +310,7 @@ def test_without_the_check_no_edges_are_written(bench: Bench) -> None:
     assert not any("--edges" in line for line in bench.log)
 
 
-def test_where_the_check_is_missing_one_line_says_so_and_the_run_goes_on(bench: Bench) -> None:
+def test_an_unavailable_check_is_one_line_and_the_run_continues(bench: Bench) -> None:
     (bench.bin / "ecdaq-sync0").unlink()
     bench.make_it("ecdaqd", WHEN_RUN.format(count=3) + "exit 0")
     run = bench.start("--seconds", "1", "--no-dds")
@@ -319,16 +319,16 @@ def test_where_the_check_is_missing_one_line_says_so_and_the_run_goes_on(bench: 
     assert reports(err) == ["-- no check of SYNC0: ecdaq-sync0 is not built"]
 
 
-@pytest.mark.parametrize(("code", "said"), [(0, []), (1, ["-- ecdaq-sync0 ended with 1"])])
+@pytest.mark.parametrize(("code", "message"), [(0, []), (1, ["-- ecdaq-sync0 ended with 1"])])
 def test_a_check_that_ends_by_itself_ends_nothing_else(
-    bench: Bench, code: int, said: list[str]
+    bench: Bench, code: int, message: list[str]
 ) -> None:
     bench.make_it("ecdaq-sync0", f"exit {code}")
     run = bench.start("--no-dds")
     bench.wait_for_log(*(f"start {name}" for name in PROGRAMS if name != "ecdaq-dds"))
     assert run.stderr is not None
     assert run.stderr.readline().startswith("-- starting")
-    assert [run.stderr.readline().rstrip() for _ in said] == said
+    assert [run.stderr.readline().rstrip() for _ in message] == message
     assert run.poll() is None
     assert not ends(bench)
     os.killpg(run.pid, signal.SIGINT)

@@ -52,7 +52,7 @@ def heads(outcome: Outcome) -> list[str]:
     return [failure.splitlines()[0] for failure in outcome.failures]
 
 
-def test_ctest_results_are_told_apart(own_build: Path) -> None:
+def test_ctest_results_are_counted_by_kind(own_build: Path) -> None:
     (own_build / "CMakeLists.txt").write_text(CTEST)
     build = own_build / "build" / "release"
     subprocess.run(["cmake", "-S", own_build, "-B", build], check=True, capture_output=True)
@@ -63,7 +63,7 @@ def test_ctest_results_are_told_apart(own_build: Path) -> None:
     assert outcome.skips == ["unit release: a.skip: no such NIC"]
 
 
-def test_pytest_results_are_told_apart(own_build: Path) -> None:
+def test_pytest_results_are_counted_by_kind(own_build: Path) -> None:
     (own_build / "tests" / "cli").mkdir(parents=True)
     (own_build / "tests" / "cli" / "test_sample.py").write_text(PYTEST)
     outcome = run_tests.run_pytest(run_tests.pytest("cli", "release"), OPTIONS)
@@ -141,7 +141,9 @@ def test_an_image_that_cannot_be_made_fails_its_suite(
     assert "no kernel for a" in outcome.failures[0]
 
 
-def test_without_root_no_image_is_made_and_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_root_no_image_is_built_and_the_reason_is_printed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(os, "geteuid", lambda: 1000)
     options = argparse.Namespace(only="", fail_fast=False, fuzz_seconds=1, groups=[])
     outcome = run_tests.run_group("boot", BrokenBuilder(), options)

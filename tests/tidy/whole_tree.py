@@ -41,7 +41,7 @@ def expand_variables(text: str) -> str:
 
 
 def doubled_test_names(files: Sequence[Source]) -> Iterable[Finding]:
-    """A test's name stands for one test in the whole project."""
+    """A test's name is unique in the whole project."""
     seen: dict[str, str] = {}
     for source in files:
         if not source.path.startswith("tests/") or not source.path.endswith(".c"):

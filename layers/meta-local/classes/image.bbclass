@@ -45,7 +45,7 @@ python do_rootfs_base() {
         ["mmdebstrap", "--mode=root", "--variant=essential", "--format=tar",
          "--architectures=" + d.getVar("DISTRO_ARCH"),
          "--include=" + ",".join(d.getVar("IMAGE_PREINSTALL").split()), *options,
-         # Host keys made here would be thrown away, and emulated they take a minute.
+         # Host keys made here would be deleted, and take a minute under emulation.
          "--essential-hook=mkdir -p $1/etc/ssh && cd $1/etc/ssh && "
          "touch ssh_host_rsa_key ssh_host_ecdsa_key ssh_host_ed25519_key",
          "--aptopt=APT::Install-Recommends \"false\"", "--aptopt=Acquire::Retries \"3\"",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From a root file system to the files of an image: what make-disk.sh lays together, and the papers
+"""From a root file system to the files of an image: the parts for make-disk.sh, and the documents
 that belong to it (package list, bill of materials, checksums)."""
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Inputs:
 
 
 def _fill_boot(inputs: Inputs, out: Path, boot: Path) -> None:
-    """The boot partition: IMAGE_BOOT_FILES ("source;target"; bare names stand beside the image)."""
+    """The boot partition: IMAGE_BOOT_FILES ("source;target"; bare names are beside the image)."""
     for entry in inputs.boot_files:
         source, _, target = entry.partition(";")
         found = out / source

@@ -87,7 +87,7 @@ while read -r word a b c d e; do
 	esac
 done < "$disk/plan"
 
-# One aligned block more: the second copy of a GPT stands at the end.
+# One aligned block more: the second copy of a GPT is at the end.
 truncate -s $((offset + align)) "$image"
 sfdisk --quiet "$image" < "$disk/table"
 bmaptool --quiet create -o "${image%.img}.bmap" "$image"

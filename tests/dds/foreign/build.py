@@ -25,7 +25,7 @@ BUILD_SECONDS = 1200
 
 
 class Unavailable(Exception):  # noqa: N818 - not an error: a reason
-    """Why a foreign subscriber cannot be had here."""
+    """Why a foreign subscriber cannot be built here."""
 
 
 def cache() -> Path:

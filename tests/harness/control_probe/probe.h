@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A control program that does what the test that loads it says. */
+/* A control program configured by the test that loads it. */
 #ifndef TESTS_HARNESS_CONTROL_PROBE_PROBE_H
 #define TESTS_HARNESS_CONTROL_PROBE_PROBE_H
 

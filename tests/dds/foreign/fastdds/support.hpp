@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * What fastddsgen would make: how Fast DDS reads a message, without type information. fastddsgen is
- * not used because it brings Java along. Fast DDS 2 and 3 want the same under other names. Nothing is
+ * not used because it brings Java along. Fast DDS 2 and 3 have the same under other names. Nothing is
  * written here, so nothing is serialised.
  */
 #pragma once
