@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from measure.page import NotMeasuredError, write_page
+from measure.page import NotMeasuredError, write_index, write_page
 from measure.subjects import SUBJECTS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -56,6 +56,7 @@ def main(arguments: Sequence[str]) -> int:
         except NotMeasuredError as why:
             print(f"build.sh: measure: {subject.name}: {why}", file=sys.stderr)
             failed = True
+    write_index(ROOT, SUBJECTS.values())
     return 1 if failed else 0
 
 

@@ -18,6 +18,7 @@ VERBS = {
     "oneshot": "SLAVE|all",
     "sdo": "read|write",
     "events": "",
+    "sync0": "[calibrate]",
     "histogram": "wake|",
     "doctor": "",
     "clear": "",
@@ -37,7 +38,7 @@ READING = [
 
 def test_help_names_every_verb_and_the_exit_codes() -> None:
     text = works(ecdaq(None, "--help"))
-    for verb in [*VERBS, "log"]:
+    for verb in [*VERBS, "log", "security"]:
         assert f"\n  {verb} " in text
     assert "\n  16  no ecdaqd" in text
     assert max(len(line) for line in text.splitlines()) <= 100

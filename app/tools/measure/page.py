@@ -7,7 +7,7 @@ import datetime
 import os
 import platform
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +15,14 @@ NOTE = (
     "Timings of an emulated or shared machine show that a function works, not how fast it is on\n"
     "the hardware it is made for. Counts (lost, bad, gaps, differences) hold everywhere."
 )
+
+INDEX = """# Measurement results
+
+One page per subject, written by `./build.sh measure`, as is this list: the command, the commit,
+the machine, the date, and what was measured. The manuals state bounds and commands; figures of
+one machine belong here.
+
+"""
 
 
 class NotMeasuredError(Exception):
@@ -55,6 +63,20 @@ def commit(root: Path) -> str:
 def git(root: Path, *words: str) -> str:
     result = subprocess.run(["git", *words], cwd=root, capture_output=True, text=True, check=True)
     return result.stdout.strip()
+
+
+def write_index(root: Path, subjects: Iterable[Subject]) -> None:
+    """Link the pages that there are, and name the subjects without one."""
+    folder = root / "app" / "doc" / "results"
+    lines = []
+    for subject in subjects:
+        page = folder / f"{subject.name}.md"
+        if page.exists():
+            title = page.read_text().splitlines()[0].removeprefix("# ")
+            lines.append(f"- [{title}]({page.name})")
+        else:
+            lines.append(f"- {subject.title}: no page yet, `./build.sh measure {subject.name}`")
+    (folder / "README.md").write_text(INDEX + "\n".join(lines) + "\n")
 
 
 def write_page(root: Path, subject: Subject) -> Path:
