@@ -412,7 +412,7 @@ def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument(
         "--fuzz-seconds", type=int, default=int(os.environ.get("ECDAQ_FUZZ_SECONDS", "5"))
     )
-    # build.sh asks for this before it prepares anything.
+    # build.sh calls this before it prepares anything.
     parser.add_argument("--check", action="store_true", help=argparse.SUPPRESS)
     parser.set_defaults(fail_fast=False)
     return parser.parse_args(arguments)

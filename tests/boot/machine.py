@@ -215,7 +215,7 @@ class Machine:
         ]
 
     def try_run(self, command: str, seconds: float = COMMAND_S) -> subprocess.CompletedProcess[str]:
-        """A shell command in the guest; its exit code is the caller's to judge."""
+        """A shell command in the guest; the caller checks its exit code."""
         return subprocess.run(
             [*self.ssh_command(), command],
             capture_output=True,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What was built, looked at as files: nothing is booted. For the Raspberry Pi this is all that can
+"""Inspects what was built as files: nothing is booted. For the Raspberry Pi this is all that can
 be shown without a board; app/doc/how-to/image.md lists what only a board can show."""
 
 from __future__ import annotations

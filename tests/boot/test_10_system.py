@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A machine with a key and a name on its boot partition comes up as it is meant to."""
+"""A machine with a key and a name on its boot partition boots as configured."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The bus comes to OP by itself, on its own core, and every cycle is recorded.
+"""The bus reaches OP without an operator, on its own core, and every cycle is recorded.
 
 In guest time (app/tools/image/virt.sh): the guest's clock counts instructions, so that a cycle of
 1 ms holds whatever the host does. All times printed here are guest time, not those of a board.
@@ -145,7 +145,7 @@ def test_its_memory_is_locked(machine: Machine) -> None:
 
 
 def test_no_interrupt_but_the_timer_comes_to_that_core(machine: Machine) -> None:
-    """All that devices raise goes to the housekeeping core; what the kernel manages itself may name
+    """Device interrupts go to the housekeeping core; those the kernel manages itself may name
     others, but goes nowhere else (isolcpus=managed_irq)."""
     lists = machine.run(
         "for i in /proc/irq/[0-9]*; do echo ${i##*/} $(cat $i/effective_affinity_list); done"

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The power goes at random moments: the machine boots again by itself, its file system is repaired
-by its journal alone, and the recordings open.
+"""The power fails at random moments: the machine boots again, its file system is repaired by
+its journal alone, and the recordings open.
 
 In guest time, so that the moments are spread over the guest's second and not over the host's load.
 ECDAQ_POWER_CUTS: how many (3; the table in app/doc/how-to/image.md is of 20). ECDAQ_POWER_CUT_SEED.

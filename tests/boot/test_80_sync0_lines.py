@@ -297,7 +297,7 @@ def test_a_line_in_use_a_wrong_name_and_a_wrong_number_are_one_line_each(machine
 
 
 def test_a_missing_permission_for_a_chip_is_reported(machine: Machine) -> None:
-    """A person without rights, and the service itself when the rule for /dev is missing."""
+    """A user without permission, and the service when the udev rule is missing."""
     no_right = "no permission to open /dev/gpiochip*: be root or in their group"
     assert by_hand(machine, f"{CHIP}:0", who="") == [
         f"ecdaq-sync0: line '{CHIP}:0' of slave 0: {no_right}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A segment on the host whose SYNC0 pins are wired to GPIO inputs of the machine, and the books of
+"""A segment on the host whose SYNC0 pins are wired to GPIO inputs of the machine, and the logs of
 both sides: which pulse left the segment, which edge the kernel in the machine timed."""
 
 from __future__ import annotations
@@ -173,7 +173,7 @@ class Books:
 
     def silent(self, slave: int, other: int) -> list[int]:
         """Cycles in which @other's pulse left the segment and @slave's did not, as far as both
-        are in the books."""
+        are in the logs."""
         seen = {p.dc_ns for p in self.pulses[slave]}
         until = min(pulses[-1].dc_ns for pulses in self.pulses.values())
         return sorted(

@@ -11,7 +11,7 @@ import ecdaq
 
 
 def command(link: ecdaq.Link, asked: dict) -> dict:
-    """Send as asked, with all that is wrong in it; the first answer to it."""
+    """Send the command as given, with its errors; the first reply to it."""
     before = max((s.cycle for s in link.subscribe(0.005)), default=0)
     started = time.monotonic()
     sent_ns = time.monotonic_ns()

@@ -69,7 +69,7 @@ static dds_entity_t topic(const struct pc *pc, const dds_topic_descriptor_t *typ
 	return dds_create_topic(pc->participant, type, name, NULL, NULL);
 }
 
-/* A refusal of one entity (by permissions) is no reason to give up: it is what is looked at. */
+/* An entity rejected by permissions is not an error: it is the result under test. */
 static void open_all(struct pc *pc, int is_commander)
 {
 	dds_qos_t *qos = reliable();

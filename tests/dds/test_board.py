@@ -17,7 +17,7 @@ KEEP_SIZE, PUNCH_HOLE = 1, 2
 
 
 def take_board(bench: Bench) -> int:
-    """What the master gives to whoever may connect."""
+    """What the master sends to a process that may connect."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as link:
         link.settimeout(10)
         link.connect(str(bench.segment.run_dir / "commands-remote"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The Python kit by itself: its types are those of the IDL, its counting is right."""
+"""The Python kit by itself: its types are those of the IDL, and it counts gaps."""
 
 from __future__ import annotations
 

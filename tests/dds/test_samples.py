@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Samples over DDS: complete, equal to the recording, whatever happens to those who carry them.
+"""Samples over DDS: complete, equal to the recording, also when programs are killed.
 
 ECDAQ_DDS_SECONDS: how long each looks (5). Numbers are printed: ./build.sh test dds, or pytest -s.
 """

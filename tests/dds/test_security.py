@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""With DDS Security: who has no key gets nothing, and only a commander's key commands."""
+"""With DDS Security: without a key no samples, without a commander's key no commands."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SECURED = {
 }
 # A handshake, the exchange of keys and the matching of encrypted endpoints, on a busy machine.
 TIMEOUT_S = "30"
-# So long somebody listens who is to hear nothing, after others were served on the same machine.
+# How long a subscriber that must receive nothing runs, after others have received samples.
 SILENCE_S = "5"
 
 
@@ -99,7 +99,7 @@ def test_samples_need_a_key_and_commands_need_a_commanders_key(
     mallory, eve, fake = (result(bench, name, process) for name, process in strangers.items())
     # A subscriber's key does not command: it is refused a writer.
     assert (mallory["writer"], mallory["answered"], mallory["accepted"]) == (0, 0, 0)
-    # Without keys, or with those of another store, one hears nothing and is not heard.
+    # Without keys, or with those of another store, nothing is received or accepted.
     for stranger in (eve, fake):
         assert (stranger["samples"], stranger["results"]) == (0, 0)
         assert (stranger["answered"], stranger["accepted"]) == (0, 0)

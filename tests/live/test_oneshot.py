@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One-shot mode the whole way: commanded at the master, fired by the slave, judged by its pulse."""
+"""One-shot mode end to end: commanded at the master, fired by the slave, checked by its pulse."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The main job on a real packet socket in real time. Counts and content are judged, not times."""
+"""The main job on a real packet socket in real time. Counts and content are checked, not times."""
 
 from __future__ import annotations
 

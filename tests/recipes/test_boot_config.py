@@ -47,7 +47,7 @@ class Place:
         }
 
     def run(self) -> str:
-        """Its output. It never fails: whatever the folder holds, the machine has to boot."""
+        """Its output. It never fails: the machine must boot with any contents."""
         self.console.write_text("")
         done = subprocess.run(
             [PROGRAM], env=self.environment, capture_output=True, text=True, check=False

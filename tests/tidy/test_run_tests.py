@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The test runner counts rightly: a failure, a crash or an empty group cannot pass for success."""
+"""The test runner counts correctly: a failure, a crash or an empty group is never a success."""
 
 from __future__ import annotations
 

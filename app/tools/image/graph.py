@@ -26,7 +26,7 @@ class Task:
 
 
 def _files_below(folder: Path) -> Iterator[Path]:
-    """Files of the project below a folder: what git tracks or would; else whatever is there."""
+    """Files of the project below a folder: tracked and untracked, not ignored; without git all."""
     listed = subprocess.run(
         ["git", "-C", folder, "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
         capture_output=True,

@@ -37,7 +37,7 @@ def run(command: list[str], keep: str, root: Path) -> list[str]:
     if result.returncode != 0:
         last = "\n".join(result.stdout.splitlines()[-10:])
         raise NotMeasuredError(f"{command[0]} ended with {result.returncode}:\n{last}")
-    # The dots of pytest come before the first word of a line of ours.
+    # The dots of pytest may precede a line of the test.
     lines = [re.sub(r"^(\d+: )|^\.[.sF]*(?=[^.])", "", line) for line in result.stdout.splitlines()]
     return [line.rstrip() for line in lines if re.search(keep, line)]
 
@@ -60,7 +60,7 @@ def subject(
     return Subject(name, title, (how[0],), how[1], is_quick)
 
 
-# What pytest itself prints is not of the subject.
+# Lines of pytest itself are not part of the page.
 NOT_PYTEST = r"^(?!\s*$|[.sF]*\s*(\[ *\d+%\])?$|=+ |\d+ passed|SKIPPED|-- |\s*$)"
 ALL = (
     subject(

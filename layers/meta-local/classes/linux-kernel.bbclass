@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 # A kernel of its own configuration: .cfg files of SRC_URI merged over KERNEL_DEFCONFIG, by the very
 # commands that Isar's class of this name uses. One package, linux-image-${KERNEL_NAME_PROVIDED}. A symbol
-# that was asked for and is not in the final configuration ends the build before it has begun.
+# that was requested and is not in the final configuration fails the build before it starts.
 inherit dpkg
 
 KERNEL_NAME_PROVIDED ?= "${@d.getVar('BPN').partition('linux-')[2]}"

@@ -9,7 +9,7 @@ PV = "${DISTRO_VERSION}"
 
 inherit image
 
-# No initial RAM disk: the kernel finds its root by itself.
+# No initial RAM disk: the kernel mounts its root directly.
 ROOTFS_FEATURES:remove = "generate-initrd"
 
 # SSH host keys are made at first boot (ecdaq-ssh-key.service); Isar makes no image that has any.
@@ -18,8 +18,8 @@ remove_host_keys() {
 	run_privileged find "${IMAGE_ROOTFS}/etc/ssh" -name "ssh_host_*_key*" -delete
 }
 
-# On the boot partition beside what the machine needs there: the kernel's command line, and what to lay
-# into the ecdaq folder.
+# On the boot partition beside the machine's own files: the kernel's command line, and a description
+# of the ecdaq folder.
 IMAGE_BOOT_FILES += "${IMAGE_FULLNAME}.cmdline;cmdline.txt \
                      ${IMAGE_ROOTFS}/usr/share/ecdaq/boot/ecdaq/README.txt;ecdaq/README.txt"
 do_copy_boot_files[vardeps] += "KERNEL_CMDLINE"
@@ -29,7 +29,7 @@ do_copy_boot_files:append() {
 
 # Our packages; the class adds the kernel, a machine its own.
 IMAGE_INSTALL += "ecdaq ecdaq-config"
-# Debian's: to boot, to be reached, to keep time, to be looked at; and what our packages link.
+# Debian's: boot, network, time, diagnosis; and the libraries of our packages.
 IMAGE_PREINSTALL += "init systemd-sysv udev dbus kmod \
                      openssh-server sudo chrony \
                      iproute2 ethtool iputils-ping nftables \

@@ -30,5 +30,5 @@ inherit linux-kernel
 KERNEL_NAME_PROVIDED = "ecdaq"
 # "make defconfig KBUILD_DEFCONFIG=defconfig allnoconfig": everything off, then the fragments.
 KERNEL_DEFCONFIG = "defconfig allnoconfig"
-# Isar's default asks for an initramfs generator, too; no machine of ours has an initial RAM disk.
+# Isar's default needs an initramfs generator, too; none of our machines has an initial RAM disk.
 KERNEL_DEBIAN_DEPENDS = "kmod, linux-base (>= 4.3~)"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Filled in by hand, and wrongly. */
+/* Filled in by hand, with errors. */
 #include <ecdaq/control.h>
 
 static int begin(const struct ecdaq_init *in, void **ret_state)
