@@ -74,6 +74,7 @@ Without GROUP all groups run, the fast ones first:
 Only when named:
   control  the tests of control programs in unit, sim, cli and live
   sync0    the tests of the SYNC0 check in unit, cli and live
+  long     hours of bus time and of SYNC0 edges on virtual time
   wire     SYNC0 on GPIO lines of the image in QEMU; as root, on an idle machine
 
   --keep-going      run all groups even if one fails (default)

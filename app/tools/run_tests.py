@@ -261,7 +261,7 @@ def booted(name: str, *options: str) -> Suite:
 # Fast groups first. Tests labelled "long" run in the release flavour only.
 GROUPS: dict[str, list[Suite]] = {
     "unit": [
-        ctest("unit", "release"),
+        ctest("unit", "release", "-LE", "^long$"),
         ctest("unit", "asan", "-LE", "^long$"),
         replace(ctest("unit", "tsan", "-R", SHARED_STATE_TESTS), run=run_shared_state),
     ],
@@ -274,7 +274,7 @@ GROUPS: dict[str, list[Suite]] = {
     ],
     "replay": [ctest("replay", "release"), pytest("replay", "release")],
     "sim": [
-        ctest("sim", "release"),
+        ctest("sim", "release", "-LE", "^long$"),
         pytest("sim", "release"),
         ctest("sim", "asan", "-LE", "^long$"),
     ],
@@ -305,11 +305,13 @@ GROUPS: dict[str, list[Suite]] = {
             ("tests/live", "-k", "test_sync0 or test_oneshot"),
         ),
     ],
+    # Hours of bus time.
+    "long": [ctest("long", "release")],
     "boot": [booted("boot", f"--ignore-glob={WIRE_FILES}")],
     "wire": [booted("wire", "-k", "test_70_sync0 or test_80_sync0")],
 }
-# Part of other groups, or too exact for a loaded machine: only when named.
-ON_REQUEST = ("control", "sync0", "wire")
+# Part of other groups, long, or too exact for a loaded machine: only when named.
+ON_REQUEST = ("control", "sync0", "long", "wire")
 
 
 class Builder:
