@@ -121,3 +121,25 @@ TEST(board, the_receiver_of_a_shared_board_cannot_truncate_it_only_empty_it)
 	board_unmap(mine);
 	close(fd);
 }
+
+/* 0 is a descriptor like any other: a service started without standard input gets it. */
+TEST(board, a_shared_board_may_have_descriptor_0)
+{
+	int fd = -1;
+	int standard_input = dup(0);
+	struct board *shared;
+
+	close(0);
+	shared = board_create_shared(&fd);
+	CHECK(shared != NULL);
+	CHECK_EQ(fd, 0);
+	board_unmap(shared);
+	shared = board_map(fd);
+	CHECK(shared != NULL);
+	board_unmap(shared);
+	close(fd);
+	if (standard_input >= 0) {
+		CHECK_EQ(dup2(standard_input, 0), 0);
+		close(standard_input);
+	}
+}
