@@ -101,6 +101,22 @@ TEST(sync0_gpio, a_line_is_found_by_its_name)
 	CHECK_EQ(fake_gpiod.live, 0);
 }
 
+/* Only LABEL:NUMBER is a chip and an offset. */
+TEST(sync0_gpio, a_name_that_resembles_a_label_and_a_number_is_a_name)
+{
+	static const char *const names[] = { "pinctrl-test:17x", "pinctrl-test:65536",
+					     "pinctrl-test:99999999999999999999" };
+
+	for (size_t i = 0; i < sizeof(names) / sizeof(names[0]); i++) {
+		fake_gpiod_reset();
+		fake_gpiod.name_of_5 = names[i];
+		CHECK_EQ(open_with(names[i], 1, CONFIG_EDGE_AUTO), 0);
+		CHECK_EQ(fake_gpiod.asked_offset, 5);
+		gpio_close(gpio);
+		CHECK_EQ(fake_gpiod.live, 0);
+	}
+}
+
 TEST(sync0_gpio, each_reason_for_refusal_is_one_clear_line)
 {
 	fake_gpiod_reset();

@@ -95,6 +95,21 @@ static void start(int64_t period_ns)
 	CHECK_EQ(try_watch(&b.watch), 0);
 }
 
+/* Of files of the run directory, deleted ones among them, in this process. */
+static unsigned mappings(void)
+{
+	FILE *maps = fopen("/proc/self/maps", "re");
+	unsigned count = 0;
+	char line[512];
+
+	CHECK(maps != NULL);
+	while (fgets(line, sizeof(line), maps) != NULL) {
+		count += strstr(line, b.dir) != NULL;
+	}
+	fclose(maps);
+	return count;
+}
+
 static void end(void)
 {
 	static const char *const names[] = { "edges",        "samples",      "sync0",
@@ -105,6 +120,7 @@ static void end(void)
 		watch_destroy(b.watch);
 	}
 	fake_master_stop(&b.fake);
+	CHECK_EQ(mappings(), 0);
 	if (b.edges != NULL) {
 		fclose(b.edges);
 	}
@@ -220,6 +236,8 @@ TEST(sync0_watch, a_second_one_in_the_same_directory_is_refused)
 
 TEST(sync0_watch, a_run_directory_that_is_made_later_or_anew_is_taken)
 {
+	unsigned mapped;
+
 	begin();
 	CHECK_EQ(rmdir(b.dir), 0);
 	CHECK_EQ(try_watch(&b.watch), 0);
@@ -227,10 +245,13 @@ TEST(sync0_watch, a_run_directory_that_is_made_later_or_anew_is_taken)
 	CHECK_EQ(mkdir(b.dir, 0700), 0);
 	watch_step(b.watch);
 	CHECK_EQ(page()->state, SYNC0_NO_LINE);
+	mapped = mappings();
+	CHECK(mapped > 0);
 	unlink(path_of("sync0-lock"));
 	unlink(path_of("sync0-status"));
 	watch_step(b.watch);
 	CHECK_EQ(page()->state, SYNC0_NO_LINE);
+	CHECK_EQ(mappings(), mapped); /* those of the deleted files are gone */
 	end();
 }
 
