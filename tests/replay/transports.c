@@ -194,3 +194,121 @@ TEST(replay, what_is_no_capture_is_refused_in_one_line)
 	CHECK(rp == NULL);
 	unlink(path);
 }
+
+/* Both transactions are sent before the first answer comes; the second has none. */
+static void make_capture_of_two_equal_frames(const char *path)
+{
+	struct fake_wire wire = { 0 };
+	struct transport transport;
+	uint8_t frame[LIMIT_FRAME_BYTES];
+	size_t len = make_frame(frame, 0x10, 0, 0x100, 0);
+
+	CHECK_EQ(capture_create(path, 1 << 16, fake_platform(&wire), fake_transport(&wire),
+				&transport),
+		 0);
+	CHECK_EQ(transport.send(transport.ctx, frame, len), 0);
+	wire.drop = 1;
+	CHECK_EQ(transport.send(transport.ctx, frame, len), 0);
+	CHECK_EQ(transport.receive(transport.ctx, frame, sizeof(frame), (mono_t){ 1000000 }, NULL),
+		 60);
+	transport.destroy(transport.ctx);
+}
+
+TEST(replay, a_captured_answer_is_given_once)
+{
+	const char *path = make_path();
+	struct transport transport;
+	struct replay *rp;
+	uint8_t frame[LIMIT_FRAME_BYTES];
+	size_t len = make_frame(frame, 0x10, 0, 0x100, 0);
+	char error[128];
+
+	make_capture_of_two_equal_frames(path);
+	CHECK_EQ(replay_create(path, REPLAY_EXACT, &rp, error, sizeof(error)), 0);
+	transport = replay_transport(rp);
+	CHECK_EQ(transport.send(transport.ctx, frame, len), 0);
+	CHECK_EQ(transport.send(transport.ctx, frame, len), 0);
+	CHECK_EQ(replay_matched(rp), 2);
+	CHECK_EQ(transport.receive(transport.ctx, frame, sizeof(frame), (mono_t){ 1000000 }, NULL),
+		 60);
+	CHECK_EQ(transport.receive(transport.ctx, frame, sizeof(frame), (mono_t){ 1000000 }, NULL),
+		 -EAGAIN);
+	replay_destroy(rp);
+	unlink(path);
+}
+
+/* One frame of two datagrams, indices @idx and @idx + 1. */
+static size_t make_double_frame(uint8_t *frame, uint8_t idx)
+{
+	const uint8_t source[6] = { 0x10, 1, 1, 1, 1, 1 };
+	struct ecat_frame_builder fb;
+
+	ecat_frame_begin(&fb, frame, source);
+	ecat_frame_add(&fb, ECAT_CMD_FPRD, idx, 0x1001, 0x100, 4);
+	ecat_frame_add(&fb, ECAT_CMD_FPRD, (uint8_t)(idx + 1), 0x1001, 0x200, 4);
+	return ecat_frame_end(&fb);
+}
+
+TEST(replay, the_index_of_every_datagram_of_a_frame_is_masked)
+{
+	const char *path = make_path();
+	struct fake_wire wire = { 0 };
+	struct transport transport;
+	struct replay *rp;
+	struct ecat_datagram dg;
+	uint8_t frame[LIMIT_FRAME_BYTES];
+	char error[128];
+	size_t pos = 0;
+	int len;
+
+	CHECK_EQ(capture_create(path, 1 << 16, fake_platform(&wire), fake_transport(&wire),
+				&transport),
+		 0);
+	CHECK_EQ(transport.send(transport.ctx, frame, make_double_frame(frame, 0)), 0);
+	CHECK(transport.receive(transport.ctx, frame, sizeof(frame), (mono_t){ 1000000 }, NULL) >
+	      0);
+	transport.destroy(transport.ctx);
+
+	CHECK_EQ(replay_create(path, REPLAY_MASK_INDEX, &rp, error, sizeof(error)), 0);
+	transport = replay_transport(rp);
+	CHECK_EQ(transport.send(transport.ctx, frame, make_double_frame(frame, 7)), 0);
+	len = transport.receive(transport.ctx, frame, sizeof(frame), (mono_t){ 1000000 }, NULL);
+	CHECK(len > 0);
+	for (uint8_t idx = 7; idx <= 8; idx++) {
+		CHECK_EQ(ecat_frame_next(frame, (size_t)len, &pos, &dg), 1);
+		CHECK_EQ(dg.idx, idx);
+		CHECK_EQ(get_le16(dg.wkc), 1);
+	}
+	replay_destroy(rp);
+	unlink(path);
+}
+
+TEST(replay, the_wall_clock_begins_at_the_first_captured_frame)
+{
+	const char *path = make_path();
+	struct fake_wire wire = { 0 };
+	struct platform platform;
+	struct replay *rp;
+	char error[128];
+
+	make_capture(path);
+	CHECK_EQ(replay_create(path, REPLAY_EXACT, &rp, error, sizeof(error)), 0);
+	platform = replay_platform(rp);
+	CHECK_EQ(platform.tai_ns(platform.ctx), fake_tai(&wire)); /* of a wire at time 0 */
+	CHECK_EQ(platform.sleep_until(platform.ctx, (mono_t){ 250 }), 0);
+	CHECK_EQ(platform.tai_ns(platform.ctx), fake_tai(&wire) + 250);
+	replay_destroy(rp);
+	unlink(path);
+}
+
+/* A file of sysfs has the size of a page and less in it. */
+TEST(replay, a_capture_that_cannot_be_read_to_its_end_is_refused)
+{
+	struct replay *rp = NULL;
+	char error[128];
+
+	CHECK_EQ(replay_create("/sys/devices/system/cpu/online", 0, &rp, error, sizeof(error)),
+		 -EIO);
+	CHECK_STR(error, "capture /sys/devices/system/cpu/online: Input/output error");
+	CHECK(rp == NULL);
+}
