@@ -192,8 +192,8 @@ int bus_map_sm(struct bus *bus, size_t pos, uint32_t *total_bytes);
 
 /* --- sync_limits.c --- */
 
-/** Read 0x1C32 and 0x1C33 of a slave that has them; a cycle it cannot follow is -EPROTO. 0 or
- * -errno with a line. */
+/** Read 0x1C32 of a slave with outputs and 0x1C33 of one with inputs, if it has CoE; a cycle it
+ * cannot follow is -EPROTO. Exactly 0, with neither too, or -errno with a line. */
 int bus_sync_limits(struct bus *bus, size_t pos);
 
 /* --- map.c --- */

@@ -3,6 +3,7 @@
 #include <errno.h>
 
 #include "base/bytes.h"
+#include "bus/bus_internal.h"
 #include "harness/test.h"
 #include "sim/bus/bus_bench.h"
 #include "wire/esc_reg.h"
@@ -181,6 +182,59 @@ TEST(trouble, sdo_information_is_not_requested_from_a_slave_without_it)
 	CHECK(without > 0);
 	CHECK(mailbox_writes_of_bring_up(SDO | SDO_INFORMATION) > without);
 	CHECK_EQ(mailbox_writes_of_bring_up(SDO | PDO_ASSIGN), without);
+}
+
+/*
+ * A slave of another identity, without CoE, with inputs of @entries times 255 bits that have no
+ * name. Its SII ends behind them.
+ */
+static void set_inputs_of_sii(struct esc *esc, uint8_t entries)
+{
+	enum { PDO_HEAD_BYTES = 8, ENTRY_BYTES = 8, PRODUCT = 0x14, PROTOCOLS = 0x38 };
+	uint8_t *pdo = sii_category(esc, SII_CATEGORY_TXPDO);
+	size_t bytes = PDO_HEAD_BYTES + ENTRY_BYTES * (size_t)entries;
+
+	CHECK(pdo + bytes + 2 <= esc->sii + esc->sii_bytes);
+	esc->sii[PRODUCT]++;
+	put_le16(esc->sii + PROTOCOLS, 0);
+	put_le16(pdo - 2, (uint16_t)(bytes / 2));
+	pdo[2] = entries;
+	memset(pdo + PDO_HEAD_BYTES, 0, bytes - PDO_HEAD_BYTES);
+	for (size_t i = 0; i < entries; i++) {
+		pdo[PDO_HEAD_BYTES + i * ENTRY_BYTES + 5] = 255; /* bit length */
+	}
+	put_le16(pdo + bytes, SII_CATEGORY_END);
+}
+
+/* 50 * 255 bits, behind the outputs of slave 0 in the image. */
+TEST(trouble, inputs_longer_than_a_frame_are_refused_with_their_length)
+{
+	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 2, .seed = 23 });
+
+	set_inputs_of_sii(segment_esc(b->segment, 1), 50);
+	CHECK_EQ(bench_find(b), 0);
+	CHECK_EQ(bench_map(b), -E2BIG);
+	CHECK(strstr(b->error, "slave 1 (") == b->error);
+	CHECK(strstr(b->error, ": SM3 has 1594 bytes: they do not fit in one frame and must not "
+			       "be split") != NULL);
+	bench_destroy(b);
+}
+
+/* Before mapping a slave has neither inputs nor outputs. */
+TEST(trouble, sync_objects_are_not_read_of_a_slave_without_inputs_and_outputs)
+{
+	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 1, .seed = 24 });
+	unsigned writes;
+
+	CHECK_EQ(bench_find(b), 0);
+	writes = bench_mailbox_writes(b);
+	CHECK_EQ(bus_sync_limits(b->bus, 0), 0);
+	CHECK_EQ(bench_mailbox_writes(b), writes);
+	CHECK_EQ(bench_map(b), 0);
+	writes = bench_mailbox_writes(b);
+	CHECK_EQ(bus_sync_limits(b->bus, 0), 0);
+	CHECK_EQ(bench_mailbox_writes(b), writes + 4);
+	bench_destroy(b);
 }
 
 /* The broadcast that stops SYNC units does not reach one that belongs to the slave's controller. */
