@@ -146,6 +146,17 @@ start_dds()
 		note "DDS: ecdaq-remote --interface lo --domain $private_domain --tag run-$$ watch"
 }
 
+# Directories of earlier runs that were killed: no process holds their lock any more.
+remove_abandoned_run_dirs()
+{
+	local dir
+
+	find /dev/shm -maxdepth 1 -name 'ecdaq-run-*' -type d -uid "$(id -u)" -mmin +1 -print0 2> /dev/null |
+		while IFS= read -r -d '' dir; do
+			[ ! -e "$dir/run.lock" ] || flock -n "$dir/run.lock" rm -rf "$dir" || true
+		done
+}
+
 enter_namespace()
 {
 	local how=(unshare --net)
@@ -154,6 +165,7 @@ enter_namespace()
 	"${how[@]}" true 2> /dev/null ||
 		die "this kernel grants no network namespace to user $(id -un): run it as root"
 	if [ -z "${ECDAQ_RUN_DIR:-}" ]; then
+		remove_abandoned_run_dirs
 		ECDAQ_RUN_DIR=$(mktemp -d /dev/shm/ecdaq-run-XXXXXX)
 		export ECDAQ_RUN_DIR run_dir_is_own=yes
 	fi

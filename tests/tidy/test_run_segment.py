@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import re
+import shutil
 import signal
 import subprocess
 import time
@@ -159,6 +161,22 @@ def test_the_run_directory_is_removed_unless_it_is_given(bench: Bench, tmp_path:
     (line,) = [entry for entry in bench.log if entry.startswith("run dir ")]
     # Others on this machine may make and remove theirs meanwhile.
     assert not Path(line.removeprefix("run dir ")).exists()
+
+
+def test_the_directory_of_a_killed_run_is_removed_by_the_next_run(bench: Bench) -> None:
+    folders = [Path(f"/dev/shm/ecdaq-run-test{os.getpid()}{name}") for name in ("a", "b")]
+    for folder in folders:
+        folder.mkdir()
+        (folder / "run.lock").touch()
+        os.utime(folder, (0, 0))
+    abandoned, used = folders
+    bench.make_it("ecdaqd", "exit 0")
+    with (used / "run.lock").open() as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        bench.start("--seconds", "1").wait(20)
+        assert not abandoned.exists()
+        assert used.exists()
+    shutil.rmtree(used)
 
 
 @pytest.mark.parametrize("page", ['{"pid":1,"samples_good":7,}', '{"pid":PID,"samples_good":0,}'])
