@@ -190,7 +190,7 @@ void cycle_step(struct cycle *cy)
 	correction_ns = cycle_follow(cy, &res);
 	place = cycle_place(cy, &res);
 	move_deadline(cy, place.late_periods, 0);
-	if (!place.is_in_window && res.status == EXCHANGE_OK) {
+	if (!place.is_in_window && cycle_has_inputs(cy, &res)) {
 		ADD(st->frames_late, 1);
 		cy->sample.flags |= SAMPLE_LATE;
 	}

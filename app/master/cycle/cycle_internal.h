@@ -99,6 +99,9 @@ struct cycle_place {
 
 /** Which SYNC0 edge the frame's inputs belong to, by the DC time at which it passed. */
 struct cycle_place cycle_place(struct cycle *cy, const struct exchange_result *res);
+/** 1 if the exchange brought inputs of at least one slave: all answered, or some with per_slave. */
+int cycle_has_inputs(const struct cycle *cy, const struct exchange_result *res);
+
 /** Judge each slave's sample by flags and counters. */
 void cycle_judge(struct cycle *cy, const struct exchange_result *res, int is_in_window);
 

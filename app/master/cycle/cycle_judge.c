@@ -142,11 +142,16 @@ static void count_bad(struct cycle *cy, uint64_t bad, int is_explained)
 	}
 }
 
+int cycle_has_inputs(const struct cycle *cy, const struct exchange_result *res)
+{
+	return res->status == EXCHANGE_OK ||
+	       (res->status == EXCHANGE_WKC_LOW && cy->spec.plan->is_split);
+}
+
 void cycle_judge(struct cycle *cy, const struct exchange_result *res, int is_in_window)
 {
 	uint64_t all = all_slaves(cy);
-	int is_fresh = res->status == EXCHANGE_OK ||
-		       (res->status == EXCHANGE_WKC_LOW && cy->spec.plan->is_split);
+	int is_fresh = cycle_has_inputs(cy, res);
 	uint64_t stale = (~cy->slaves | res->slaves_low) & all;
 	uint64_t wrong;
 	struct check_fault fault;
@@ -158,7 +163,7 @@ void cycle_judge(struct cycle *cy, const struct exchange_result *res, int is_in_
 	}
 	if (!is_fresh || !is_in_window) {
 		cy->sample.slaves_bad = all;
-		count_bad(cy, all, res->status != EXCHANGE_WKC_LOW);
+		count_bad(cy, all, is_fresh || res->status != EXCHANGE_WKC_LOW);
 		return;
 	}
 	wrong = check_image(&cy->check, cy->image, cy->sample.cycle, stale, &fault);

@@ -709,6 +709,32 @@ TEST(cycle, of_a_split_image_only_the_slave_that_is_not_there_is_bad)
 	CHECK_EQ(next_sample().h.slaves_bad, 0);
 }
 
+TEST(cycle, a_frame_outside_its_window_is_late_though_a_slave_of_a_split_image_is_missing)
+{
+	uint64_t unexplained;
+	struct got s;
+
+	start_in_op();
+	plan.is_split = 1;
+	world.status = EXCHANGE_WKC_LOW;
+	world.slaves_low = 2;
+	steps(10);
+	CHECK_EQ(stats.frames_late, 0);
+	ring_seek(reader, ring_newest(reader));
+	CHECK_EQ(stats.slave_bad[0], 0);
+	unexplained = stats.samples_bad_unexplained;
+	/* The frame is back, its DC time not plausible. */
+	world.is_timeless = 1;
+	steps(1);
+	world.is_timeless = 0;
+	CHECK_EQ(stats.frames_late, 1);
+	CHECK_EQ(stats.slave_bad[0], 1);
+	CHECK_EQ(stats.samples_bad_unexplained, unexplained);
+	s = next_sample();
+	CHECK_EQ(s.h.flags & SAMPLE_LATE, SAMPLE_LATE);
+	CHECK_EQ(s.h.slaves_bad, 3);
+}
+
 TEST(cycle, outputs_of_a_slave_that_is_not_in_op_are_at_fail_safe)
 {
 	start_in_op();
