@@ -33,6 +33,29 @@ def descendants() -> list[int]:
     return found[1:]
 
 
+def wait_and_reap(process: subprocess.Popen[bytes], seconds: float) -> int:
+    """As process.wait(seconds). Adopted orphans that end meanwhile are reaped, as init would: who
+    waits for one of them to disappear must not wait for a zombie."""
+    end = time.monotonic() + seconds
+    while True:
+        try:
+            return process.wait(min(0.1, seconds))
+        except subprocess.TimeoutExpired:
+            reap_orphans(process.pid)
+            if time.monotonic() > end:
+                raise
+
+
+def reap_orphans(keep: int) -> None:
+    """Collect the children that have ended, but not @keep."""
+    with contextlib.suppress(ChildProcessError):
+        while True:
+            ended = os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT)
+            if ended is None or ended.si_pid == keep:
+                return
+            os.waitpid(ended.si_pid, os.WNOHANG)
+
+
 def end_group(process: subprocess.Popen[bytes]) -> None:
     """End a suite, the leader of a process group, and then whatever of it is left."""
     with contextlib.suppress(ProcessLookupError):

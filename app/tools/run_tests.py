@@ -23,7 +23,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from processes import adopt_orphans, end_group
+from processes import adopt_orphans, end_group, wait_and_reap
 from test_report import Outcome, fail_unexpected_skips, read_junit, tail
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -91,7 +91,7 @@ def run_logged(
             start_new_session=True,
         )
         try:
-            return process.wait(seconds)
+            return wait_and_reap(process, seconds)
         except subprocess.TimeoutExpired:
             end_group(process)
             out.write(f"\nended after {seconds} s\n".encode())
