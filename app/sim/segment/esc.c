@@ -129,6 +129,7 @@ void esc_count_error(struct esc *esc, unsigned port, enum esc_error error)
 
 void esc_force_al_status(struct esc *esc, uint8_t status, uint16_t code)
 {
+	esc->al_late_ns = 0;
 	esc->reg[ESC_REG_AL_STATUS] = status;
 	put_le16(esc->reg + ESC_REG_AL_STATUS_CODE, code);
 	esc->ecat_event |= ESC_ECAT_EVENT_AL_STATUS;

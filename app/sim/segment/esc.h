@@ -143,6 +143,14 @@ struct esc_sync {
 	uint64_t pulses_lost; /* fault: so many SYNC0 pulses do not come out */
 };
 
+/* Faults of the application's state machine. They survive a power cycle. */
+struct esc_al_fault {
+	uint8_t slow_state;    /* its AL status shows this state only slow_ns later; 0: none */
+	uint8_t refused_state; /* it answers this one with an error; 0: none */
+	uint16_t refused_code;
+	int64_t slow_ns;
+};
+
 /* Called at each SYNC0 edge, at its true time and its system time. */
 typedef void (*esc_sync0_sink)(void *ctx, int64_t t_ns, uint64_t system_time_ns);
 
@@ -169,9 +177,13 @@ struct esc {
 	int64_t pdi_watchdog_deadline_ns; /* INT64_MAX: not running, or expired */
 	uint8_t is_pdi_expired;
 	int64_t mailbox_stuck_until_ns; /* a fault: the PDI's mailbox writes are lost */
-	uint8_t ports;                  /* with a link */
-	uint8_t is_write_enabled;       /* 0x0020 or 0x0030 came in this frame */
-	uint8_t reset_step[2];          /* of 'R' 'E' 'S', by the master, by the PDI */
+	struct esc_al_fault al_fault;
+	int64_t al_late_ns; /* when al_late_status shows; 0: nothing is late */
+	uint8_t al_late_status;
+	uint8_t is_al_refused;    /* the error in AL status is al_fault's */
+	uint8_t ports;            /* with a link */
+	uint8_t is_write_enabled; /* 0x0020 or 0x0030 came in this frame */
+	uint8_t reset_step[2];    /* of 'R' 'E' 'S', by the master, by the PDI */
 	uint8_t is_reset_wanted;
 	uint8_t is_loop_changed; /* 0x0101 was written: the segment looks */
 	esc_sync0_sink sink;
@@ -233,6 +245,8 @@ void esc_set_links(struct esc *esc, uint8_t ports);
 int esc_is_port_closed(const struct esc *esc, unsigned port);
 /** AL status and code as a fault sets them, whoever the application is. */
 void esc_force_al_status(struct esc *esc, uint8_t status, uint16_t code);
+/** What a slow or refusing application has in its AL status at @t_ns. */
+void esc_show_late_status(struct esc *esc, int64_t t_ns);
 /** The process data watchdog expires now, whatever was written. */
 void esc_force_watchdog(struct esc *esc);
 

@@ -4,6 +4,8 @@
 
 #include <string.h>
 
+#include "wire/al.h"
+
 enum { SYNC0_IS_OUTPUT = 0x04 }; /* 0x0151 */
 
 int esc_eeprom_loaded(const struct esc *esc)
@@ -91,7 +93,49 @@ static int is_writable(const struct esc *esc, unsigned addr)
 	       addr == ESC_REG_EEPROM_PDI_ACCESS || addr >= ESC_REG_USER_RAM;
 }
 
-static void write_register(struct esc *esc, unsigned addr, uint8_t value)
+static void set_al_status(struct esc *esc, uint8_t value)
+{
+	if (esc->reg[ESC_REG_AL_STATUS] != value) {
+		esc->ecat_event |= ESC_ECAT_EVENT_AL_STATUS;
+	}
+	esc->reg[ESC_REG_AL_STATUS] = value;
+}
+
+void esc_show_late_status(struct esc *esc, int64_t t_ns)
+{
+	if (esc->al_late_ns != 0 && t_ns >= esc->al_late_ns) {
+		esc->al_late_ns = 0;
+		set_al_status(esc, esc->al_late_status);
+	}
+}
+
+/* As the application writes it, or as a fault (struct esc_al_fault) has it. */
+static void write_al_status(struct esc *esc, int64_t t_ns, uint8_t value)
+{
+	const struct esc_al_fault *fault = &esc->al_fault;
+	uint8_t state = value & AL_STATE_MASK;
+	uint8_t from = esc->reg[ESC_REG_AL_STATUS] & AL_STATE_MASK;
+
+	if (esc->al_late_ns != 0 && value == esc->al_late_status) {
+		return; /* requested again meanwhile */
+	}
+	esc->al_late_ns = 0;
+	esc->is_al_refused = 0;
+	if ((value & AL_ERROR) != 0 || state == from) {
+		set_al_status(esc, value);
+	} else if (state == fault->refused_state) {
+		esc->is_al_refused = 1;
+		set_al_status(esc, from | AL_ERROR);
+		put_le16(esc->reg + ESC_REG_AL_STATUS_CODE, fault->refused_code);
+	} else if (state == fault->slow_state) {
+		esc->al_late_ns = t_ns + fault->slow_ns;
+		esc->al_late_status = value;
+	} else {
+		set_al_status(esc, value);
+	}
+}
+
+static void write_register(struct esc *esc, int64_t t_ns, unsigned addr, uint8_t value)
 {
 	unsigned sm = (addr - ESC_REG_SM) / ESC_SM_BYTES;
 
@@ -109,8 +153,13 @@ static void write_register(struct esc *esc, unsigned addr, uint8_t value)
 	if (!is_writable(esc, addr)) {
 		return;
 	}
-	if (addr == ESC_REG_AL_STATUS && esc->reg[addr] != value) {
-		esc->ecat_event |= ESC_ECAT_EVENT_AL_STATUS;
+	if (addr == ESC_REG_AL_STATUS) {
+		write_al_status(esc, t_ns, value);
+		return;
+	}
+	if (addr >= ESC_REG_AL_STATUS_CODE && addr < ESC_REG_AL_STATUS_CODE + 2 &&
+	    esc->is_al_refused) {
+		return;
 	}
 	/* The SYNC unit counts on with the start time it was given. */
 	if (addr >= ESC_REG_DC_START_TIME && addr < ESC_REG_DC_START_TIME + 8 &&
@@ -133,7 +182,7 @@ void esc_pdi_write(struct esc *esc, int64_t t_ns, uint16_t addr, const void *buf
 		return;
 	}
 	for (size_t i = 0; i < len && addr + i < ESC_REGISTER_BYTES; i++) {
-		write_register(esc, (unsigned)(addr + i), bytes[i]);
+		write_register(esc, t_ns, (unsigned)(addr + i), bytes[i]);
 	}
 	if (esc_touches(addr, len, ESC_REG_DC_ACTIVATION, 1) &&
 	    (esc->reg[ESC_REG_DC_CYCLIC_CONTROL] & 1)) {

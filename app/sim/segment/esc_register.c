@@ -60,6 +60,9 @@ static void refresh(struct esc *esc, enum esc_side side, int64_t t_ns, uint16_t 
 	if (esc_touches(addr, len, ESC_REG_DL_STATUS, 2)) {
 		refresh_dl_status(esc);
 	}
+	if (esc_touches(addr, len, ESC_REG_AL_STATUS, 1)) {
+		esc_show_late_status(esc, t_ns);
+	}
 	if (esc_touches(addr, len, ESC_REG_ECAT_EVENT_REQUEST, 2)) {
 		put_le16(r + ESC_REG_ECAT_EVENT_REQUEST, (uint16_t)esc->ecat_event);
 	}

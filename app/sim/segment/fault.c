@@ -192,8 +192,24 @@ static void apply_to_frame(struct fault_plan *plan, const struct fault *f, struc
 	case FAULT_MAILBOX_STUCK:
 	case FAULT_IDENTITY:
 	case FAULT_SYNC0_LOST:
+	case FAULT_UNPLUG:
+	case FAULT_PLUG:
+	case FAULT_SLOW:
+	case FAULT_REFUSE:
+	case FAULT_OBEY:
 		break;
 	}
+}
+
+/* An earlier master may have given it any station address. */
+static void plug(struct segment *segment, const struct fault *f, int64_t t_ns)
+{
+	struct esc *esc = segment_esc(segment, f->slave);
+
+	if (f->address != 0) {
+		put_le16(esc->reg + ESC_REG_STATION_ADDRESS, f->address);
+	}
+	segment_plug(segment, f->slave, t_ns);
 }
 
 static void apply_to_slave(const struct fault *f, struct segment *segment, int64_t t_ns)
@@ -236,6 +252,23 @@ static void apply_to_slave(const struct fault *f, struct segment *segment, int64
 		break;
 	case FAULT_PORT_ERROR:
 		esc_count_error(esc, f->port, ESC_ERROR_RX);
+		break;
+	case FAULT_UNPLUG:
+		segment_unplug(segment, f->slave, t_ns);
+		break;
+	case FAULT_PLUG:
+		plug(segment, f, t_ns);
+		break;
+	case FAULT_SLOW:
+		esc->al_fault.slow_state = f->state;
+		esc->al_fault.slow_ns = f->by_ns;
+		break;
+	case FAULT_REFUSE:
+		esc->al_fault.refused_state = f->state;
+		esc->al_fault.refused_code = f->code;
+		break;
+	case FAULT_OBEY:
+		esc->al_fault = (struct esc_al_fault){ 0 };
 		break;
 	case FAULT_LOSE:
 	case FAULT_DROP:

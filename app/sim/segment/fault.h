@@ -20,6 +20,12 @@
  *   at=3s mailbox-stuck slave=1 for=1s its answers are lost, for ever without for=
  *   at=3s sync0-lost slave=1 count=3   its next SYNC0 pulses do not come out of the chip
  *   at=3s identity slave=1 product=0x1 its EEPROM names another product from now on
+ *   at=0s unplug slave=1               out of the line, with power; its neighbours are connected
+ *   at=3s plug slave=1 address=0x1001  back, with the station address of another master (default:
+ *                                      the one it has)
+ *   at=3s slow slave=1 state=safeop by=3s its changes to SAFE-OP take 3 s
+ *   at=3s refuse slave=1 state=safeop code=0x0018 it refuses SAFE-OP with that code
+ *   at=3s obey slave=1                 neither slow nor refusing any more
  */
 #ifndef SIM_SEGMENT_FAULT_H
 #define SIM_SEGMENT_FAULT_H
@@ -50,6 +56,11 @@ enum fault_action {
 	FAULT_MAILBOX_STUCK,
 	FAULT_IDENTITY,
 	FAULT_SYNC0_LOST,
+	FAULT_UNPLUG,
+	FAULT_PLUG,
+	FAULT_SLOW,
+	FAULT_REFUSE,
+	FAULT_OBEY,
 };
 
 enum fault_trigger { FAULT_AT, FAULT_FRAME, FAULT_EVERY, FAULT_PROBABLY };
@@ -68,6 +79,8 @@ struct fault {
 	uint16_t code;
 	uint32_t product;
 	uint32_t count;
+	uint16_t address; /* 0: as it is */
+	uint8_t state;    /* AL state */
 	int is_done;
 };
 

@@ -8,6 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "wire/al.h"
+
 /* How an action is written, and what it needs. */
 static const struct {
 	const char *name;
@@ -35,6 +37,11 @@ static const struct {
 	{ "mailbox-stuck", FAULT_MAILBOX_STUCK, 0, "slave" },
 	{ "identity", FAULT_IDENTITY, 0, "product" },
 	{ "sync0-lost", FAULT_SYNC0_LOST, 0, "slave" },
+	{ "unplug", FAULT_UNPLUG, 0, "slave" },
+	{ "plug", FAULT_PLUG, 0, "slave" },
+	{ "slow", FAULT_SLOW, 0, "by" },
+	{ "refuse", FAULT_REFUSE, 0, "code" },
+	{ "obey", FAULT_OBEY, 0, "slave" },
 };
 
 enum { ACTIONS = sizeof(actions) / sizeof(actions[0]), KEYS_MAX = 16 };
@@ -99,6 +106,26 @@ static int parse_small(const char *text, uint64_t limit, uint32_t *ret)
 	return r;
 }
 
+static int parse_state(const char *text, uint8_t *ret)
+{
+	static const struct {
+		const char *name;
+		uint8_t state;
+	} states[] = { { "init", AL_INIT },
+		       { "preop", AL_PREOP },
+		       { "boot", AL_BOOT },
+		       { "safeop", AL_SAFEOP },
+		       { "op", AL_OP } };
+
+	for (size_t i = 0; i < sizeof(states) / sizeof(states[0]); i++) {
+		if (strcmp(states[i].name, text) == 0) {
+			*ret = states[i].state;
+			return 0;
+		}
+	}
+	return -EINVAL;
+}
+
 /* --- keys --- */
 
 /* 1: it was one, 0: it was none, -EINVAL. */
@@ -154,6 +181,14 @@ static int set_key(struct fault *f, const char *key, const char *value, size_t s
 	if (strcmp(key, "port") == 0) {
 		r = parse_small(value, 3, &small);
 		f->port = r == 0 ? small : f->port;
+		return r;
+	}
+	if (strcmp(key, "state") == 0) {
+		return parse_state(value, &f->state);
+	}
+	if (strcmp(key, "address") == 0) {
+		r = parse_small(value, UINT16_MAX, &small);
+		f->address = r == 0 ? (uint16_t)small : f->address;
 		return r;
 	}
 	if (strcmp(key, "code") == 0) {
@@ -267,7 +302,7 @@ static int check_whole(const struct fault *f, const struct seen *seen, char *err
 
 int fault_parse(char *line, size_t slave_count, struct fault *ret, char *error, size_t error_bytes)
 {
-	struct fault f = { .trigger = FAULT_AT, .count = 1 };
+	struct fault f = { .trigger = FAULT_AT, .count = 1, .state = AL_SAFEOP };
 	struct seen seen = { .action = -1 };
 	char *comment = strchr(line, '#');
 	char *rest = NULL;

@@ -136,7 +136,7 @@ static void set_links(struct segment *seg)
 				links |= (uint8_t)(1u << port);
 			}
 		}
-		esc_set_links(&n->esc, n->has_power ? links : 0);
+		esc_set_links(&n->esc, n->has_power && !n->is_unplugged ? links : 0);
 		n->esc.is_loop_changed = 0;
 		for (unsigned port = 0; port < PATH_PORTS; port++) {
 			seg->wiring[i].link[port].is_open =
@@ -203,11 +203,13 @@ int segment_close_ring(struct segment *segment, size_t slave, unsigned port, int
 
 void segment_start_node(struct node *n, int64_t t_ns, uint64_t clock_ns)
 {
+	const struct esc_al_fault al_fault = n->esc.al_fault;
 	uint8_t links = n->esc.ports;
 
 	n->has_power = 1;
 	esc_init(&n->esc, &n->features, n->sii, n->sii_bytes, t_ns);
 	esc_clock_start(&n->esc, t_ns, clock_ns, n->ppm + n->wandered_ppm);
+	n->esc.al_fault = al_fault;
 	esc_sync0_to(&n->esc, sync0_edge, n);
 	esc_set_links(&n->esc, links);
 	n->next_wander_ns = n->wander_ppm > 0 ? t_ns + WANDER_STEP_NS : INT64_MAX;

@@ -101,6 +101,14 @@ void segment_heal(struct segment *segment, size_t slave, int64_t t_ns);
 void segment_power_off(struct segment *segment, size_t slave, int64_t t_ns);
 void segment_power_on(struct segment *segment, size_t slave, int64_t t_ns);
 
+/**
+ * Take @slave out of the line, with power, and connect what was behind its port 1 to its parent;
+ * and put it back. 0; -EINVAL: it has slaves at other ports, or it is the only slave, or part of a
+ * ring's end.
+ */
+int segment_unplug(struct segment *segment, size_t slave, int64_t t_ns);
+int segment_plug(struct segment *segment, size_t slave, int64_t t_ns);
+
 /** The same for the cable that closes the ring. */
 void segment_cut_ring(struct segment *segment, int64_t t_ns);
 void segment_heal_ring(struct segment *segment, int64_t t_ns);

@@ -25,7 +25,8 @@ struct node {
 	unsigned parent_port;
 	int64_t wire_ns;
 	int has_power;
-	int is_cut; /* the cable towards the parent */
+	int is_cut;       /* the cable towards the parent */
+	int is_unplugged; /* out of the line: its neighbours are connected to each other */
 	int64_t next_wander_ns;
 	int64_t next_ns; /* of all of its own events */
 };

@@ -163,3 +163,106 @@ TEST(fault_actions, what_has_happened_makes_room_in_a_full_plan)
 	CHECK_EQ(receive_one(&l, &wkc), 3);
 	close_line(&l);
 }
+
+/* --- devices that come and go, slow and unwilling ones --- */
+
+/* Station address at each position of the line; how many there are. */
+static unsigned read_line(struct bench *b, uint16_t *address)
+{
+	unsigned count = 0;
+
+	while (count < 3) {
+		uint8_t word[2] = { 0 };
+
+		if (bench_send(b, ECAT_CMD_APRD, (uint16_t)-count, ESC_REG_STATION_ADDRESS, word,
+			       2) == 0) {
+			break;
+		}
+		address[count++] = get_le16(word);
+	}
+	return count;
+}
+
+static void apply(struct line *l, const char *text)
+{
+	fault_plan_restart(l->plan, l->bench->now_ns);
+	plan(l, text);
+	fault_plan_judge(l->plan, l->bench->segment, l->bench->now_ns, 60);
+}
+
+TEST(sim_fault, an_unplugged_slave_leaves_the_others_connected_and_returns_with_any_address)
+{
+	for (unsigned slave = 0; slave < 3; slave++) {
+		struct line l = open_line();
+		uint16_t address[3] = { 0 };
+		char text[64];
+
+		snprintf(text, sizeof(text), "at=0s unplug slave=%u", slave);
+		apply(&l, text);
+		CHECK_EQ(read_line(l.bench, address), 2);
+		CHECK_EQ(address[0], BENCH_STATION + (slave == 0));
+		CHECK_EQ(address[1], BENCH_STATION + 1 + (slave <= 1));
+		snprintf(text, sizeof(text), "at=0s plug slave=%u address=0x1234", slave);
+		apply(&l, text);
+		CHECK_EQ(read_line(l.bench, address), 3);
+		for (unsigned i = 0; i < 3; i++) {
+			CHECK_EQ(address[i], i == slave ? 0x1234 : BENCH_STATION + i);
+		}
+		close_line(&l);
+	}
+}
+
+TEST(sim_fault, the_only_slave_and_one_that_is_not_plugged_out_stay_as_they_are)
+{
+	struct line l = open_line();
+
+	CHECK_EQ(segment_plug(l.bench->segment, 1, l.bench->now_ns), -EINVAL);
+	CHECK_EQ(segment_unplug(l.bench->segment, 1, l.bench->now_ns), 0);
+	CHECK_EQ(segment_unplug(l.bench->segment, 1, l.bench->now_ns), -EINVAL);
+	CHECK_EQ(segment_plug(l.bench->segment, 1, l.bench->now_ns), 0);
+	close_line(&l);
+}
+
+static uint8_t al_status(struct line *l)
+{
+	return bench_read8(l->bench, BENCH_STATION, ESC_REG_AL_STATUS);
+}
+
+static void write_al_status(struct line *l, uint8_t state)
+{
+	esc_pdi_write(segment_esc(l->bench->segment, 0), l->bench->now_ns, ESC_REG_AL_STATUS,
+		      &state, 1);
+}
+
+TEST(sim_fault, a_slow_slave_shows_its_state_later_even_if_it_is_asked_again)
+{
+	struct line l = open_line();
+
+	apply(&l, "at=0s slow slave=0 state=preop by=50ms");
+	write_al_status(&l, 2);
+	l.bench->now_ns += 30 * MS;
+	CHECK_EQ(al_status(&l), 1);
+	write_al_status(&l, 2);
+	l.bench->now_ns += 19 * MS;
+	CHECK_EQ(al_status(&l), 1);
+	l.bench->now_ns += 2 * MS;
+	CHECK_EQ(al_status(&l), 2);
+	close_line(&l);
+}
+
+TEST(sim_fault, an_unwilling_slave_refuses_one_state_until_it_obeys)
+{
+	struct line l = open_line();
+	const uint8_t code[2] = { 0 };
+
+	apply(&l, "at=0s refuse slave=0 state=preop code=0x0018");
+	write_al_status(&l, 2);
+	esc_pdi_write(segment_esc(l.bench->segment, 0), l.bench->now_ns, ESC_REG_AL_STATUS_CODE,
+		      code, 2);
+	CHECK_EQ(al_status(&l), 0x11);
+	CHECK_EQ(bench_read8(l.bench, BENCH_STATION, ESC_REG_AL_STATUS_CODE), 0x18);
+	apply(&l, "at=0s obey slave=0");
+	write_al_status(&l, 2);
+	CHECK_EQ(al_status(&l), 2);
+	close_line(&l);
+}
