@@ -47,10 +47,11 @@ static struct dc_servo_result apply(struct dc_servo *servo, double error_ns, dou
 					 .correction_ns = (int64_t)whole };
 }
 
-/* Deadlines only ever move back in a jump: moving forward could land in the past. */
+/* Deadlines only ever move back in a jump: moving forward could land in the past. The frequency
+ * learnt so far stays. */
 static struct dc_servo_result jump(struct dc_servo *servo, int64_t error_ns)
 {
-	servo->has_jumped = 1;
+	servo->is_phase_known = 1;
 	servo->filtered_ns = 0;
 	servo->far_off = 0;
 	servo->in_window = 0;
@@ -94,7 +95,7 @@ struct dc_servo_result dc_servo_update(struct dc_servo *servo, int64_t frame_dc_
 	double correction_ns;
 
 	servo->coasted = 0;
-	if (!servo->has_jumped) {
+	if (!servo->is_phase_known) {
 		return jump(servo, error_ns);
 	}
 	servo->far_off = leak(servo->far_off, llabs(error_ns) > spec->period_ns / 8);
@@ -119,7 +120,7 @@ struct dc_servo_result dc_servo_coast(struct dc_servo *servo)
 		servo->coasted++;
 	} else if (servo->state == DC_LOCKED) {
 		servo->state = DC_LOST;
-		servo->has_jumped = 0; /* the next measurement restarts */
+		servo->is_phase_known = 0; /* jump to the next measurement */
 	}
-	return apply(servo, 0, servo->has_jumped ? servo->integral_ns : 0);
+	return apply(servo, 0, servo->integral_ns);
 }

@@ -33,7 +33,7 @@ struct dc_servo {
 	double integral_ns;  /* correction that holds the frequency */
 	double filtered_ns;  /* error, smoothed over about 16 cycles */
 	double remainder_ns; /* part of a ns that is still owed */
-	int has_jumped;
+	int is_phase_known;  /* 0: the next measurement jumps to it */
 	uint32_t in_window;  /* leaky count towards lock */
 	uint32_t out_window; /* leaky count towards unlock */
 	uint32_t far_off;    /* leaky count towards another jump */
@@ -54,7 +54,10 @@ void dc_servo_init(struct dc_servo *servo, const struct dc_servo_spec *spec);
 struct dc_servo_result dc_servo_update(struct dc_servo *servo, int64_t frame_dc_ns,
 				       int64_t send_latency_ns);
 
-/** No measurement in this cycle: keep the frequency. */
+/**
+ * No measurement in this cycle: keep the frequency, however long it lasts. After 200 such cycles
+ * lock is lost, and the next measurement is jumped to.
+ */
 struct dc_servo_result dc_servo_coast(struct dc_servo *servo);
 
 #endif

@@ -120,6 +120,38 @@ TEST(dc_servo, it_keeps_the_frequency_over_an_outage_and_reports_the_loss_of_loc
 	CHECK_EQ(p.servo.state, DC_LOST);
 }
 
+/* How far the deadline walks off in @cycles without a measurement, at @ppm. */
+static double walk_without_reference(double ppm, unsigned cycles)
+{
+	struct plant p = make_plant(11, 1e9, ppm, 0);
+	double before;
+
+	for (unsigned i = 0; i < 20000; i++) {
+		turn(&p);
+	}
+	CHECK_EQ(p.servo.state, DC_LOCKED);
+	before = p.host_ns;
+	for (unsigned i = 0; i < cycles; i++) {
+		struct dc_servo_result r = dc_servo_coast(&p.servo);
+
+		p.host_ns += (double)(PERIOD_NS + r.correction_ns) * (1.0 + p.ppm * 1e-6);
+	}
+	CHECK_EQ(p.servo.state, DC_LOST);
+	/* The frequency, not the phase, is what was learnt: relock is a jump and no search. */
+	for (unsigned i = 0; i < spec.lock_cycles + 1; i++) {
+		turn(&p);
+		CHECK_EQ(p.servo.state, i < spec.lock_cycles ? DC_LOST : DC_LOCKED);
+	}
+	return fabs(p.host_ns - before - (double)(cycles + spec.lock_cycles + 1) * PERIOD_NS);
+}
+
+TEST(dc_servo, without_a_reference_for_minutes_the_frequency_stays)
+{
+	CHECK(walk_without_reference(80.0, 1000) < 1000.0);
+	CHECK(walk_without_reference(80.0, 60000) < 60000.0);
+	CHECK(walk_without_reference(-120.0, 60000) < 60000.0);
+}
+
 TEST(dc_servo, a_step_of_the_reference_loses_the_lock_and_finds_it_again)
 {
 	struct plant p = make_plant(3, 1e9, -50.0, 20000);
