@@ -108,7 +108,9 @@ const struct option option_table[] = {
 	  .min = "1",
 	  .max = "1000",
 	  .unit = "cycles",
-	  .prose = "Consecutive cycles with a low WKC before recovery starts." },
+	  .prose = "Number of cycles with a low WKC of the process data, consecutive or not, after "
+		   "which the service thread checks all slaves at once instead of at its next "
+		   "regular check (every 100 ms)." },
 	{ .name = "bus.monitor",
 	  .type = OPTION_SWITCH,
 	  FIELD(bus_monitor),
@@ -241,7 +243,8 @@ const struct option option_table[] = {
 	  .min = "100ns",
 	  .max = "5ms",
 	  .unit = "us",
-	  .prose = "Lock is lost when the filtered phase error exceeds this." },
+	  .prose = "Lock is lost after 200 cycles with a phase error of the single frame (not "
+		   "filtered) above this; each cycle below it takes two of them back." },
 	{ .name = "dc.slew",
 	  .type = OPTION_DURATION,
 	  FIELD(dc_slew_ns),
@@ -736,7 +739,8 @@ const struct option option_table[] = {
 	  .min = "-1e300",
 	  .max = "1e300",
 	  .unit = "",
-	  .prose = "Physical value while the bus is not in OP or its owner is silent." },
+	  .prose = "Physical value while the bus is not in OP or its owner is silent, and in place "
+		   "of a value that is not a number." },
 	{ .name = "outputs[].min",
 	  .type = OPTION_NUMBER,
 	  OUTPUT(min),
@@ -761,7 +765,8 @@ const struct option option_table[] = {
 	  .max = "1h",
 	  .unit = "ms",
 	  .prose = "Remote owners only: after this time without a heartbeat of the "
-		   "owner, the output goes to its fail-safe value. 0s: never." },
+		   "owner, the output goes to its fail-safe value. Rounded up to whole cycles. "
+		   "0s: never." },
 };
 
 const size_t option_count = sizeof(option_table) / sizeof(option_table[0]);

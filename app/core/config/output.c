@@ -3,6 +3,7 @@
 
 #include <errno.h>
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -61,8 +62,11 @@ int config_output_check(const struct config *cfg, const struct channel *ch, enum
 		return -ERANGE;
 	}
 	physical = image_raw_to_physical(ch, raw);
-	/* A NaN is in no range. */
-	if (rules != NULL && !(physical >= rules->min && physical <= rules->max)) {
+	if (isnan(physical)) {
+		snprintf(reason, reason_bytes, "%s: is not a number", ch->name);
+		return -ERANGE;
+	}
+	if (rules != NULL && (physical < rules->min || physical > rules->max)) {
 		snprintf(reason, reason_bytes, "%s: %g is outside %g to %g (outputs[])", ch->name,
 			 physical, rules->min, rules->max);
 		return -ERANGE;

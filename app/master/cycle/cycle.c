@@ -50,7 +50,7 @@ int cycle_create(const struct cycle_spec *spec, struct cycle **ret_cycle, char *
 		free(cy);
 		return r;
 	}
-	outputs_choose(&cy->outputs, cy->image, 0);
+	outputs_choose(&cy->outputs, cy->image, 0, 0);
 	cy->was_fail_safe = 1;
 	cy->slaves = UINT64_MAX;
 	atomic_init(&cy->wanted_slaves, UINT64_MAX);
@@ -148,7 +148,8 @@ static mono_t receive_deadline(const struct cycle *cy, mono_t now)
 static void choose_outputs(struct cycle *cy, uint8_t *image)
 {
 	int is_live = cy->phase == CYCLE_OP && !cy->is_latched_safe;
-	unsigned timed_out = outputs_choose(&cy->outputs, image, is_live ? cy->slaves : 0);
+	unsigned timed_out =
+		outputs_choose(&cy->outputs, image, is_live ? cy->slaves : 0, cy->sample.cycle);
 	int is_fail_safe = !is_live || timed_out > 0 || cycle_is_control_safe(cy);
 
 	if (is_fail_safe && !cy->was_fail_safe) {

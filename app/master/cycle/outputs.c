@@ -2,7 +2,7 @@
 #include "cycle/outputs.h"
 
 #include <errno.h>
-#include <float.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -49,13 +49,15 @@ static int configure(struct outputs *outputs, const struct cycle_spec *spec,
 	out->max = wanted->max;
 	/* A limit the channel cannot reach is none. */
 	if (image_physical_to_raw(out->channel, wanted->min, &out->min_raw) < 0) {
-		out->min = -DBL_MAX;
+		out->min = -INFINITY;
 	}
 	if (image_physical_to_raw(out->channel, wanted->max, &out->max_raw) < 0) {
-		out->max = DBL_MAX;
+		out->max = INFINITY;
 	}
 	out->owner = writer_of[wanted->owner];
-	out->timeout_cycles = (uint64_t)(wanted->timeout_ns / spec->cfg->cycle_period_ns);
+	/* Rounded up: a timeout below a period is a period, not none. */
+	out->timeout_cycles = (uint64_t)((wanted->timeout_ns + spec->cfg->cycle_period_ns - 1) /
+					 spec->cfg->cycle_period_ns);
 	return 0;
 }
 
@@ -75,8 +77,8 @@ int outputs_init(struct outputs *outputs, const struct cycle_spec *spec, char *e
 		outputs->output[outputs->output_count++] = (struct output){
 			.channel = &spec->channels[i],
 			.owner = CYCLE_WRITER_LOCAL,
-			.min = -DBL_MAX,
-			.max = DBL_MAX,
+			.min = -INFINITY,
+			.max = INFINITY,
 		};
 	}
 	memcpy(outputs->board, spec->boards, sizeof(outputs->board));
@@ -90,45 +92,50 @@ int outputs_init(struct outputs *outputs, const struct cycle_spec *spec, char *e
 	return 0;
 }
 
-static void take_boards(struct outputs *outputs)
+static void take_boards(struct outputs *outputs, uint64_t cycle)
 {
 	for (unsigned w = 0; w < CYCLE_WRITERS; w++) {
 		struct board *board = outputs->board[w];
 		uint64_t beat;
+		int has_new_set;
 
 		if (board == NULL) {
 			continue;
 		}
 		beat = atomic_load_explicit(&board->beat, memory_order_relaxed);
-		outputs->silent_cycles[w] =
-			beat == outputs->beat[w] ? outputs->silent_cycles[w] + 1 : 0;
-		outputs->beat[w] = beat;
-		if (board_take(board, (unsigned)outputs->output_count, &outputs->set[w])) {
-			outputs->silent_cycles[w] = 0;
+		has_new_set = board_take(board, (unsigned)outputs->output_count, &outputs->set[w]);
+		if (beat != outputs->beat[w] || has_new_set) {
+			outputs->beat[w] = beat;
+			outputs->alive_cycle[w] = cycle;
 		}
 	}
 }
 
+/* A NaN is in no range: neither comparison would stop it. */
 static uint64_t limited(const struct output *out, uint64_t raw)
 {
 	double physical = image_raw_to_physical(out->channel, raw);
 
+	if (isnan(physical)) {
+		return out->fail_safe_raw;
+	}
 	if (physical < out->min) {
 		return out->min_raw;
 	}
 	return physical > out->max ? out->max_raw : raw;
 }
 
-unsigned outputs_choose(struct outputs *outputs, uint8_t *image, uint64_t live_slaves)
+unsigned outputs_choose(struct outputs *outputs, uint8_t *image, uint64_t live_slaves,
+			uint64_t cycle)
 {
 	unsigned timed_out = 0;
 
-	take_boards(outputs);
+	take_boards(outputs, cycle);
 	for (size_t i = 0; i < outputs->output_count; i++) {
 		const struct output *out = &outputs->output[i];
 		const struct board_set *set = &outputs->set[out->owner];
 		int is_silent = out->timeout_cycles > 0 &&
-				outputs->silent_cycles[out->owner] > out->timeout_cycles;
+				cycle - outputs->alive_cycle[out->owner] > out->timeout_cycles;
 		int is_live = (live_slaves >> out->channel->slave_pos & 1) != 0;
 		uint64_t raw = out->fail_safe_raw;
 

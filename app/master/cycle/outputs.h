@@ -19,11 +19,11 @@ struct output {
 	const struct channel *channel;
 	enum cycle_writer owner;
 	uint64_t fail_safe_raw;
-	double min; /* physical */
+	double min; /* physical; infinite: no limit */
 	double max;
 	uint64_t min_raw;
 	uint64_t max_raw;
-	uint64_t timeout_cycles; /* 0: none */
+	uint64_t timeout_cycles; /* by cycle number: skipped cycles count; 0: none */
 };
 
 struct outputs {
@@ -31,7 +31,7 @@ struct outputs {
 	struct board_set set[CYCLE_WRITERS];
 	uint64_t answered[CYCLE_WRITERS]; /* sequence of the last set that was answered */
 	uint64_t beat[CYCLE_WRITERS];
-	uint64_t silent_cycles[CYCLE_WRITERS];
+	uint64_t alive_cycle[CYCLE_WRITERS]; /* the last with a sign of life of the writer */
 	struct output output[BOARD_OUTPUTS];
 	size_t output_count;
 };
@@ -41,10 +41,12 @@ int outputs_init(struct outputs *outputs, const struct cycle_spec *spec, char *e
 		 size_t error_bytes);
 
 /**
- * Write all outputs into @image. With @is_live 0 they are fail-safe. Returns how many are fail-safe
- * although they should be live (their owner is silent).
+ * Write all outputs into @image: live for @live_slaves, fail-safe for all others, for a value that
+ * is not a number, and for an owner that has been silent for longer than its timeout at @cycle.
+ * Returns how many are fail-safe because of the latter.
  */
-unsigned outputs_choose(struct outputs *outputs, uint8_t *image, uint64_t live_slaves);
+unsigned outputs_choose(struct outputs *outputs, uint8_t *image, uint64_t live_slaves,
+			uint64_t cycle);
 
 /** The image last written went on the wire in @cycle: answer the boards. */
 void outputs_sent(struct outputs *outputs, uint64_t cycle);

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Limits of outputs, as raw values on the wire. */
+/* Limits and timeouts of outputs, as raw values on the wire. */
 #include "cycle/outputs.h"
+
+#include <math.h>
 
 #include "harness/test.h"
 #include "image/image.h"
@@ -11,24 +13,41 @@ static const struct channel valve = { .name = "a.valve",
 				      .type = CHANNEL_INT,
 				      .bit_len = 12,
 				      .scale = 0.1 };
+static const struct channel speed = { .name = "a.speed",
+				      .direction = CHANNEL_OUTPUT,
+				      .type = CHANNEL_FLOAT,
+				      .bit_len = 32,
+				      .scale = 1 };
 static struct config cfg;
 static struct board board;
 static struct outputs outputs;
 
-static void start(double min, double max)
+static void start_with(const struct channel *channel, const struct config_output *rules,
+		       enum cycle_writer writer)
 {
 	char error[128] = "";
-	struct cycle_spec spec = { .cfg = &cfg,
-				   .channels = &valve,
-				   .channel_count = 1,
-				   .boards = { [CYCLE_WRITER_LOCAL] = &board } };
+	struct cycle_spec spec = { .cfg = &cfg, .channels = channel, .channel_count = 1 };
 
+	spec.boards[writer] = &board;
 	memset(&cfg, 0, sizeof(cfg));
 	cfg.cycle_period_ns = 1000000;
 	cfg.output_count = 1;
-	cfg.output[0] = (struct config_output){ .channel = "a.valve", .min = min, .max = max };
+	cfg.output[0] = *rules;
+	snprintf(cfg.output[0].channel, sizeof(cfg.output[0].channel), "%s", channel->name);
 	board_init(&board);
 	CHECK_EQ(outputs_init(&outputs, &spec, error, sizeof(error)), 0);
+}
+
+static void start(double min, double max)
+{
+	start_with(&valve, &(struct config_output){ .min = min, .max = max }, CYCLE_WRITER_LOCAL);
+}
+
+static void command(uint64_t raw)
+{
+	board_begin(&board);
+	board_put(&board, 0, raw);
+	board_commit(&board);
 }
 
 /* What goes out when @physical is commanded, in tenths. */
@@ -38,10 +57,8 @@ static int sent(double physical)
 	uint64_t raw;
 
 	CHECK_EQ(image_physical_to_raw(&valve, physical, &raw), 0);
-	board_begin(&board);
-	board_put(&board, 0, raw);
-	board_commit(&board);
-	CHECK_EQ(outputs_choose(&outputs, image, 1), 0);
+	command(raw);
+	CHECK_EQ(outputs_choose(&outputs, image, 1, 1), 0);
 	raw = image_get_raw(image, &valve);
 	return raw & 0x800 ? (int)raw - 0x1000 : (int)raw;
 }
@@ -73,4 +90,83 @@ TEST(outputs, a_limit_of_one_side_leaves_the_other_side_alone)
 	start(-1e9, 100);
 	CHECK_EQ(sent(-204.8), -2048);
 	CHECK_EQ(sent(150), 1000);
+}
+
+/* What goes out of the channel a.speed when the float @text is commanded. */
+static float speed_sent(const char *text)
+{
+	uint8_t image[4];
+	uint64_t raw;
+
+	CHECK_EQ(image_raw_parse(&speed, text, &raw), 0);
+	command(raw);
+	CHECK_EQ(outputs_choose(&outputs, image, 1, 1), 0);
+	return (float)image_get_physical(image, &speed);
+}
+
+TEST(outputs, a_value_that_is_not_a_number_goes_out_as_the_fail_safe_value)
+{
+	start_with(&speed, &(struct config_output){ .min = -10, .max = 10, .fail_safe = 3 },
+		   CYCLE_WRITER_LOCAL);
+	CHECK(speed_sent("5") == 5.0f);
+	CHECK(speed_sent("nan") == 3.0f);
+	CHECK(speed_sent("-nan") == 3.0f);
+	CHECK(speed_sent("inf") == 10.0f);
+	CHECK(speed_sent("-inf") == -10.0f);
+	CHECK(speed_sent("1e9") == 10.0f);
+}
+
+TEST(outputs, a_value_that_is_not_a_number_is_not_sent_where_there_is_no_limit)
+{
+	start_with(&speed,
+		   &(struct config_output){ .min = -INFINITY, .max = INFINITY, .fail_safe = 0.5 },
+		   CYCLE_WRITER_LOCAL);
+	CHECK(speed_sent("1e9") == 1e9f);
+	CHECK(speed_sent("nan") == 0.5f);
+}
+
+/* The first cycle in which the output is fail-safe, when its owner was alive in cycle 100. */
+static uint64_t silent_since(int64_t period_ns, int64_t timeout_ns, uint64_t step)
+{
+	uint8_t image[2] = { 0 };
+	uint64_t cycle = 100;
+	char error[128] = "";
+	struct cycle_spec spec = { .cfg = &cfg,
+				   .channels = &valve,
+				   .channel_count = 1,
+				   .boards = { [CYCLE_WRITER_REMOTE] = &board } };
+
+	start_with(&valve,
+		   &(struct config_output){ .min = -50,
+					    .max = 50,
+					    .owner = CONFIG_OWNER_REMOTE,
+					    .timeout_ns = timeout_ns },
+		   CYCLE_WRITER_REMOTE);
+	cfg.cycle_period_ns = period_ns;
+	CHECK_EQ(outputs_init(&outputs, &spec, error, sizeof(error)), 0);
+	command(7);
+	CHECK_EQ(outputs_choose(&outputs, image, 1, cycle), 0);
+	CHECK_EQ(image_get_raw(image, &valve), 7);
+	while (outputs_choose(&outputs, image, 1, cycle) == 0) {
+		CHECK_EQ(image_get_raw(image, &valve), 7);
+		cycle += step;
+		CHECK(cycle < 1000);
+	}
+	CHECK_EQ(image_get_raw(image, &valve), 0);
+	return cycle;
+}
+
+TEST(outputs, a_timeout_below_a_period_is_one_period)
+{
+	CHECK_EQ(silent_since(10000000, 5000000, 1), 102);
+	CHECK_EQ(silent_since(10000000, 1, 1), 102);
+	CHECK_EQ(silent_since(10000000, 10000000, 1), 102);
+	CHECK_EQ(silent_since(10000000, 10000001, 1), 103);
+}
+
+TEST(outputs, a_timeout_counts_the_cycles_that_an_overrun_has_skipped)
+{
+	CHECK_EQ(silent_since(1000000, 50000000, 1), 151);
+	CHECK_EQ(silent_since(1000000, 50000000, 10), 160);
+	CHECK_EQ(silent_since(1000000, 50000000, 60), 160);
 }
