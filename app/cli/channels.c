@@ -2,10 +2,10 @@
 /* ecdaq channels */
 #include <stdio.h>
 
+#include "base/args.h"
 #include "cli/cli.h"
 #include "cli/source.h"
 #include "image/image.h"
-#include "program/args.h"
 #include "program/json.h"
 
 static void show(const struct channel *ch)

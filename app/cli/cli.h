@@ -6,8 +6,8 @@
 #ifndef CLI_CLI_H
 #define CLI_CLI_H
 
+#include "base/args.h"
 #include "config/config.h"
-#include "program/args.h"
 #include "program/exit_code.h"
 
 struct verb;

@@ -8,7 +8,7 @@
 #include "cli/running.h"
 #include "cli/screen.h"
 #include "cli/source.h"
-#include "program/args.h"
+#include "program/args_duration.h"
 
 enum exit_code verb_clear(struct cli *cli, int argc, char **argv)
 {

@@ -6,12 +6,13 @@
 #include <string.h>
 #include <time.h>
 
+#include "base/args.h"
 #include "base/clock.h"
 #include "base/event.h"
 #include "cli/cli.h"
 #include "cli/screen.h"
+#include "cli/source.h"
 #include "cli/text.h"
-#include "program/args.h"
 #include "program/json.h"
 #include "reader/feed.h"
 #include "reader/reader.h"
@@ -162,25 +163,6 @@ static enum exit_code run(struct events *events)
 	}
 }
 
-static enum exit_code fail_open(const struct cli *cli, const char *path, int error)
-{
-	switch (error) {
-	case -ENOENT:
-	case -ENOTDIR:
-		return cli_fail(cli, EXIT_CODE_NO_DAEMON,
-				"events: %s is not there: is ecdaqd running?", path);
-	case -EACCES:
-	case -EPERM:
-		return cli_fail(cli, EXIT_CODE_PERMISSION,
-				"events: no permission to read %s: be root or in its group", path);
-	case -EPROTO:
-		return cli_fail(cli, EXIT_CODE_FAILED,
-				"events: %s is of another version of ecdaq, or damaged", path);
-	default:
-		return cli_fail(cli, EXIT_CODE_FAILED, "events: %s: %s", path, strerror(-error));
-	}
-}
-
 static enum exit_code open_feeds(struct events *events)
 {
 	char path[CONFIG_PATH_BYTES];
@@ -198,7 +180,7 @@ static enum exit_code open_feeds(struct events *events)
 	events->sync0 = feed_create(FEED_EVENTS, sync0_path, FEED_AT_OLDEST);
 	r = events->feed == NULL || events->sync0 == NULL ? -ENOMEM : feed_open(events->feed, NULL);
 	if (r < 0) {
-		return fail_open(events->cli, path, r);
+		return source_fail_open(events->cli, path, -r);
 	}
 	feed_seek_back(events->feed, events->count);
 	(void)feed_open(events->sync0, NULL);

@@ -7,12 +7,12 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/args.h"
 #include "cli/bars.h"
 #include "cli/cli.h"
 #include "cli/screen.h"
 #include "cli/source.h"
 #include "cli/text.h"
-#include "program/args.h"
 #include "program/json.h"
 
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)

@@ -7,8 +7,8 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "base/args.h"
 #include "cli/cli.h"
-#include "program/args.h"
 #include "program/exit_code.h"
 
 static enum exit_code verb_version(struct cli *cli, int argc, char **argv)

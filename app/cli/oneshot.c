@@ -12,7 +12,7 @@
 #include "cli/screen.h"
 #include "cli/text.h"
 #include "image/image.h"
-#include "program/args.h"
+#include "program/args_duration.h"
 #include "program/json.h"
 #include "reader/table.h"
 

@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "base/stop.h"
 
 static volatile sig_atomic_t is_over;
 static volatile sig_atomic_t must_suspend; /* Ctrl-Z */
@@ -70,7 +71,7 @@ static void on_signal(int number)
 	case SIGCONT:
 		was_continued = 1;
 		break;
-	default:
+	default: /* SIGHUP: the terminal is gone */
 		is_over = 1;
 		break;
 	}
@@ -90,14 +91,13 @@ static void handle_signal(int number, void (*handler)(int number))
 
 void screen_catch_signals(void)
 {
-	handle_signal(SIGINT, on_signal);
-	handle_signal(SIGTERM, on_signal);
+	stop_catch(STOP_REPEAT_IGNORED, NULL);
 	handle_signal(SIGHUP, on_signal);
 }
 
 int screen_is_over(void)
 {
-	return is_over != 0;
+	return is_over != 0 || stop_requested();
 }
 
 static void take_terminal(void)
@@ -284,7 +284,7 @@ int screen_wait(int64_t ns)
 		sigaddset(&caught, numbers[i]);
 	}
 	sigprocmask(SIG_BLOCK, &caught, &mask);
-	while (!is_over && key == 0 && !must_suspend && !was_continued) {
+	while (!screen_is_over() && key == 0 && !must_suspend && !was_continued) {
 		int64_t left_ns = until_ns - now_ns();
 		struct timespec left = { .tv_sec = left_ns / NS_PER_S,
 					 .tv_nsec = left_ns % NS_PER_S };

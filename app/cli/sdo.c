@@ -8,13 +8,13 @@
 #include <string.h>
 #include <strings.h>
 
+#include "base/args.h"
 #include "base/bytes.h"
 #include "cli/admin_client.h"
 #include "cli/cli.h"
 #include "cli/sdo_abort.h"
 #include "cli/source.h"
 #include "config/sdo_value.h"
-#include "program/args.h"
 #include "program/json.h"
 
 struct sdo {

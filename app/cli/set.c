@@ -6,12 +6,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/args.h"
 #include "cli/admin_client.h"
 #include "cli/choose.h"
 #include "cli/cli.h"
 #include "cli/source.h"
 #include "image/image.h"
-#include "program/args.h"
 #include "program/json.h"
 
 struct setting {

@@ -3,11 +3,11 @@
 #include <inttypes.h>
 #include <stdio.h>
 
+#include "base/args.h"
 #include "cli/cli.h"
 #include "cli/report.h"
 #include "cli/source.h"
 #include "cli/text.h"
-#include "program/args.h"
 #include "wire/al.h"
 
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)

@@ -8,24 +8,22 @@
 
 #include "reader/page.h"
 
-/* Say why @path cannot be read. */
-static enum exit_code fail_open(const struct cli *cli, const char *what, const char *path, int err)
+enum exit_code source_fail_open(const struct cli *cli, const char *path, int err)
 {
 	switch (err) {
 	case ENOENT:
 	case ENOTDIR:
-		return cli_fail(cli, EXIT_CODE_NO_DAEMON, "%s: %s is not there: is ecdaqd running?",
-				what, path);
+		return cli_fail(cli, EXIT_CODE_NO_DAEMON, "%s is not there: is ecdaqd running?",
+				path);
 	case EACCES:
 	case EPERM:
 		return cli_fail(cli, EXIT_CODE_PERMISSION,
-				"%s: no permission to read %s: be root or in its group", what,
-				path);
+				"no permission to read %s: be root or in its group", path);
 	case EPROTO:
 		return cli_fail(cli, EXIT_CODE_FAILED,
-				"%s: %s is of another version of ecdaq, or damaged", what, path);
+				"%s is of another version of ecdaq, or damaged", path);
 	default:
-		return cli_fail(cli, EXIT_CODE_FAILED, "%s: %s: %s", what, path, strerror(err));
+		return cli_fail(cli, EXIT_CODE_FAILED, "%s: %s", path, strerror(err));
 	}
 }
 
@@ -39,7 +37,7 @@ enum exit_code source_status(struct cli *cli, const struct status_page **ret_pag
 		return result;
 	}
 	r = source_try_status(cli, ret_page);
-	return r < 0 ? fail_open(cli, "status", path, -r) : EXIT_CODE_OK;
+	return r < 0 ? source_fail_open(cli, path, -r) : EXIT_CODE_OK;
 }
 
 int source_try_status(struct cli *cli, const struct status_page **ret_page)
@@ -142,7 +140,7 @@ enum exit_code samples_open(struct cli *cli, struct samples *ret_samples)
 		return result;
 	}
 	r = samples_try(cli, ret_samples);
-	return r < 0 ? fail_open(cli, "samples", path, -r) : EXIT_CODE_OK;
+	return r < 0 ? source_fail_open(cli, path, -r) : EXIT_CODE_OK;
 }
 
 void samples_close(struct samples *samples)

@@ -14,6 +14,9 @@
 #include "cli/cli.h"
 #include "reader/reader.h"
 
+/** Report why @path in the run directory cannot be read: errno @err. */
+enum exit_code source_fail_open(const struct cli *cli, const char *path, int err);
+
 /** A copy of ecdaqd's status page. EXIT_CODE_OK, or the code of a failure, which has been reported.
  */
 enum exit_code source_status(struct cli *cli, const struct status_page **ret_page);

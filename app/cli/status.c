@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* ecdaq status */
+#include "base/args.h"
 #include "cli/cli.h"
 #include "cli/report.h"
 #include "cli/source.h"
-#include "program/args.h"
 
 enum exit_code verb_status(struct cli *cli, int argc, char **argv)
 {

@@ -8,12 +8,12 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "base/args.h"
 #include "cli/bars.h"
 #include "cli/cli.h"
 #include "cli/running.h"
 #include "cli/sync0_source.h"
 #include "cli/text.h"
-#include "program/args.h"
 #include "program/json.h"
 #include "reader/feed.h"
 

@@ -14,7 +14,7 @@
 #include "cli/screen.h"
 #include "cli/source.h"
 #include "cli/text.h"
-#include "program/args.h"
+#include "program/args_duration.h"
 
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
 

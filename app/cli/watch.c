@@ -16,7 +16,7 @@
 #include "cli/plot.h"
 #include "cli/screen.h"
 #include "image/image.h"
-#include "program/args.h"
+#include "program/args_duration.h"
 #include "program/json.h"
 
 #define DRAW_PERIOD_NS (NS_PER_S / 15)

@@ -8,19 +8,16 @@ import re
 import pytest
 from project import sources
 
-# What only its definition holds, and where that is. ecdaq-sim, which sees little, has getopt.
+# What only its definition holds, and where that is.
 ONCE = {
     "exit codes": (r"enum \w*exit\w* \{|EXIT_CODE_\w+ = \d", {"app/core/program/exit_code.h"}),
     "JSON text": (r"\\u%04x", {"app/core/program/json.c"}),
     "long options": (
         r"getopt_long\s*\(|args_parse\(struct args [^;{]*\n\{",
-        {"app/core/program/args.c", "app/sim/simulator/options.c"},
+        {"app/core/base/args.c"},
     ),
     "--check and --set": (r"\{ \"(?:check|set)\", 0, args_", {"app/core/program/command_line.c"}),
-    "stop signals": (
-        r"sigaction\(SIGTERM",
-        {"app/core/program/stop.c", "app/sim/simulator/main.c"},
-    ),
+    "stop signals": (r"sigaction\(SIGTERM", {"app/core/base/stop.c"}),
 }
 
 

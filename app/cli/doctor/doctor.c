@@ -7,6 +7,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "base/args.h"
 #include "cli/cli.h"
 #include "cli/doctor/check.h"
 #include "cli/doctor/resolve.h"
@@ -14,7 +15,6 @@
 #include "cli/running.h"
 #include "cli/source.h"
 #include "cli/text.h"
-#include "program/args.h"
 #include "program/json.h"
 
 #define CYCLE_THREAD "ecdaqd-cycle"

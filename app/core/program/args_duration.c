@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
+#include "program/args_duration.h"
+
 #include <errno.h>
 #include <stdio.h>
 
 #include "config/config.h"
-#include "program/args.h"
 
 _Static_assert((int)ARGS_WHY_BYTES >= (int)CONFIG_WHY_BYTES, "a reason of config/ fits");
 

@@ -10,8 +10,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "base/args.h"
 #include "config/config.h"
-#include "program/args.h"
 #include "program/exit_code.h"
 
 enum { COMMAND_LINE_OVERRIDES = 7 };

@@ -50,10 +50,10 @@ struct ecdaq_events {
 
 static int ring_path(const char *run_dir, const char *name, char path[CONFIG_PATH_BYTES])
 {
-	const char *given = run_dir != NULL ? run_dir : getenv("ECDAQ_RUN_DIR");
-	const char *dir = given != NULL && given[0] != '\0' ? given : "/run/ecdaq";
-
-	return snprintf(path, CONFIG_PATH_BYTES, "%s/%s", dir, name) < CONFIG_PATH_BYTES
+	if (run_dir == NULL || run_dir[0] == '\0') {
+		return config_run_path(NULL, name, path, CONFIG_PATH_BYTES);
+	}
+	return snprintf(path, CONFIG_PATH_BYTES, "%s/%s", run_dir, name) < CONFIG_PATH_BYTES
 		       ? 0
 		       : -ENAMETOOLONG;
 }

@@ -115,9 +115,9 @@ struct ecdaq_reader;
 struct ecdaq_events;
 
 /**
- * Read the samples in @run_dir, the run directory of ecdaqd; NULL or "": $ECDAQ_RUN_DIR, else
- * /run/ecdaq. Succeeds without an ecdaqd; ecdaq_reader_next() then waits for one. 0; -ENOMEM;
- * -ENAMETOOLONG (ret untouched on failure). Release with ecdaq_reader_close().
+ * Read the samples in @run_dir, the run directory of ecdaqd; NULL or "": the one that ecdaqd itself
+ * takes (option run_dir). Succeeds without an ecdaqd; ecdaq_reader_next() then waits for one. 0;
+ * -ENOMEM; -ENAMETOOLONG (ret untouched on failure). Release with ecdaq_reader_close().
  */
 int ecdaq_reader_open(const char *run_dir, enum ecdaq_start start,
 		      struct ecdaq_reader **ret_reader);

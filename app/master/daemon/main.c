@@ -7,10 +7,10 @@
 #include <stdio.h>
 #include <unistd.h>
 
+#include "base/stop.h"
 #include "daemon/machine.h"
 #include "program/command_line.h"
 #include "program/error.h"
-#include "program/stop.h"
 
 /* How long the service loop sleeps when nothing presses. */
 #define SERVICE_PERIOD_MS 20

@@ -5,8 +5,8 @@
 #include <string.h>
 #include <time.h>
 
+#include "base/args.h"
 #include "keystore/keystore.h"
-#include "program/args.h"
 #include "program/error.h"
 #include "program/exit_code.h"
 

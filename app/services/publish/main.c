@@ -2,10 +2,10 @@
 /* ecdaq-dds: publishes the samples of ecdaqd over DDS and takes commands, until it is stopped. */
 #include <errno.h>
 
+#include "base/stop.h"
 #include "config/config.h"
 #include "program/command_line.h"
 #include "program/error.h"
-#include "program/stop.h"
 #include "publish/publisher.h"
 
 enum { ERROR_BYTES = 512 };

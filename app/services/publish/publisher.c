@@ -7,10 +7,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/timex.h>
 #include <time.h>
 
 #include "base/clock.h"
+#include "base/platform.h"
 #include "base/status.h"
 #include "publish/commands.h"
 #include "publish/domain.h"
@@ -230,12 +230,12 @@ static void publish_state(struct publisher *p)
 		.samples = p->counts,
 		.commands = commands_counts(p->commands),
 	};
-	struct timex t = { .modes = 0 };
+	int32_t tai_offset_s;
 
 	state_put_status(&p->topics, &view);
 	write_status_page(p);
-	if (p->samples != NULL && adjtimex(&t) >= 0) {
-		sample_writer_note_tai_offset(p->samples, t.tai);
+	if (p->samples != NULL && platform_tai_offset_s(&tai_offset_s) == 0) {
+		sample_writer_note_tai_offset(p->samples, tai_offset_s);
 	}
 }
 

@@ -6,8 +6,8 @@
 #include <limits.h>
 #include <string.h>
 
+#include "base/args.h"
 #include "config/config.h"
-#include "program/args.h"
 #include "program/error.h"
 #include "record/log_common.h"
 

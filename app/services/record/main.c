@@ -6,10 +6,10 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "base/stop.h"
 #include "config/config.h"
 #include "program/command_line.h"
 #include "program/error.h"
-#include "program/stop.h"
 #include "record/recorder.h"
 
 enum { IDLE_NS = 5000000, CONFIG_TEXT_BYTES = 1 << 20, ERROR_BYTES = 512 };

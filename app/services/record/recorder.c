@@ -7,9 +7,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/timex.h>
 
 #include "base/clock.h"
+#include "base/platform.h"
 #include "reader/feed.h"
 #include "reader/reader.h"
 #include "record/sample_feed.h"
@@ -208,10 +208,10 @@ static void look_for_session(struct recorder *rec)
 
 static void note_tai_offset(struct sample_feed *samples)
 {
-	struct timex t = { .modes = 0 };
+	int32_t tai_offset_s;
 
-	if (adjtimex(&t) >= 0) {
-		sample_feed_note_tai_offset(samples, t.tai);
+	if (platform_tai_offset_s(&tai_offset_s) == 0) {
+		sample_feed_note_tai_offset(samples, tai_offset_s);
 	}
 }
 

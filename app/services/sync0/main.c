@@ -5,10 +5,10 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/stop.h"
 #include "config/config.h"
 #include "program/command_line.h"
 #include "program/error.h"
-#include "program/stop.h"
 #include "sync0/calibrate_live.h"
 #include "sync0/replay.h"
 #include "sync0/watch.h"

@@ -2,14 +2,13 @@
 /* ecdaq-sim: the simulated segment on a network interface, in real time. */
 #include <errno.h>
 #include <sched.h>
-#include <signal.h>
-#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "base/stop.h"
 #include "segment/edge_writer.h"
 #include "segment/fault.h"
 #include "segment/segment.h"
@@ -49,14 +48,6 @@ struct simulation {
 	uint64_t bad_frames;
 };
 
-static _Atomic int stop_wanted;
-
-static void on_signal(int number)
-{
-	(void)number;
-	atomic_store_explicit(&stop_wanted, 1, memory_order_relaxed);
-}
-
 /* --- files and sockets --- */
 
 static void write_edge(void *ctx, unsigned slave, int64_t t_ns, uint64_t system_time_ns)
@@ -69,7 +60,7 @@ static int open_all(struct simulation *sim)
 	char error[256];
 	int r;
 
-	sim->faults = fault_plan_create(sim->opt.seed, wire_socket_now_ns());
+	sim->faults = fault_plan_create((uint64_t)sim->opt.seed.value, wire_socket_now_ns());
 	if (sim->faults == NULL) {
 		return sim_error("no memory");
 	}
@@ -79,7 +70,8 @@ static int open_all(struct simulation *sim)
 		return sim_error(error);
 	}
 	if (sim->opt.edges != NULL) {
-		r = edge_writer_open(sim->opt.edges, sim->opt.edges_keep_bytes, &sim->edges);
+		r = edge_writer_open(sim->opt.edges, (uint64_t)sim->opt.edges_keep_mib.value << 20,
+				     &sim->edges);
 		if (r < 0) {
 			snprintf(error, sizeof(error), "%s: %s", sim->opt.edges, strerror(-r));
 			return sim_error(error);
@@ -115,17 +107,17 @@ static void flush_edges(struct simulation *sim, int64_t now_ns)
 
 static void go_real_time(const struct sim_options *opt)
 {
-	struct sched_param p = { .sched_priority = opt->priority };
+	struct sched_param p = { .sched_priority = (int)opt->priority.value };
 	cpu_set_t set;
 
-	if (opt->cpu >= 0) {
+	if (opt->cpu.value >= 0) {
 		CPU_ZERO(&set);
-		CPU_SET((unsigned)opt->cpu, &set);
+		CPU_SET((unsigned)opt->cpu.value, &set);
 		if (sched_setaffinity(0, sizeof(set), &set) < 0) {
 			perror("ecdaq-sim: --cpu");
 		}
 	}
-	if (opt->priority > 0 && sched_setscheduler(0, SCHED_FIFO, &p) < 0) {
+	if (opt->priority.value > 0 && sched_setscheduler(0, SCHED_FIFO, &p) < 0) {
 		perror("ecdaq-sim: --priority");
 	}
 }
@@ -256,7 +248,7 @@ static int serve(struct simulation *sim)
 	uint8_t frame[FRAME_BYTES];
 	char line[256];
 
-	while (!atomic_load_explicit(&stop_wanted, memory_order_relaxed)) {
+	while (!stop_requested()) {
 		int64_t t_ns = 0;
 		int n = wire_socket_receive(sim->fd, frame, sizeof(frame), live_on(sim), &t_ns);
 
@@ -274,16 +266,13 @@ static int serve(struct simulation *sim)
 int main(int argc, char **argv)
 {
 	static struct simulation sim = {
-		.opt = { .slaves = "2", .seed = 1, .cpu = -1, .jitter_ns = 10, .wander_ppm = 0.5 },
 		.control_fd = -1,
 	};
-	struct sigaction action = { .sa_handler = on_signal };
 	int r;
 
-	sim.opt.signal = signal_default();
+	sim.opt = sim_options_default();
 	sim_options_read(argc, argv, &sim.opt);
-	sigaction(SIGTERM, &action, NULL);
-	sigaction(SIGINT, &action, NULL);
+	stop_catch(STOP_REPEAT_IGNORED, NULL);
 	if (topology_create(&sim.opt, wire_socket_now_ns(), &sim.segment) < 0 ||
 	    open_all(&sim) < 0) {
 		return 1;

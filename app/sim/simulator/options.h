@@ -5,6 +5,7 @@
 
 #include <stdint.h>
 
+#include "base/args.h"
 #include "segment/signal.h"
 
 struct sim_options {
@@ -15,15 +16,16 @@ struct sim_options {
 	const char *faults;
 	const char *control;
 	const char *edges;
-	uint64_t edges_keep_bytes; /* 0: all */
+	struct args_integer edges_keep_mib; /* 0: all */
 	struct signal_spec signal;
 	double wander_ppm;
-	int64_t jitter_ns;
-	uint64_t seed;
-	int priority;
-	int cpu;
+	struct args_integer jitter_ns;
+	struct args_integer seed;
+	struct args_integer priority; /* 0: not real-time */
+	struct args_integer cpu;      /* -1: any */
 };
 
+struct sim_options sim_options_default(void);
 /** Fill @opt over its defaults; ends the program on --help, --version (0) and on wrong options (2).
  */
 void sim_options_read(int argc, char **argv, struct sim_options *opt);

@@ -235,7 +235,7 @@ static int set_crystals(struct topology *l)
 		s->ppm = (prng_unit(&l->prng) - 0.5) * 100.0;
 		s->clock_start_ns = prng_below(&l->prng, 10 * (uint64_t)NS_PER_S);
 		s->seed = prng_next(&l->prng);
-		s->jitter_ns = l->opt->jitter_ns;
+		s->jitter_ns = l->opt->jitter_ns.value;
 		s->wander_ppm = l->opt->wander_ppm;
 		s->signal = l->opt->signal;
 		if (*text != '\0' && take_ppm(&text, &s->ppm) < 0) {
@@ -268,7 +268,7 @@ int topology_create(const struct sim_options *opt, int64_t t_ns, struct segment 
 	static struct topology l;
 
 	l.opt = opt;
-	l.prng.state = opt->seed;
+	l.prng.state = (uint64_t)opt->seed.value;
 	l.count = 0;
 	return make(&l, t_ns, ret_segment);
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "program/args.h"
+#include "base/args.h"
 
 #include "harness/test.h"
 
@@ -8,9 +8,9 @@ static struct {
 	const char *text;
 	uint64_t count;
 	double number;
-	int64_t duration_ns;
 	int64_t dc_ns;
 	uint64_t cycle;
+	struct args_integer level;
 	const char *run_dir;
 	struct args_list set;
 } got;
@@ -20,9 +20,9 @@ static const struct args_option options[] = {
 	{ "text", 't', args_text, &got.text, "T", "" },
 	{ "count", 0, args_count, &got.count, "N", "" },
 	{ "number", 0, args_number, &got.number, "X", "" },
-	{ "in", 0, args_duration, &got.duration_ns, "T", "" },
 	{ "at", 0, args_dc_time, &got.dc_ns, "NS", "" },
 	{ "from", 0, args_cycle, &got.cycle, "CYCLE", "" },
+	{ "level", 0, args_integer, &got.level, "N", "" },
 	{ "set", 0, args_list, &got.set, "X=Y", "" },
 };
 
@@ -45,6 +45,7 @@ static enum args_result parse(const char *const *line, int ends_at_operand)
 		argv[argc] = words[argc];
 	}
 	memset(&got, 0, sizeof(got));
+	got.level = (struct args_integer){ .low = -2, .high = 7 };
 	args = (struct args){ .options = options,
 			      .option_count = sizeof(options) / sizeof(options[0]),
 			      .shared = shared,
@@ -76,14 +77,11 @@ TEST(args, short_options_take_the_next_word)
 	CHECK_STR(got.text, "x");
 }
 
-TEST(args, values_carry_units_where_they_are_durations)
+TEST(args, numbers_and_times_are_taken_whole)
 {
-	CHECK_EQ(PARSE("a", "--in", "1.5ms", "--number", "2.5", "--at", "-3"), ARGS_OK);
-	CHECK_EQ(got.duration_ns, 1500000);
+	CHECK_EQ(PARSE("a", "--number", "2.5", "--at", "-3"), ARGS_OK);
 	CHECK(got.number == 2.5);
 	CHECK_EQ(got.dc_ns, -3);
-	CHECK_EQ(PARSE("a", "--in", "2"), ARGS_OK);
-	CHECK_EQ(got.duration_ns, INT64_C(2000000000));
 }
 
 TEST(args, both_tables_are_looked_at)
@@ -150,6 +148,19 @@ static void fails(const char *message, const char *const *line)
 
 #define FAILS(message, ...) fails(message, (const char *[]){ __VA_ARGS__, NULL })
 
+TEST(args, an_integer_is_taken_within_its_range_in_any_base)
+{
+	CHECK_EQ(PARSE("a", "--level", "-2"), ARGS_OK);
+	CHECK_EQ(got.level.value, -2);
+	CHECK_EQ(PARSE("a", "--level", "0x7"), ARGS_OK);
+	CHECK_EQ(got.level.value, 7);
+	FAILS("--level: \"8\": expected a whole number from -2 to 7", "a", "--level", "8");
+	FAILS("--level: \"-3\": expected a whole number from -2 to 7", "a", "--level", "-3");
+	FAILS("--level: \"7x\": expected a whole number from -2 to 7", "a", "--level", "7x");
+	FAILS("--level: \"99999999999999999999\": expected a whole number from -2 to 7", "a",
+	      "--level", "99999999999999999999");
+}
+
 TEST(args, each_mistake_is_named)
 {
 	FAILS("--flags: unknown option", "a", "--flags");
@@ -169,15 +180,11 @@ TEST(args, each_mistake_is_named)
 	FAILS("--number: \"nan\": expected a number above 0", "a", "--number", "nan");
 	FAILS("--number: \"inf\": expected a number above 0", "a", "--number", "inf");
 	FAILS("--number: \"0\": expected a number above 0", "a", "--number", "0");
-	FAILS("--in: \"0s\": expected a duration above 0", "a", "--in", "0s");
-	FAILS("--in: \"-1s\": expected a duration above 0", "a", "--in", "-1s");
 	FAILS("--at: \"soon\": expected a DC time in ns", "a", "--at", "soon");
 	FAILS("--at: \"99999999999999999999\": expected a DC time in ns", "a", "--at",
 	      "99999999999999999999");
 	FAILS("missing WORD...", "--flag");
 	FAILS("c: unexpected argument", "a", "b", "c");
-	CHECK_EQ(PARSE("a", "--in", "1parsec"), ARGS_ERROR);
-	CHECK(strstr(error, "--in: ") == error && strstr(error, "parsec") != NULL);
 }
 
 TEST(args, a_refused_value_leaves_its_target_untouched)

@@ -4,8 +4,8 @@
  * an option. Options and operands may be mixed; a word that starts with a dash and a digit is an
  * operand: a value. --help, -h and --version are options of every program. Context: blocking.
  */
-#ifndef PROGRAM_ARGS_H
-#define PROGRAM_ARGS_H
+#ifndef BASE_ARGS_H
+#define BASE_ARGS_H
 
 #include <stddef.h>
 #include <stdint.h>
@@ -19,14 +19,21 @@ enum { ARGS_WHY_BYTES = 192, ARGS_ERROR_BYTES = 320, ARGS_LIST_LIMIT = 256 };
  */
 typedef int args_parse_value(const char *text, void *target, char *why);
 
-args_parse_value args_flag;     /* int: 1; its option has no value */
-args_parse_value args_text;     /* const char *: into argv */
-args_parse_value args_list;     /* struct args_list: appended */
-args_parse_value args_count;    /* uint64_t, at least 1 */
-args_parse_value args_cycle;    /* uint64_t */
-args_parse_value args_number;   /* double, above 0 */
-args_parse_value args_dc_time;  /* int64_t ns */
-args_parse_value args_duration; /* int64_t ns, above 0: "500us"; a plain number is in s */
+args_parse_value args_flag;    /* int: 1; its option has no value */
+args_parse_value args_text;    /* const char *: into argv */
+args_parse_value args_list;    /* struct args_list: appended */
+args_parse_value args_count;   /* uint64_t, at least 1 */
+args_parse_value args_cycle;   /* uint64_t */
+args_parse_value args_number;  /* double, above 0 */
+args_parse_value args_integer; /* struct args_integer: decimal, 0x or 0 */
+args_parse_value args_dc_time; /* int64_t ns */
+
+/* A whole number from @low to @high. */
+struct args_integer {
+	int64_t low;
+	int64_t high;
+	int64_t value;
+};
 
 struct args_list {
 	const char *item[ARGS_LIST_LIMIT];

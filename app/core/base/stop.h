@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* SIGTERM and SIGINT, which stop a program in order. Once in a process. */
-#ifndef PROGRAM_STOP_H
-#define PROGRAM_STOP_H
+#ifndef BASE_STOP_H
+#define BASE_STOP_H
 
 #include <signal.h>
 #include <stdint.h>

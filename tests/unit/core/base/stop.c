@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "program/stop.h"
+#include "base/stop.h"
 
 #include <sys/wait.h>
 #include <unistd.h>

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-#include "program/args.h"
+#include "base/args.h"
 
 #include <errno.h>
+#include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -84,6 +85,25 @@ int args_number(const char *text, void *target, char *why)
 		return refuse(why, text, "a number above 0");
 	}
 	*(double *)target = value;
+	return 0;
+}
+
+int args_integer(const char *text, void *target, char *why)
+{
+	struct args_integer *integer = target;
+	long long value;
+	char *end;
+
+	errno = 0;
+	value = strtoll(text, &end, 0);
+	if (errno != 0 || end == text || *end != '\0' || value < integer->low ||
+	    value > integer->high) {
+		snprintf(why, ARGS_WHY_BYTES,
+			 "\"%.64s\": expected a whole number from %" PRId64 " to %" PRId64, text,
+			 integer->low, integer->high);
+		return -ERANGE;
+	}
+	integer->value = value;
 	return 0;
 }
 
