@@ -33,9 +33,7 @@ CASES = [
     ),
     Case(rules.rule_includes, "app/core/base/a.c", '#include "wire/al.h"', '#include "clock.h"'),
     Case(rules.rule_includes, "app/cli/a.c", '#include "cycle/cycle.h"', '#include "base/ring.h"'),
-    Case(
-        rules.rule_includes, "app/cli/a.c", '#include "record/mcap.h"', '#include "base/args.h"'
-    ),
+    Case(rules.rule_includes, "app/cli/a.c", '#include "record/mcap.h"', '#include "base/args.h"'),
     Case(
         rules.rule_includes,
         "app/cli/a.c",
