@@ -23,7 +23,7 @@ MISTAKES = [
     (FAILED, ["--interface", "nosuchnic"], "nosuchnic: no such interface"),
     (FAILED, [*NIC, "--slaves", "0"], "expected a number from 1 to 64"),
     (FAILED, [*NIC, "--slaves", "65"], "expected a number from 1 to 64"),
-    (FAILED, [*NIC, "--slaves", ""], "no name and no number"),
+    (USAGE, [*NIC, "--slaves", ""], "missing value"),
     (FAILED, [*NIC, "--slaves", "a/b"], "NAME,NAME"),
     (FAILED, [*NIC, "--slaves", "el2829"], "'el2829': not in the catalogue: did you mean el2828"),
     (FAILED, [*NIC, "--slaves", "motor"], "'motor': not in the catalogue: --list-slaves"),

@@ -1,11 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 #include "config/config.h"
 
-#include <errno.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
+
+#include "base/run_path.h"
 
 /* FB1111-Piccolo: 1 converts on command. */
 enum { MODE_INDEX = 0x8000, MODE_SUBINDEX = 1 };
@@ -26,39 +24,17 @@ int config_is_oneshot(const struct config *cfg, uint16_t slave_pos)
 	return 0;
 }
 
-/* The run directory that is named, or NULL. */
-static const char *named_run_dir(const struct config *cfg)
+static const char *run_dir(const struct config *cfg)
 {
-	const char *env = getenv("ECDAQ_RUN_DIR");
-
-	if (cfg != NULL && cfg->run_dir[0] != '\0') {
-		return cfg->run_dir;
-	}
-	return env != NULL && env[0] != '\0' ? env : NULL;
+	return cfg != NULL ? cfg->run_dir : NULL;
 }
 
 int config_has_run_dir(const struct config *cfg)
 {
-	return named_run_dir(cfg) != NULL;
+	return run_path_named(run_dir(cfg)) != NULL;
 }
 
 int config_run_path(const struct config *cfg, const char *file, char *ret_path, size_t path_bytes)
 {
-	const char *named = named_run_dir(cfg);
-	char path[2 * CONFIG_PATH_BYTES];
-	int len;
-
-	if (named != NULL) {
-		len = snprintf(path, sizeof(path), "%s/%s", named, file);
-	} else if (geteuid() == 0) {
-		len = snprintf(path, sizeof(path), "/run/ecdaq/%s", file);
-	} else {
-		len = snprintf(path, sizeof(path), "/dev/shm/ecdaq-%u/%s", (unsigned)geteuid(),
-			       file);
-	}
-	if (len < 0 || (size_t)len >= sizeof(path) || (size_t)len >= path_bytes) {
-		return -ENAMETOOLONG;
-	}
-	memcpy(ret_path, path, (size_t)len + 1);
-	return 0;
+	return run_path(run_dir(cfg), file, ret_path, path_bytes);
 }

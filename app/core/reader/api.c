@@ -12,6 +12,7 @@
 #include "base/clock.h"
 #include "base/event.h"
 #include "base/platform.h"
+#include "base/run_path.h"
 #include "base/sample.h"
 #include "config/config.h"
 #include "image/image.h"
@@ -48,16 +49,6 @@ struct ecdaq_events {
 	char text[TEXT_BYTES];
 };
 
-static int ring_path(const char *run_dir, const char *name, char path[CONFIG_PATH_BYTES])
-{
-	if (run_dir == NULL || run_dir[0] == '\0') {
-		return config_run_path(NULL, name, path, CONFIG_PATH_BYTES);
-	}
-	return snprintf(path, CONFIG_PATH_BYTES, "%s/%s", run_dir, name) < CONFIG_PATH_BYTES
-		       ? 0
-		       : -ENAMETOOLONG;
-}
-
 int ecdaq_reader_open(const char *run_dir, enum ecdaq_start start, struct ecdaq_reader **ret_reader)
 {
 	struct ecdaq_reader *r = calloc(1, sizeof(*r));
@@ -67,7 +58,7 @@ int ecdaq_reader_open(const char *run_dir, enum ecdaq_start start, struct ecdaq_
 	if (r == NULL) {
 		return -ENOMEM;
 	}
-	result = ring_path(run_dir, CONFIG_RUN_SAMPLES, path);
+	result = run_path(run_dir, CONFIG_RUN_SAMPLES, path, sizeof(path));
 	if (result == 0) {
 		result = reader_create(
 			path, start == ECDAQ_FROM_OLDEST ? READER_AT_OLDEST : READER_AT_NEWEST,
@@ -317,7 +308,7 @@ int ecdaq_events_open(const char *run_dir, enum ecdaq_start start, struct ecdaq_
 	if (e == NULL) {
 		return -ENOMEM;
 	}
-	result = ring_path(run_dir, CONFIG_RUN_EVENTS, path);
+	result = run_path(run_dir, CONFIG_RUN_EVENTS, path, sizeof(path));
 	if (result == 0) {
 		e->feed = feed_create(FEED_EVENTS, path,
 				      start == ECDAQ_FROM_OLDEST ? FEED_AT_OLDEST : FEED_AT_NEWEST);
