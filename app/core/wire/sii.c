@@ -220,6 +220,10 @@ static void parse_words(const uint8_t *image, struct sii *sii)
 	sii->product = get_le32(image + 0x14);
 	sii->revision = get_le32(image + 0x18);
 	sii->serial = get_le32(image + 0x1c);
+	sii->boot_out_start = get_le16(image + 0x28);
+	sii->boot_out_len = get_le16(image + 0x2a);
+	sii->boot_in_start = get_le16(image + 0x2c);
+	sii->boot_in_len = get_le16(image + 0x2e);
 	sii->mailbox_out_start = get_le16(image + 0x30);
 	sii->mailbox_out_len = get_le16(image + 0x32);
 	sii->mailbox_in_start = get_le16(image + 0x34);

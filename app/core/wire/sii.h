@@ -78,6 +78,11 @@ struct sii {
 	uint16_t mailbox_in_start;
 	uint16_t mailbox_in_len;
 	uint16_t mailbox_protocols; /* enum sii_mailbox_protocol */
+	/* Mailboxes of state BOOT; length 0: none. */
+	uint16_t boot_out_start;
+	uint16_t boot_out_len;
+	uint16_t boot_in_start;
+	uint16_t boot_in_len;
 	uint32_t size_bytes;
 	uint8_t coe_details;
 	uint8_t group_name; /* string numbers */

@@ -13,11 +13,6 @@ enum {
 	ACTIVATE_ON = 0x01,
 	ACTIVATE_REPEAT = 0x02,
 	PDI_REPEAT_DONE = 0x02,
-	TYPE_MASK = 0x0f,
-	COUNTER_SHIFT = 4,
-	COUNTER_MASK = 7,
-	ERROR_COMMAND = 1,
-	ERROR_BYTES = 4,
 };
 
 struct sm_view {
@@ -47,21 +42,18 @@ void mailbox_reset(struct mailbox *m)
 
 static void finish_answer(struct mailbox *m, unsigned type, size_t data_len)
 {
-	/* Counters go 1 to 7; 0 is for those who do not count. */
-	m->answer_counter = (uint8_t)(m->answer_counter % COUNTER_MASK + 1);
-	put_le16(m->answer, (uint16_t)data_len);
-	put_le16(m->answer + 2, 0);
-	m->answer[4] = 0;
-	m->answer[5] = (uint8_t)(type | (unsigned)m->answer_counter << COUNTER_SHIFT);
+	m->answer_counter = mailbox_counter_next(m->answer_counter);
+	mailbox_header_put(m->answer, &(struct mailbox_header){ .data_len = (uint16_t)data_len,
+								.type = (uint8_t)type,
+								.counter = m->answer_counter });
 	m->answer_len = MAILBOX_HEADER_BYTES + data_len;
 	m->is_waiting = 1;
 }
 
 static void answer_error(struct mailbox *m, enum mailbox_error error)
 {
-	put_le16(m->answer + MAILBOX_HEADER_BYTES, ERROR_COMMAND);
-	put_le16(m->answer + MAILBOX_HEADER_BYTES + 2, (uint16_t)error);
-	finish_answer(m, MAILBOX_ERROR, ERROR_BYTES);
+	mailbox_error_put(m->answer + MAILBOX_HEADER_BYTES, error);
+	finish_answer(m, MAILBOX_TYPE_ERROR, MAILBOX_ERROR_BYTES);
 }
 
 /* The last answer once more, unless it is still there. */
@@ -72,38 +64,69 @@ static void answer_again(struct mailbox *m, const struct sm_view *answer)
 	}
 }
 
-static void execute(struct mailbox *m, const uint8_t *request, size_t box_bytes,
-		    const struct sm_view *answer, mailbox_service service, void *ctx)
+static const struct mailbox_server *find_server(const struct mailbox_server *server, size_t count,
+						unsigned type)
 {
-	size_t len = get_le16(request);
-	unsigned type = request[5] & TYPE_MASK;
-	uint8_t counter = request[5] >> COUNTER_SHIFT & COUNTER_MASK;
+	for (size_t i = 0; i < count; i++) {
+		if (server[i].type == type) {
+			return &server[i];
+		}
+	}
+	return NULL;
+}
+
+static void execute(struct mailbox *m, const struct mailbox_call *call,
+		    const struct sm_view *answer, const struct mailbox_server *servers,
+		    size_t server_count)
+{
+	struct mailbox_header header = mailbox_header_get(call->request - MAILBOX_HEADER_BYTES);
+	const struct mailbox_server *server;
 	size_t data_len;
 
-	if (counter != 0 && counter == m->request_counter && m->answer_len > 0) {
-		answer_again(m, answer); /* the master has not seen it */
+	if (header.counter != 0 && header.counter == m->request_counter) {
+		if (m->is_reply) {
+			answer_again(m, answer); /* the master has not seen it */
+		}
 		return;
 	}
-	m->request_counter = counter;
-	if (len > box_bytes - MAILBOX_HEADER_BYTES) {
-		answer_error(m, MAILBOX_INVALID_SIZE);
+	m->request_counter = header.counter;
+	m->is_reply = 1;
+	if (header.data_len > call->request_capacity) {
+		answer_error(m, MAILBOX_ERROR_INVALID_SIZE);
 		return;
 	}
-	if (type != MAILBOX_COE) {
-		answer_error(m, MAILBOX_UNSUPPORTED);
+	server = find_server(servers, server_count, header.type);
+	if (server == NULL) {
+		answer_error(m, MAILBOX_ERROR_UNSUPPORTED_PROTOCOL);
 		return;
 	}
-	data_len = service(ctx, type, request + MAILBOX_HEADER_BYTES, len,
-			   m->answer + MAILBOX_HEADER_BYTES, answer->len - MAILBOX_HEADER_BYTES);
+	data_len = server->answer(server->ctx, call);
 	if (data_len > 0) {
-		finish_answer(m, type, data_len);
+		finish_answer(m, header.type, data_len);
+	} else {
+		m->is_reply = 0;
+	}
+}
+
+/* What a server sends by itself. */
+static void take_unasked(struct mailbox *m, const struct mailbox_call *call,
+			 const struct mailbox_server *servers, size_t server_count)
+{
+	for (size_t i = 0; i < server_count && !m->is_waiting; i++) {
+		size_t data_len =
+			servers[i].next != NULL ? servers[i].next(servers[i].ctx, call) : 0;
+
+		if (data_len > 0) {
+			finish_answer(m, servers[i].type, data_len);
+			m->is_reply = 0;
+		}
 	}
 }
 
 static int is_box(const struct sm_view *sm)
 {
-	return (sm->activate & ACTIVATE_ON) && sm->len > MAILBOX_HEADER_BYTES + ERROR_BYTES &&
-	       sm->len <= MAILBOX_BYTES;
+	return (sm->activate & ACTIVATE_ON) &&
+	       sm->len > MAILBOX_HEADER_BYTES + MAILBOX_ERROR_BYTES && sm->len <= MAILBOX_BYTES;
 }
 
 static void put_answer(struct mailbox *m, struct esc *esc, int64_t t_ns, const struct sm_view *sm)
@@ -117,16 +140,21 @@ static void put_answer(struct mailbox *m, struct esc *esc, int64_t t_ns, const s
 	m->is_waiting = 0;
 }
 
-void mailbox_run(struct mailbox *m, struct esc *esc, int64_t t_ns, mailbox_service service,
-		 void *ctx)
+void mailbox_run(struct mailbox *m, struct esc *esc, int64_t t_ns,
+		 const struct mailbox_server *server, size_t server_count)
 {
 	struct sm_view request = look_at(esc, t_ns, SM_REQUEST);
 	struct sm_view answer = look_at(esc, t_ns, SM_ANSWER);
 	uint8_t box[MAILBOX_BYTES];
+	struct mailbox_call call = { .t_ns = t_ns,
+				     .request = box + MAILBOX_HEADER_BYTES,
+				     .answer = m->answer + MAILBOX_HEADER_BYTES };
 
 	if (!is_box(&request) || !is_box(&answer)) {
 		return;
 	}
+	call.request_capacity = request.len - MAILBOX_HEADER_BYTES;
+	call.capacity = answer.len - MAILBOX_HEADER_BYTES;
 	if ((answer.activate ^ answer.pdi_control) & ACTIVATE_REPEAT) {
 		uint8_t done = answer.activate & PDI_REPEAT_DONE;
 
@@ -135,7 +163,11 @@ void mailbox_run(struct mailbox *m, struct esc *esc, int64_t t_ns, mailbox_servi
 	}
 	if (!m->is_waiting && (request.status & STATUS_FULL)) {
 		esc_pdi_read(esc, t_ns, request.start, box, request.len);
-		execute(m, box, request.len, &answer, service, ctx);
+		call.request_len = get_le16(box);
+		execute(m, &call, &answer, server, server_count);
+	}
+	if (!m->is_waiting && !(answer.status & STATUS_FULL)) {
+		take_unasked(m, &call, server, server_count);
 	}
 	if (m->is_waiting && !(answer.status & STATUS_FULL)) {
 		put_answer(m, esc, t_ns, &answer);

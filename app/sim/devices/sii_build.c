@@ -196,9 +196,10 @@ static void put_words(uint8_t *image, const struct slave_model *m)
 	put_le32(image + SII_VENDOR, s->vendor);
 	put_le32(image + SII_PRODUCT, s->product);
 	put_le32(image + SII_REVISION, s->revision);
-	for (size_t i = 0; i < 4; i++) {
-		put_le16(image + SII_BOOTSTRAP + 2 * i, m->bootstrap[i]);
-	}
+	put_le16(image + SII_BOOTSTRAP, s->boot_out_start);
+	put_le16(image + SII_BOOTSTRAP + 2, s->boot_out_len);
+	put_le16(image + SII_BOOTSTRAP + 4, s->boot_in_start);
+	put_le16(image + SII_BOOTSTRAP + 6, s->boot_in_len);
 	put_le16(image + SII_MAILBOX, s->mailbox_out_start);
 	put_le16(image + SII_MAILBOX + 2, s->mailbox_out_len);
 	put_le16(image + SII_MAILBOX + 4, s->mailbox_in_start);

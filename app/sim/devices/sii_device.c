@@ -302,6 +302,11 @@ static void io_get(const struct sim_device *dev, char *ret_text, size_t text_byt
 	}
 }
 
+static int server_set(struct sim_device *dev, const char *key, const char *value)
+{
+	return slave_application_set(&self(dev)->app, key, value);
+}
+
 static int io_set(struct sim_device *dev, const char *key, const char *value)
 {
 	struct sii_device *d = self(dev);
@@ -312,6 +317,9 @@ static int io_set(struct sim_device *dev, const char *key, const char *value)
 	long long counts = strtoll(value, NULL, 0);
 	int is_set = 0;
 
+	if (server_set(dev, key, value) == 0) {
+		return 0;
+	}
 	if (*end != '\0' || value[strspn(value, "0123456789xXabcdefABCDEF-")]) {
 		return -EINVAL;
 	}
@@ -332,6 +340,7 @@ static int io_set(struct sim_device *dev, const char *key, const char *value)
 
 static void destroy(struct sim_device *dev)
 {
+	slave_application_done(&self(dev)->app);
 	free(dev);
 }
 
@@ -342,6 +351,7 @@ static const struct sim_device_ops image_ops = {
 	.next_wake_ns = next_wake_ns,
 	.run = run,
 	.sync0 = sync0,
+	.io_set = server_set,
 	.destroy = destroy,
 };
 

@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 #include "devices/slave_application.h"
 
+#include <errno.h>
+#include <string.h>
+
 #include "base/bytes.h"
 #include "wire/al.h"
 #include "wire/esc_reg.h"
@@ -30,12 +33,19 @@ static void read_sm(struct slave_application *app, int64_t t_ns, size_t n, uint8
 	esc_pdi_read(app->esc, t_ns, (uint16_t)(ESC_REG_SM + n * ESC_SM_BYTES), r, ESC_SM_BYTES);
 }
 
-static int sm_fits(struct slave_application *app, int64_t t_ns, size_t n, uint32_t len)
+static int has_boot(const struct sii *sii)
+{
+	return (sii->mailbox_protocols & SII_MAILBOX_FOE) && sii->boot_out_len > 0 &&
+	       sii->boot_in_len > 0;
+}
+
+static int sm_is(struct slave_application *app, int64_t t_ns, size_t n, uint16_t start,
+		 uint32_t len)
 {
 	uint8_t r[ESC_SM_BYTES];
 
 	read_sm(app, t_ns, n, r);
-	return (r[6] & 1) && get_le16(r) == app->sii->sm[n].start && get_le16(r + 2) == len;
+	return (r[6] & 1) && get_le16(r) == start && get_le16(r + 2) == len;
 }
 
 static uint16_t check_mailbox(struct slave_application *app, int64_t t_ns)
@@ -55,6 +65,19 @@ static uint16_t check_mailbox(struct slave_application *app, int64_t t_ns)
 	return AL_CODE_NONE;
 }
 
+static uint16_t check_boot(struct slave_application *app, int64_t t_ns)
+{
+	const struct sii *sii = app->sii;
+
+	if (!has_boot(sii)) {
+		return AL_CODE_BOOT_NOT_SUPPORTED;
+	}
+	return sm_is(app, t_ns, 0, sii->boot_out_start, sii->boot_out_len) &&
+			       sm_is(app, t_ns, 1, sii->boot_in_start, sii->boot_in_len)
+		       ? AL_CODE_NONE
+		       : AL_CODE_INVALID_MAILBOX_CONFIG_BOOT;
+}
+
 static uint16_t check_process_data(struct slave_application *app, int64_t t_ns)
 {
 	for (size_t n = 0; n < app->sii->sm_count; n++) {
@@ -62,7 +85,7 @@ static uint16_t check_process_data(struct slave_application *app, int64_t t_ns)
 		uint32_t bits = coe_dictionary_sm_bits(&app->coe.dictionary, n);
 
 		if ((type == SLAVE_SM_OUTPUTS || type == SLAVE_SM_INPUTS) && bits > 0 &&
-		    !sm_fits(app, t_ns, n, (bits + 7) / 8)) {
+		    !sm_is(app, t_ns, n, app->sii->sm[n].start, (bits + 7) / 8)) {
 			return type == SLAVE_SM_OUTPUTS ? AL_CODE_INVALID_OUTPUT_CONFIG
 							: AL_CODE_INVALID_INPUT_CONFIG;
 		}
@@ -72,11 +95,19 @@ static uint16_t check_process_data(struct slave_application *app, int64_t t_ns)
 
 static uint16_t check_step(struct slave_application *app, int64_t t_ns, uint8_t from, uint8_t to)
 {
-	if (to == AL_BOOT) {
+	if (to != AL_INIT && to != AL_PREOP && to != AL_BOOT && to != AL_SAFEOP && to != AL_OP) {
+		return AL_CODE_UNKNOWN_STATE;
+	}
+	if (to == AL_BOOT && !has_boot(app->sii)) {
 		return AL_CODE_BOOT_NOT_SUPPORTED;
 	}
-	if (to != AL_INIT && to != AL_PREOP && to != AL_SAFEOP && to != AL_OP) {
-		return AL_CODE_UNKNOWN_STATE;
+	/* BOOT is entered from INIT and left to INIT only. */
+	if ((to == AL_BOOT && from != AL_INIT && from != AL_BOOT) ||
+	    (from == AL_BOOT && to != AL_INIT && to != AL_BOOT)) {
+		return AL_CODE_INVALID_STATE_CHANGE;
+	}
+	if (to == AL_BOOT) {
+		return check_boot(app, t_ns);
 	}
 	/* Up one step at a time, down as far as wanted. */
 	if ((to == AL_SAFEOP && from == AL_INIT) ||
@@ -96,6 +127,7 @@ static void entered(struct slave_application *app, uint8_t from, uint8_t to)
 {
 	if (from == AL_INIT) {
 		mailbox_reset(&app->mailbox);
+		foe_server_reset(&app->foe);
 		coe_dictionary_reset(&app->coe.dictionary);
 	}
 	app->coe.dictionary.is_preop = to == AL_PREOP;
@@ -138,11 +170,37 @@ static int is_watchdog_down(struct slave_application *app, int64_t t_ns)
 	return 0;
 }
 
-static size_t service(void *ctx, unsigned type, const uint8_t *request, size_t request_len,
-		      uint8_t *answer, size_t capacity)
+static size_t answer_coe(void *ctx, const struct mailbox_call *call)
 {
-	(void)type;
-	return coe_server_answer(ctx, request, request_len, answer, capacity);
+	return coe_server_answer(ctx, call->request, call->request_len, call->answer,
+				 call->capacity);
+}
+
+/* In BOOT there is only FoE. */
+static void run_mailbox(struct slave_application *app, int64_t t_ns, uint8_t state)
+{
+	const struct {
+		uint16_t protocol;
+		struct mailbox_server server;
+	} all[] = {
+		{ SII_MAILBOX_COE, { MAILBOX_TYPE_COE, answer_coe, NULL, &app->coe } },
+		{ SII_MAILBOX_FOE, { MAILBOX_TYPE_FOE, foe_server_answer, NULL, &app->foe } },
+	};
+	struct mailbox_server server[sizeof(all) / sizeof(all[0])];
+	unsigned protocols = app->sii->mailbox_protocols;
+	size_t count = 0;
+
+	if (state == AL_BOOT) {
+		protocols &= SII_MAILBOX_FOE;
+	}
+	for (size_t i = 0; i < sizeof(all) / sizeof(all[0]); i++) {
+		if (all[i].protocol & protocols) {
+			server[count++] = all[i].server;
+		}
+	}
+	if (count > 0) {
+		mailbox_run(&app->mailbox, app->esc, t_ns, server, count);
+	}
 }
 
 void slave_application_run(struct slave_application *app, int64_t t_ns)
@@ -153,8 +211,8 @@ void slave_application_run(struct slave_application *app, int64_t t_ns)
 		handle_control(app, t_ns);
 	}
 	state = slave_application_state(app, t_ns);
-	if (state != AL_INIT && (app->sii->mailbox_protocols & SII_MAILBOX_COE)) {
-		mailbox_run(&app->mailbox, app->esc, t_ns, service, &app->coe);
+	if (state != AL_INIT) {
+		run_mailbox(app, t_ns, state);
 	}
 	if (state == AL_OP && is_watchdog_down(app, t_ns)) {
 		set_state(app, t_ns, AL_SAFEOP | AL_ERROR, AL_CODE_SM_WATCHDOG);
@@ -170,10 +228,24 @@ void slave_application_init(struct slave_application *app, const struct sii *sii
 	coe_dictionary_init(&app->coe.dictionary, sii, name);
 }
 
+void slave_application_done(struct slave_application *app)
+{
+	foe_server_done(&app->foe);
+}
+
+int slave_application_set(struct slave_application *app, const char *key, const char *value)
+{
+	if (strncmp(key, "foe.", 4) == 0) {
+		return foe_server_set(&app->foe, key + 4, value);
+	}
+	return -EINVAL;
+}
+
 void slave_application_power_on(struct slave_application *app, struct esc *esc)
 {
 	app->esc = esc;
 	mailbox_reset(&app->mailbox);
+	foe_server_reset(&app->foe);
 	coe_dictionary_reset(&app->coe.dictionary);
 	app->coe.dictionary.is_preop = 0;
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * What every slave application with a state machine of its own does, whatever its terminals are: AL
- * states with the checks that ETG.1000.6 asks of a simple slave, the mailbox with SDOs if its SII
- * says CoE, the fall to SAFE-OP when its watchdog is down.
+ * states with the checks that ETG.1000.6 asks of a simple slave, BOOT if its SII has mailboxes for
+ * it, the mailbox with the protocols of its SII, the fall to SAFE-OP when its watchdog is down.
  */
 #ifndef SIM_DEVICES_SLAVE_APPLICATION_H
 #define SIM_DEVICES_SLAVE_APPLICATION_H
@@ -11,6 +11,7 @@
 #include <stdint.h>
 
 #include "devices/coe_server.h"
+#include "devices/foe_server.h"
 #include "devices/mailbox.h"
 #include "segment/esc.h"
 #include "wire/sii.h"
@@ -29,14 +30,21 @@ struct slave_application {
 	const struct sii *sii; /* not taken over */
 	struct esc *esc;       /* as of the last power-on */
 	struct coe_server coe;
+	struct foe_server foe;
 	struct mailbox mailbox;
 };
 
 /** Before the first power-on; @name is what 0x1008 says. */
 void slave_application_init(struct slave_application *app, const struct sii *sii, const char *name);
+/** Free what the servers stored. */
+void slave_application_done(struct slave_application *app);
 void slave_application_power_on(struct slave_application *app, struct esc *esc);
 /** One pass of the main loop; the EEPROM is loaded. */
 void slave_application_run(struct slave_application *app, int64_t t_ns);
+
+/** A property "PROTOCOL.KEY" of a protocol's server, as "foe.busy". 0; -EINVAL: no such property or
+ * value. */
+int slave_application_set(struct slave_application *app, const char *key, const char *value);
 
 /** AL state, without the error bit. */
 uint8_t slave_application_state(struct slave_application *app, int64_t t_ns);

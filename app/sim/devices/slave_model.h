@@ -56,9 +56,8 @@ struct slave_model {
 	char name[MODEL_NAME_BYTES]; /* in the catalogue */
 	struct sii sii;              /* TxPDOs first; its string numbers count text[] from 1 */
 	uint16_t config[MODEL_CONFIG_WORDS]; /* words 0 to 6 of the SII */
-	uint16_t bootstrap[4]; /* mailboxes of BOOT: out start, length, in start, length */
-	int16_t ebus_ma;       /* current taken from the E-bus; below 0: supplied */
-	uint16_t device_type;  /* object 0x1000 */
+	int16_t ebus_ma;                     /* current taken from the E-bus; below 0: supplied */
+	uint16_t device_type;                /* object 0x1000 */
 	char text[MODEL_TEXTS][SII_NAME_BYTES];
 	size_t text_count;
 	struct model_dc_mode dc[MODEL_DC_MODES];

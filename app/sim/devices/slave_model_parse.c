@@ -143,7 +143,17 @@ static int take_boxes(struct parse *p, uint16_t box[4])
 
 static int take_bootstrap(struct parse *p)
 {
-	return take_boxes(p, p->m->bootstrap);
+	struct sii *s = &p->m->sii;
+	uint16_t box[4];
+
+	if (take_boxes(p, box) < 0) {
+		return -EBADMSG;
+	}
+	s->boot_out_start = box[0];
+	s->boot_out_len = box[1];
+	s->boot_in_start = box[2];
+	s->boot_in_len = box[3];
+	return 1;
 }
 
 static int take_mailbox(struct parse *p)

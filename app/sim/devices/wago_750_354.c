@@ -282,6 +282,7 @@ static void sync0(struct sim_device *dev, int64_t t_ns, uint64_t system_time_ns)
 
 static void destroy(struct sim_device *dev)
 {
+	slave_application_done(&((struct coupler *)dev)->app);
 	free(dev);
 }
 

@@ -41,7 +41,7 @@ TEST(sii_device, states_cannot_be_skipped_and_unknown_ones_are_refused)
 	CHECK_EQ(terminal_request(b, AL_OP), AL_PREOP | AL_ERROR);
 	CHECK_EQ(terminal_request(b, AL_PREOP | AL_ERROR), AL_PREOP);
 	CHECK_EQ(terminal_request(b, AL_BOOT), AL_PREOP | AL_ERROR);
-	CHECK_EQ(terminal_code(b), AL_CODE_BOOT_NOT_SUPPORTED);
+	CHECK_EQ(terminal_code(b), AL_CODE_INVALID_STATE_CHANGE);
 	CHECK_EQ(terminal_request(b, 7 | AL_ERROR), AL_PREOP | AL_ERROR);
 	CHECK_EQ(terminal_code(b), AL_CODE_UNKNOWN_STATE);
 	bench_destroy(b);

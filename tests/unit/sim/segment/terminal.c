@@ -111,7 +111,11 @@ size_t terminal_sii(uint8_t *sii, const char *name)
 	put_le32(sii + 0x14, 0x12345678);
 	put_le32(sii + 0x18, 0x00010002);
 	put_le32(sii + 0x1c, 4711);
-	put_le16(sii + 0x38, SII_MAILBOX_COE);
+	put_le16(sii + 0x28, TERMINAL_MAILBOX_OUT);
+	put_le16(sii + 0x2a, BOX_BYTES);
+	put_le16(sii + 0x2c, TERMINAL_MAILBOX_IN);
+	put_le16(sii + 0x2e, BOX_BYTES);
+	put_le16(sii + 0x38, SII_MAILBOX_COE | SII_MAILBOX_FOE);
 	put_categories(&w, name);
 	return w.pos;
 }
