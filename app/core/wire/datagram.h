@@ -38,6 +38,17 @@ enum ecat_size {
 	ECAT_DATAGRAM_MAX_BYTES = 1486,
 };
 
+/* 100 Mbit/s: 80 ns a byte; a frame costs its bytes, and preamble, FCS and gap. */
+enum ecat_time { ECAT_BYTE_NS = 80, ECAT_UNSEEN_BYTES = 8 + 4 + 12 };
+
+/** How long the wire is busy with a frame of @frame_len bytes (Ethernet header first, no FCS). */
+static inline int64_t ecat_wire_time_ns(size_t frame_len)
+{
+	size_t len = frame_len < ECAT_FRAME_MIN_BYTES ? ECAT_FRAME_MIN_BYTES : frame_len;
+
+	return (int64_t)(len + ECAT_UNSEEN_BYTES) * ECAT_BYTE_NS;
+}
+
 /* One datagram inside a frame buffer. @data points into the frame. */
 struct ecat_datagram {
 	uint8_t cmd; /* enum ecat_cmd */

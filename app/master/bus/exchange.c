@@ -9,6 +9,7 @@
 #include "base/bytes.h"
 #include "bus/exchange_dc.h"
 #include "bus/exchange_frame.h"
+#include "wire/datagram.h"
 
 enum {
 	HISTORY = 256, /* exchanges whose frames are kept, to tell a late frame from a duplicate */
@@ -322,18 +323,37 @@ struct exchange_result exchange_run(struct exchange *ex, uint8_t *image, mono_t 
 	return end_result(ex);
 }
 
-int exchange_ride(struct exchange *ex, mono_t deadline)
+/* Service frames that are off the wire before the cycle's next ones. */
+static unsigned send_service_frames(struct exchange *ex, const struct exchange_window *window)
 {
+	unsigned count = 0;
+	mono_t free_at = now(ex);
+	const uint8_t *frame;
 	size_t len;
-	const uint8_t *frame = line_ride_take(ex->line, &len);
 
-	if (frame != NULL) {
-		ex->transport.send(ex->transport.ctx, frame, len);
+	while ((frame = line_ride_take(ex->line, mono_sub(window->wire_needed, free_at), &len)) !=
+	       NULL) {
+		int r = ex->transport.send(ex->transport.ctx, frame, len);
+
+		if (r < 0) {
+			line_ride_refused(ex->line, r);
+		}
+		free_at = mono_add(free_at, (span_t){ ecat_wire_time_ns(len) });
+		count++;
 	}
+	return count;
+}
+
+unsigned exchange_ride(struct exchange *ex, const struct exchange_window *window)
+{
+	unsigned count;
+
+	line_ride_advance(ex->line, window->period);
+	count = send_service_frames(ex, window);
 	while (line_ride_is_out(ex->line)) {
-		if (receive_one(ex, deadline) < 0) {
+		if (receive_one(ex, window->listen_until) < 0) {
 			break;
 		}
 	}
-	return frame != NULL;
+	return count;
 }

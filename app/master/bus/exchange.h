@@ -57,8 +57,17 @@ void exchange_destroy(struct exchange *ex);
  */
 struct exchange_result exchange_run(struct exchange *ex, uint8_t *image, mono_t deadline);
 
-/** Send a waiting service frame, if there is one, and look for its answer until @deadline. Context:
- * cycle thread. 1 if one was sent. */
-int exchange_ride(struct exchange *ex, mono_t deadline);
+/* What a cycle leaves for service frames. */
+struct exchange_window {
+	span_t period;
+	mono_t wire_needed;  /* by the next cyclic frames: the last slave must be passed by then */
+	mono_t listen_until; /* answers that come later are taken in by the next exchange */
+};
+
+/**
+ * Send the service frames that fit into @window, and look for their answers. Context: cycle
+ * thread. Returns how many were sent.
+ */
+unsigned exchange_ride(struct exchange *ex, const struct exchange_window *window);
 
 #endif

@@ -61,7 +61,7 @@ int registers_run(struct bus *bus, struct access *access, size_t count)
 		size_t packed = 0;
 		int r = -EMSGSIZE;
 
-		for (unsigned i = 0; i < tries && r < 0; i++) {
+		for (unsigned i = 0; i < tries && r < 0 && r != -ECANCELED; i++) {
 			packed = pack(&fb, frame, access, count, bus->sequence++);
 			if (packed == 0) {
 				return -EMSGSIZE;

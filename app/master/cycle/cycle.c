@@ -13,7 +13,8 @@ enum {
 	STACK_BYTES = 64 * 1024, /* touched before the first cycle */
 	FAULT_CHECK_CYCLES = 64, /* how often the thread's page faults are read */
 	SETTLE_SHARE = 20,       /* slaves have a 20th of the period to put their inputs in place */
-	RIDE_PERCENT = 85,       /* service frames until then */
+	RIDE_PERCENT = 85,       /* answers to service frames are looked for until then */
+	WIRE_PERCENT = 95,       /* and they are off the wire by then: the next wake may be early */
 };
 
 int cycle_create(const struct cycle_spec *spec, struct cycle **ret_cycle, char *error,
@@ -173,6 +174,19 @@ static void count_page_faults(struct cycle *cy)
 	}
 }
 
+static void give_ride(struct cycle *cy)
+{
+	struct exchange_window window = {
+		.period = cy->period,
+		.wire_needed =
+			mono_add(cy->deadline, (span_t){ cy->period.ns * WIRE_PERCENT / 100 }),
+		.listen_until =
+			mono_add(cy->deadline, (span_t){ cy->period.ns * RIDE_PERCENT / 100 }),
+	};
+
+	ADD(cy->spec.stats->rides, exchange_ride(cy->spec.exchange, &window));
+}
+
 void cycle_step(struct cycle *cy)
 {
 	const struct platform *pf = &cy->spec.platform;
@@ -212,10 +226,7 @@ void cycle_step(struct cycle *cy)
 	count_page_faults(cy);
 	done = pf->now(pf->ctx);
 	histogram_add(&st->work, mono_sub(done, now).ns);
-	if (exchange_ride(cy->spec.exchange,
-			  mono_add(cy->deadline, (span_t){ cy->period.ns * RIDE_PERCENT / 100 }))) {
-		ADD(st->rides, 1);
-	}
+	give_ride(cy);
 	move_deadline(cy, 1, correction_ns);
 	cy->steps++;
 	cycle_count_down(cy);

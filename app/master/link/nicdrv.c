@@ -6,6 +6,7 @@
  */
 #include "oshw.h"
 
+#include <errno.h>
 #include <netinet/in.h>
 #include <string.h>
 
@@ -117,7 +118,7 @@ static int transact(ecx_portt *port, uint8 idx, int64_t timeout_ns)
 	port->bufstat[idx] = EC_BUF_TX;
 	r = line_transact(port->line, frame, len, answer, sizeof(answer), (span_t){ timeout_ns });
 	if (r < 0) {
-		return EC_NOFRAME;
+		return r == -ECANCELED ? EC_ERROR : EC_NOFRAME;
 	}
 	body_len = (size_t)r - ECAT_ETHERNET_BYTES;
 	memcpy(port->rxbuf[idx], answer + ECAT_ETHERNET_BYTES, body_len);
@@ -138,7 +139,7 @@ int ecx_srconfirm(ecx_portt *port, uint8 idx, int timeout)
 	if (!may_be_repeated(port->txbuf[idx])) {
 		return transact(port, idx, whole_us * NS_PER_US);
 	}
-	for (unsigned i = 0; i < LINE_TRIES && port->line != NULL && wkc < 0; i++) {
+	for (unsigned i = 0; i < LINE_TRIES && port->line != NULL && wkc == EC_NOFRAME; i++) {
 		port->retries += i > 0;
 		wkc = transact(port, idx, line_timeout(port->line, i).ns);
 	}

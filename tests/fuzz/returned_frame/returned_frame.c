@@ -180,7 +180,11 @@ static void meet_exchange(struct wire *w, struct line *line)
 		if (res.status == EXCHANGE_OK && res.wkc != plan.wkc_expected) {
 			abort();
 		}
-		exchange_ride(ex, (mono_t){ w->now_ns + 100000 });
+		exchange_ride(ex, &(struct exchange_window){
+					  .period = { NS_PER_MS },
+					  .wire_needed = { w->now_ns + NS_PER_MS },
+					  .listen_until = { w->now_ns + 100000 },
+				  });
 	}
 	exchange_destroy(ex);
 }

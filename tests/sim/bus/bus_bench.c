@@ -260,7 +260,11 @@ static void one_cycle(struct bus_bench *b)
 		b->phase_error_ns = fold_ns(b->last.dc_time_ns - period_ns / 2, period_ns);
 		b->deadline.ns -= b->phase_error_ns / 8;
 	}
-	exchange_ride(b->ex, mono_add(b->deadline, (span_t){ period_ns * 8 / 10 }));
+	exchange_ride(b->ex, &(struct exchange_window){
+				     .period = { period_ns },
+				     .wire_needed = { b->deadline.ns + period_ns * 95 / 100 },
+				     .listen_until = { b->deadline.ns + period_ns * 8 / 10 },
+			     });
 	b->deadline.ns += period_ns;
 }
 

@@ -310,7 +310,11 @@ static void cycle_once(void *ctx, mono_t until)
 
 	(void)until;
 	CHECK_EQ(run(b).status, EXCHANGE_OK);
-	exchange_ride(b->ex, (mono_t){ b->wire.now_ns + 300000 });
+	exchange_ride(b->ex, &(struct exchange_window){
+				     .period = { NS_PER_MS },
+				     .wire_needed = { b->wire.now_ns + 500000 },
+				     .listen_until = { b->wire.now_ns + 300000 },
+			     });
 }
 
 TEST(exchange, service_frame_rides_along_and_is_not_foreign)

@@ -63,8 +63,11 @@ static void ride_in_flood(void *ctx, mono_t until)
 	b->wire.flood_ns = FLOOD_NS;
 	b->wire.drop = 1;
 	deadline = (mono_t){ b->wire.now_ns + DEADLINE_NS };
-	exchange_ride(b->ex, deadline);
-	CHECK(b->wire.now_ns >= deadline.ns && b->wire.now_ns <= deadline.ns + FLOOD_NS);
+	exchange_ride(b->ex, &(struct exchange_window){ .period = { NS_PER_MS },
+							.wire_needed = deadline,
+							.listen_until = deadline });
+	CHECK(b->wire.now_ns <= deadline.ns + FLOOD_NS);
+	CHECK(b->wire.now_ns >= deadline.ns || !line_ride_is_out(b->line));
 }
 
 TEST(exchange, ride_whose_answer_is_lost_in_a_flood_ends_with_its_deadline)

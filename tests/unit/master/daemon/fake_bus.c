@@ -323,9 +323,9 @@ struct exchange_result exchange_run(struct exchange *ex, uint8_t *image, mono_t 
 	return res;
 }
 
-int exchange_ride(struct exchange *ex, mono_t deadline)
+unsigned exchange_ride(struct exchange *ex, const struct exchange_window *window)
 {
 	(void)ex;
-	(void)deadline;
+	(void)window;
 	return 0;
 }
