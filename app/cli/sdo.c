@@ -12,10 +12,10 @@
 #include "base/bytes.h"
 #include "cli/admin_client.h"
 #include "cli/cli.h"
-#include "cli/sdo_abort.h"
 #include "cli/source.h"
 #include "config/sdo_value.h"
 #include "program/json.h"
+#include "wire/sdo_abort.h"
 
 struct sdo {
 	struct cli *cli;

@@ -49,7 +49,7 @@ MODULES: dict[str, dict[str, set[str]]] = {
         "publish": READERS | {"keystore"},
         "sync0": READERS,
     },
-    "cli": {"cli": READERS | {"wire/al.h"}},
+    "cli": {"cli": READERS | {"wire/al.h", "wire/sdo_abort.h"}},
     "sim": {
         "firmware": {"base", "wire"},
         "segment": {"base", "wire"},

@@ -2,9 +2,9 @@
 #include "cli/text.h"
 
 #include "base/clock.h"
-#include "cli/sdo_abort.h"
 #include "cli/source.h"
 #include "harness/test.h"
+#include "wire/sdo_abort.h"
 
 TEST(text, times_change_their_unit_with_their_size)
 {

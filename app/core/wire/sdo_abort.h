@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* SDO abort codes in words (ETG.1000.6, table 41). */
-#ifndef CLI_SDO_ABORT_H
-#define CLI_SDO_ABORT_H
+#ifndef WIRE_SDO_ABORT_H
+#define WIRE_SDO_ABORT_H
 
 #include <stdint.h>
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "cli/sdo_abort.h"
+#include "wire/sdo_abort.h"
 
 #include <stddef.h>
 
