@@ -61,7 +61,7 @@ static void step(struct fake *f)
 
 	if (f->cycle % 64 == 0) {
 		header.flags = SAMPLE_LOST;
-		header.slaves_bad = 3;
+		header.slaves_bad = slave_set_all(SLAVES);
 		header.round_trip_ns = -1;
 		header.wkc = 0;
 		st->frames_lost++;
@@ -77,7 +77,7 @@ static void step(struct fake *f)
 		histogram_add(&st->phase, (int64_t)(f->cycle % 11) - 5);
 	}
 	histogram_add(&st->wake_latency, header.wake_latency_ns);
-	ring_push(f->samples, &header, sizeof(header), f->image, sizeof(f->image));
+	ring_push(f->samples, &header, sample_head_bytes(SLAVES), f->image, sizeof(f->image));
 	st->cycles++;
 	st->frames_sent++;
 	st->cycle_number = f->cycle;

@@ -183,7 +183,7 @@ void fake_make_rings(struct fake *f)
 {
 	struct ring_spec samples = {
 		.kind = "sample",
-		.payload_bytes = sizeof(struct sample_header) + IMAGE_BYTES,
+		.payload_bytes = sample_head_bytes(SLAVES) + IMAGE_BYTES,
 		.slot_count = 65536,
 		.meta = &f->meta,
 		.meta_bytes = sizeof(f->meta),

@@ -169,7 +169,7 @@ static void push(struct ring *ring, const struct arguments *a, uint64_t cycle, i
 	uint8_t image[IMAGE_BYTES];
 
 	fill_image(image, cycle, dc_ns);
-	ring_push(ring, &h, sizeof(h), image, sizeof(image));
+	ring_push(ring, &h, sample_head_bytes(SLAVES), image, sizeof(image));
 }
 
 static void produce(struct ring *ring, struct ring *events, const struct arguments *a)
@@ -233,15 +233,14 @@ int main(int argc, char **argv)
 					  .payload_bytes = sizeof(struct event),
 					  .slot_count = 1024 },
 		      &events) < 0 ||
-	    make_ring(
-		    a.run_dir, CONFIG_RUN_SAMPLES,
-		    (struct ring_spec){ .kind = "sample",
-					.payload_bytes = sizeof(struct sample_header) + IMAGE_BYTES,
-					.slot_count = a.depth,
-					.meta = &meta,
-					.meta_bytes = sizeof(meta),
-					.period_ns = PERIOD_NS },
-		    &ring) < 0) {
+	    make_ring(a.run_dir, CONFIG_RUN_SAMPLES,
+		      (struct ring_spec){ .kind = "sample",
+					  .payload_bytes = sample_head_bytes(SLAVES) + IMAGE_BYTES,
+					  .slot_count = a.depth,
+					  .meta = &meta,
+					  .meta_bytes = sizeof(meta),
+					  .period_ns = PERIOD_NS },
+		      &ring) < 0) {
 		return 1;
 	}
 	produce(ring, events, &a);

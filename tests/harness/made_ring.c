@@ -54,7 +54,7 @@ struct ring *made_ring(const char *path, const struct made_meta *meta, uint64_t 
 	const struct ring_spec spec = {
 		.path = path,
 		.kind = "sample",
-		.payload_bytes = sizeof(struct sample_header) + MADE_IMAGE_BYTES,
+		.payload_bytes = sample_head_bytes(MADE_SLAVES) + MADE_IMAGE_BYTES,
 		.slot_count = slots,
 		.meta = meta,
 		.meta_bytes = sizeof(*meta),
@@ -76,14 +76,14 @@ void made_push(struct ring *ring, uint64_t cycle, uint64_t slaves_bad, uint32_t 
 		.wake_tai_ns = INT64_C(1767225600000450000) + (int64_t)cycle * MADE_PERIOD_NS,
 		.round_trip_ns = 100000,
 		.flags = flags,
-		.slaves_bad = slaves_bad,
+		.slaves_bad = { .word = { slaves_bad } },
 	};
 	uint8_t image[MADE_IMAGE_BYTES] = { 0 };
 
 	put_le16(image + 1, (uint16_t)(cycle + 100));
 	put_le16(image + 3, (uint16_t)cycle);
 	put_le16(image + 5, (uint16_t)(cycle + 200));
-	ring_push(ring, &h, sizeof(h), image, sizeof(image));
+	ring_push(ring, &h, sample_head_bytes(MADE_SLAVES), image, sizeof(image));
 }
 
 void made_overwrite(const char *path, off_t offset, const void *bytes, size_t count)

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What a slot of the sample ring holds: one sample_header, then the process image (outputs first,
- * inputs behind), exactly as it was on the wire in that cycle. Part of the installed interface:
- * a change of layout is a new SAMPLE_VERSION.
+ * What a slot of the sample ring holds: one sample_header, without those words of slaves_bad that
+ * the slaves of the bus do not need (sample_head_bytes()), then the process image (outputs first,
+ * inputs behind), exactly as it was on the wire in that cycle. A change of layout is a new
+ * SAMPLE_VERSION; readers refuse any other.
  *
  * Cycle k belongs to the SYNC0 edge at dc_time_ns(k) = dc_time_ns(0) + k * period_ns. There is one
  * sample for every k: a cycle that the master missed has one, too, flagged SAMPLE_SKIPPED.
@@ -11,9 +12,12 @@
 #define BASE_SAMPLE_H
 
 #include <assert.h>
+#include <stddef.h>
 #include <stdint.h>
 
-#define SAMPLE_VERSION 1u
+#include "base/slave_set.h"
+
+#define SAMPLE_VERSION 2u
 
 enum sample_flag {
 	SAMPLE_LOST = 1u << 0,    /* no frame back before the receive deadline: inputs are stale */
@@ -40,10 +44,17 @@ struct sample_header {
 	uint32_t flags;          /* enum sample_flag */
 	uint16_t wkc;            /* working counter of the process data, sum over its datagrams */
 	uint16_t wkc_expected;
-	uint64_t slaves_bad; /* bit n: the sample of slave n is not good (reader/table.h) */
+	struct slave_set slaves_bad; /* whose sample is not good (reader/table.h) */
 };
 
-static_assert(sizeof(struct sample_header) == 72, "part of the ring's format");
+static_assert(offsetof(struct sample_header, slaves_bad) == 64, "part of the ring's format");
+
+/* Bytes of the header in the ring: 72 up to 64 slaves, 8 more for each further 64. */
+static inline uint32_t sample_head_bytes(uint32_t slave_count)
+{
+	return (uint32_t)offsetof(struct sample_header, slaves_bad) +
+	       slave_set_words(slave_count) * (uint32_t)sizeof(uint64_t);
+}
 
 enum channel_type {
 	CHANNEL_BOOL = 1,  /* 1 bit */

@@ -7,6 +7,9 @@
 #include <string.h>
 
 #include "base/ring.h"
+#include "base/slave_set.h"
+
+enum { PAYLOAD_BYTES_MAX = sizeof(struct sample_header) + LIMIT_IMAGE_BYTES };
 
 struct reader {
 	char *path;
@@ -16,7 +19,8 @@ struct reader {
 	int starts_at_newest;
 	int error; /* as reader_error() has it */
 	struct sample_header header;
-	uint8_t *payload; /* the sample read last: its header, then its image */
+	uint8_t *payload;    /* the sample read last, as it was in the ring */
+	uint32_t head_bytes; /* of it: where its image begins */
 };
 
 int reader_create(const char *path, enum reader_start start, struct reader **ret_reader)
@@ -27,7 +31,7 @@ int reader_create(const char *path, enum reader_start start, struct reader **ret
 		return -ENOMEM;
 	}
 	r->path = strdup(path);
-	r->payload = calloc(1, sizeof(struct sample_header) + LIMIT_IMAGE_BYTES);
+	r->payload = calloc(1, PAYLOAD_BYTES_MAX);
 	r->starts_at_newest = start == READER_AT_NEWEST;
 	if (r->path == NULL || r->payload == NULL) {
 		reader_destroy(r);
@@ -59,8 +63,8 @@ static int make_table(const struct ring_reader *ring, struct channel_table **ret
 		return -EPROTO;
 	}
 	r = channel_table_create(meta, bytes, ret);
-	if (r == 0 &&
-	    ring_payload_bytes(ring) < sizeof(struct sample_header) + (*ret)->meta.image_bytes) {
+	if (r == 0 && ring_payload_bytes(ring) < sample_head_bytes((*ret)->meta.slave_count) +
+							 (*ret)->meta.image_bytes) {
 		channel_table_destroy(*ret);
 		r = -EPROTO;
 	}
@@ -86,6 +90,7 @@ static enum reader_result begin(struct reader *r)
 	}
 	channel_table_destroy(r->table);
 	r->table = table;
+	r->head_bytes = sample_head_bytes(table->meta.slave_count);
 	if (!r->starts_at_newest) {
 		ring_seek(r->ring, ring_oldest(r->ring));
 	}
@@ -100,6 +105,13 @@ static enum reader_result end(struct reader *r, int error)
 	return READER_ENDED;
 }
 
+/* The words that are not in the ring are of slaves that are not on the bus. */
+static void take_header(struct reader *r)
+{
+	r->header.slaves_bad = slave_set_empty();
+	memcpy(&r->header, r->payload, r->head_bytes);
+}
+
 enum reader_result reader_next(struct reader *r, uint64_t *ret_lost)
 {
 	if (r->ring == NULL || (r->is_done && ring_is_replaced(r->ring))) {
@@ -109,10 +121,9 @@ enum reader_result reader_next(struct reader *r, uint64_t *ret_lost)
 		return READER_WAITING;
 	}
 	for (int is_last = 0;; is_last = 1) {
-		switch (ring_read(r->ring, r->payload, sizeof(r->header) + LIMIT_IMAGE_BYTES,
-				  ret_lost)) {
+		switch (ring_read(r->ring, r->payload, PAYLOAD_BYTES_MAX, ret_lost)) {
 		case RING_OK:
-			memcpy(&r->header, r->payload, sizeof(r->header));
+			take_header(r);
 			return READER_SAMPLE;
 		case RING_LOST:
 			return READER_LOST;
@@ -158,16 +169,16 @@ const struct sample_header *reader_header(const struct reader *r)
 
 const uint8_t *reader_image(const struct reader *r)
 {
-	return r->payload + sizeof(r->header);
+	return r->payload + r->head_bytes;
 }
 
 int reader_read_newest(struct reader *r)
 {
-	if (r->ring == NULL || ring_peek_newest(r->ring, r->payload,
-						sizeof(r->header) + LIMIT_IMAGE_BYTES) != RING_OK) {
+	if (r->ring == NULL ||
+	    ring_peek_newest(r->ring, r->payload, PAYLOAD_BYTES_MAX) != RING_OK) {
 		return 0;
 	}
-	memcpy(&r->header, r->payload, sizeof(r->header));
+	take_header(r);
 	return 1;
 }
 

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/clock.h"
+#include "base/slave_set.h"
 #include "image/image.h"
 
 /* Far beyond any that there will be: sums of times do not overflow with it. */
@@ -141,10 +142,10 @@ int channel_table_find_entry(const struct channel_table *table, uint32_t slave, 
 
 int sample_is_good(const struct sample_header *header, uint16_t slave_pos)
 {
-	return slave_pos < LIMIT_SLAVES && (header->slaves_bad >> slave_pos & 1) == 0;
+	return slave_pos < LIMIT_SLAVES && !slave_set_has(&header->slaves_bad, slave_pos);
 }
 
-uint64_t sample_bad_slaves(const struct sample_header *header)
+const struct slave_set *sample_bad_slaves(const struct sample_header *header)
 {
-	return header->slaves_bad;
+	return &header->slaves_bad;
 }

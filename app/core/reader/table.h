@@ -11,6 +11,7 @@
 
 #include "base/limits.h"
 #include "base/sample.h"
+#include "base/slave_set.h"
 
 /* Everything in it is consistent: texts end in zero, slave n is at position n, every channel lies
  * in the image and belongs to a slave. */
@@ -47,7 +48,7 @@ int channel_table_find_entry(const struct channel_table *table, uint32_t slave, 
  * some slaves only).
  */
 int sample_is_good(const struct sample_header *header, uint16_t slave_pos);
-/** Bit n: the sample of slave n is not good. */
-uint64_t sample_bad_slaves(const struct sample_header *header);
+/** The slaves whose sample is not good; those that are not on the bus are not among them. */
+const struct slave_set *sample_bad_slaves(const struct sample_header *header);
 
 #endif

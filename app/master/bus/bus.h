@@ -18,6 +18,7 @@
 
 #include "base/event.h"
 #include "base/sample.h"
+#include "base/slave_set.h"
 #include "base/status.h"
 #include "bus/exchange.h"
 #include "config/config.h"
@@ -67,7 +68,7 @@ int bus_stop(struct bus *bus, char *error);
 struct bus_watch_report {
 	unsigned slaves_op;
 	unsigned slaves_lost;
-	uint64_t op_mask;    /* a bit for each slave in OP */
+	struct slave_set in_op;
 	int is_reference_op; /* or there is none */
 	int is_all_op;
 };

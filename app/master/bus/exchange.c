@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/bytes.h"
+#include "base/slave_set.h"
 #include "bus/exchange_dc.h"
 #include "bus/exchange_frame.h"
 #include "wire/datagram.h"
@@ -158,7 +159,7 @@ static void keep_inputs(struct exchange *ex, const struct exchange_part *part)
 	ex->result.wkc = (uint16_t)(ex->result.wkc + wkc);
 	if (wkc != ex->plan.chunk_wkc[part->chunk]) {
 		ex->result.status = EXCHANGE_WKC_LOW;
-		ex->result.slaves_low |= ex->plan.chunk_slaves[part->chunk];
+		slave_set_or(&ex->result.slaves_low, &ex->plan.chunk_slaves[part->chunk]);
 		return;
 	}
 	if (part->offset < ex->plan.output_bytes) {

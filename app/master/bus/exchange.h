@@ -14,6 +14,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "base/slave_set.h"
 #include "bus/exchange_plan.h"
 #include "link/line.h"
 
@@ -28,7 +29,7 @@ struct exchange_result {
 	enum exchange_status status;
 	uint16_t wkc;
 	uint16_t wkc_expected;
-	uint64_t slaves_low; /* whose data was in a chunk with another WKC, a bit a slave */
+	struct slave_set slaves_low; /* whose data was in a chunk with another WKC */
 	int64_t dc_time_ns; /* system time of the reference at this frame; 0: no (believable) answer
 			     */
 	uint16_t al_status; /* all slaves' AL status ORed: exactly AL_OP only if all are in OP */

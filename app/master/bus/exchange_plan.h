@@ -6,6 +6,7 @@
 #include <stdint.h>
 
 #include "base/limits.h"
+#include "base/slave_set.h"
 
 struct exchange_plan {
 	uint32_t image_bytes;
@@ -13,11 +14,11 @@ struct exchange_plan {
 	uint32_t logical_start;
 	uint32_t chunk_bytes[LIMIT_CHUNKS]; /* how the image is cut into LRW datagrams */
 	unsigned chunk_count;
-	uint16_t chunk_wkc[LIMIT_CHUNKS];    /* expected of each */
-	uint8_t chunk_frame[LIMIT_CHUNKS];   /* which frame carries it, ascending */
-	uint64_t chunk_slaves[LIMIT_CHUNKS]; /* whose data it has, a bit a slave */
-	uint16_t wkc_expected;               /* sum, with every slave in SAFE-OP or OP */
-	uint16_t dc_reference;               /* station address of the reference clock; 0: no DC */
+	uint16_t chunk_wkc[LIMIT_CHUNKS];            /* expected of each */
+	uint8_t chunk_frame[LIMIT_CHUNKS];           /* which frame carries it, ascending */
+	struct slave_set chunk_slaves[LIMIT_CHUNKS]; /* whose data it has */
+	uint16_t wkc_expected;                       /* sum, with every slave in SAFE-OP or OP */
+	uint16_t dc_reference; /* station address of the reference clock; 0: no DC */
 	uint16_t slave_count;
 	int is_split; /* 1: a chunk a slave; those with a good WKC are taken though others have not
 		       */

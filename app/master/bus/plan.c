@@ -3,6 +3,7 @@
 
 #include <errno.h>
 
+#include "base/slave_set.h"
 #include "bus/exchange_frame.h"
 
 enum { WKC_READ = 1, WKC_WRITE = 2 }; /* what one slave adds to an LRW, ETG.1000.4 */
@@ -32,20 +33,20 @@ static uint32_t find_cut(const struct plan_area *area, size_t count, uint32_t fr
 /* LRW adds once for each slave that reads and twice for each that is written, whatever it maps
  * there. */
 static uint16_t expected_wkc(const struct plan_area *area, size_t count, uint32_t from, uint32_t to,
-			     uint64_t *ret_slaves)
+			     struct slave_set *ret_slaves)
 {
 	uint8_t adds[LIMIT_SLAVES] = { 0 };
 	uint16_t wkc = 0;
 
-	*ret_slaves = 0;
+	*ret_slaves = slave_set_empty();
 	for (size_t i = 0; i < count; i++) {
 		if (area[i].start < to && area[i].end > from) {
 			adds[area[i].slave_pos] |= area[i].is_output ? WKC_WRITE : WKC_READ;
+			slave_set_add(ret_slaves, area[i].slave_pos);
 		}
 	}
 	for (size_t i = 0; i < LIMIT_SLAVES; i++) {
 		wkc = (uint16_t)(wkc + adds[i]);
-		*ret_slaves |= adds[i] != 0 ? UINT64_C(1) << i : 0;
 	}
 	return wkc;
 }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/bytes.h"
+#include "base/slave_set.h"
 #include "bus/bus_internal.h"
 #include "bus/registers.h"
 
@@ -271,8 +272,10 @@ int bus_watch(struct bus *bus, struct status_page *page,
 	bus->is_looking = 0;
 	*ret_report = (struct bus_watch_report){ 0 };
 	for (size_t i = 0; i < bus->slave_count; i++) {
-		ret_report->slaves_op += is_in_op(&bus->slave[i]) ? 1 : 0;
-		ret_report->op_mask |= is_in_op(&bus->slave[i]) ? UINT64_C(1) << i : 0;
+		if (is_in_op(&bus->slave[i])) {
+			ret_report->slaves_op++;
+			slave_set_add(&ret_report->in_op, (unsigned)i);
+		}
 		ret_report->slaves_lost += bus->slave[i].is_lost ? 1 : 0;
 	}
 	ret_report->is_reference_op =

@@ -124,8 +124,7 @@ static int is_good(void *host, uint32_t index)
 	const struct control *ctl = host;
 	const struct channel *ch = channel(ctl, index);
 
-	return ch != NULL && ch->slave_pos < LIMIT_SLAVES &&
-	       (ctl->now.slaves_bad >> ch->slave_pos & 1) == 0;
+	return ch != NULL && ecdaq_is_slave_good(&ctl->now, ch->slave_pos);
 }
 
 /* The output, if it is the program's. */

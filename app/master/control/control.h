@@ -37,7 +37,7 @@ extern "C" {
 #endif
 
 /* Of this header. A program that was built with another one is not loaded. */
-#define ECDAQ_CONTROL_ABI UINT32_C(1)
+#define ECDAQ_CONTROL_ABI UINT32_C(2)
 
 /* A channel that was found by its name in init(); the same until exit(). */
 struct ecdaq_input {
@@ -64,13 +64,17 @@ struct ecdaq_calls;
 struct ecdaq_cycle {
 	const struct ecdaq_calls *calls;
 	void *host;
-	uint64_t number;     /* k: the SYNC0 edge that the inputs belong to */
-	int64_t dc_time_ns;  /* DC time of that edge, ns since 2000-01-01; 0 without DC */
-	int64_t period_ns;   /* of the cycle */
-	uint64_t slaves_bad; /* bit n: the inputs of slave n are not fresh and good in this cycle */
-	uint32_t flags;      /* enum ecdaq_flag */
-	uint32_t elapsed;    /* cycles since the last call: 1; more if some were skipped; 0 at the
-				first */
+	uint64_t number;    /* k: the SYNC0 edge that the inputs belong to */
+	int64_t dc_time_ns; /* DC time of that edge, ns since 2000-01-01; 0 without DC */
+	int64_t period_ns;  /* of the cycle */
+	/* Slaves whose inputs are not fresh and good in this cycle: ecdaq_is_slave_good(). Slave n
+	 * is bit n % 64 of word n / 64. */
+	const uint64_t *slaves_bad;
+	uint32_t slave_count;
+	uint32_t flags;   /* enum ecdaq_flag */
+	uint32_t elapsed; /* cycles since the last call: 1; more if some were skipped; 0 at the
+			     first */
+	uint32_t reserved;
 };
 
 /* Argument of init(); valid during the call. */
@@ -193,10 +197,11 @@ static inline int ecdaq_is_good(const struct ecdaq_cycle *cy, struct ecdaq_input
 	return cy->calls->is_good(cy->host, input.index);
 }
 
-/** The same by the slave's place on the ring. */
+/** The same by the slave's place on the bus, 0-based; 0 for one that is not there. */
 static inline int ecdaq_is_slave_good(const struct ecdaq_cycle *cy, unsigned slave_pos)
 {
-	return slave_pos < 64 && (cy->slaves_bad >> slave_pos & 1) == 0;
+	return slave_pos < cy->slave_count &&
+	       (cy->slaves_bad[slave_pos / 64] >> slave_pos % 64 & 1) == 0;
 }
 
 /**

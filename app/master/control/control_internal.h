@@ -6,6 +6,7 @@
 #include <stdatomic.h>
 
 #include "base/limits.h"
+#include "base/slave_set.h"
 #include "control/arguments.h"
 #include "control/control.h"
 #include "control/guard.h"
@@ -37,6 +38,7 @@ struct control {
 	/* the cycle's */
 	const uint8_t *image;
 	struct ecdaq_cycle now;
+	struct slave_set slaves_bad; /* what now.slaves_bad points to */
 	int verdict;
 	int has_called;      /* since the last pause */
 	uint64_t last_cycle; /* of the last call */

@@ -75,13 +75,15 @@ static void call(void *ctx)
 
 static void describe_now(struct control *ctl, const struct sample_header *sample)
 {
+	ctl->slaves_bad = sample->slaves_bad;
 	ctl->now = (struct ecdaq_cycle){
 		.calls = &control_calls,
 		.host = ctl,
 		.number = sample->cycle,
 		.dc_time_ns = sample->dc_time_ns,
 		.period_ns = ctl->cfg->cycle_period_ns,
-		.slaves_bad = sample->slaves_bad,
+		.slaves_bad = ctl->slaves_bad.word,
+		.slave_count = (uint32_t)ctl->spec.slave_count,
 		.flags = sample->flags,
 		.elapsed = (uint32_t)(sample->cycle - ctl->last_cycle),
 	};

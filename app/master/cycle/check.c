@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "cycle/check.h"
 
+#include "base/slave_set.h"
 #include "image/image.h"
 
 void check_init(struct check *check, const struct config *cfg, const struct slave_info *slaves,
@@ -18,18 +19,19 @@ void check_init(struct check *check, const struct config *cfg, const struct slav
 	}
 }
 
-void check_restart_some(struct check *check, uint64_t slaves)
+void check_restart_some(struct check *check, const struct slave_set *slaves)
 {
-	for (size_t i = 0; i < check->slave_count; i++) {
-		if (slaves >> i & 1) {
-			check->slave[i].has_last = 0;
-		}
+	for (unsigned i = slave_set_next(slaves, 0); i < check->slave_count;
+	     i = slave_set_next(slaves, i + 1)) {
+		check->slave[i].has_last = 0;
 	}
 }
 
 void check_restart(struct check *check)
 {
-	check_restart_some(check, UINT64_MAX);
+	struct slave_set all = slave_set_all(check->slave_count);
+
+	check_restart_some(check, &all);
 }
 
 static int counter_is_right(const struct check_slave *s, uint64_t seen, uint64_t cycle,
@@ -43,27 +45,29 @@ static int counter_is_right(const struct check_slave *s, uint64_t seen, uint64_t
 	return !s->has_last || seen == *ret_expected || (s->is_oneshot && seen == s->last);
 }
 
-uint64_t check_image(struct check *check, const uint8_t *image, uint64_t cycle, uint64_t stale,
-		     struct check_fault *ret_fault)
+struct slave_set check_image(struct check *check, const uint8_t *image, uint64_t cycle,
+			     const struct slave_set *stale, struct check_fault *ret_fault)
 {
-	uint64_t bad = 0;
+	struct slave_set bad = slave_set_empty();
+	int has_fault = 0;
 
 	for (size_t i = 0; i < check->slave_count; i++) {
 		struct check_slave *s = &check->slave[i];
 		uint64_t expected;
 		uint64_t seen;
 
-		if (s->counter == NULL || (stale >> i & 1) != 0) {
+		if (s->counter == NULL || slave_set_has(stale, (unsigned)i)) {
 			continue;
 		}
 		seen = image_get_raw(image, s->counter);
 		if (!counter_is_right(s, seen, cycle, &expected)) {
-			if (bad == 0) {
+			if (!has_fault) {
 				*ret_fault = (struct check_fault){ .slave_pos = (uint16_t)i,
 								   .seen = seen,
 								   .expected = expected };
 			}
-			bad |= UINT64_C(1) << i;
+			has_fault = 1;
+			slave_set_add(&bad, (unsigned)i);
 		}
 		s->has_last = 1;
 		s->last = seen;

@@ -11,6 +11,7 @@
 
 #include "base/limits.h"
 #include "base/sample.h"
+#include "base/slave_set.h"
 #include "config/config.h"
 
 struct check_slave {
@@ -37,14 +38,13 @@ void check_init(struct check *check, const struct config *cfg, const struct slav
 		size_t slave_count, const struct channel *channels);
 /** Accept the next fresh sample without check: entering OP, or after a wrong one. */
 void check_restart(struct check *check);
-/** The same for the slaves of @slaves, a bit each. */
-void check_restart_some(struct check *check, uint64_t slaves);
+/** The same for some slaves. */
+void check_restart_some(struct check *check, const struct slave_set *slaves);
 /**
- * Judge a fresh image of @cycle, but for the slaves of @stale, whose part of it is not. Returns a
- * bit for each bad slave; the first of them is described in
- * @ret_fault.
+ * Judge a fresh image of @cycle, but for the slaves of @stale, whose part of it is not. Returns the
+ * bad slaves; the first of them is described in @ret_fault.
  */
-uint64_t check_image(struct check *check, const uint8_t *image, uint64_t cycle, uint64_t stale,
-		     struct check_fault *ret_fault);
+struct slave_set check_image(struct check *check, const uint8_t *image, uint64_t cycle,
+			     const struct slave_set *stale, struct check_fault *ret_fault);
 
 #endif

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <sys/resource.h>
 
+#include "base/slave_set.h"
 #include "control/program.h"
 #include "cycle/cycle_internal.h"
 
@@ -51,10 +52,10 @@ int cycle_create(const struct cycle_spec *spec, struct cycle **ret_cycle, char *
 		free(cy);
 		return r;
 	}
-	outputs_choose(&cy->outputs, cy->image, 0, 0);
+	outputs_choose(&cy->outputs, cy->image, &(struct slave_set){ 0 }, 0);
 	cy->was_fail_safe = 1;
-	cy->slaves = UINT64_MAX;
-	atomic_init(&cy->wanted_slaves, UINT64_MAX);
+	cycle_slaves_init(cy);
+	cy->slaves = *cycle_slaves_take(cy);
 	*ret_cycle = cy;
 	return 0;
 }
@@ -70,10 +71,12 @@ static void change_phase(struct cycle *cy)
 {
 	enum cycle_phase wanted =
 		(enum cycle_phase)atomic_load_explicit(&cy->wanted_phase, memory_order_acquire);
-	uint64_t slaves = atomic_load_explicit(&cy->wanted_slaves, memory_order_acquire);
+	const struct slave_set *slaves = cycle_slaves_take(cy);
+	struct slave_set returned = *slaves;
 
-	check_restart_some(&cy->check, slaves & ~cy->slaves); /* they are back */
-	cy->slaves = slaves;
+	slave_set_and_not(&returned, &cy->slaves);
+	check_restart_some(&cy->check, &returned);
+	cy->slaves = *slaves;
 	if (wanted == cy->phase) {
 		return;
 	}
@@ -149,8 +152,8 @@ static mono_t receive_deadline(const struct cycle *cy, mono_t now)
 static void choose_outputs(struct cycle *cy, uint8_t *image)
 {
 	int is_live = cy->phase == CYCLE_OP && !cy->is_latched_safe;
-	unsigned timed_out =
-		outputs_choose(&cy->outputs, image, is_live ? cy->slaves : 0, cy->sample.cycle);
+	struct slave_set live = is_live ? cy->slaves : slave_set_empty();
+	unsigned timed_out = outputs_choose(&cy->outputs, image, &live, cy->sample.cycle);
 	int is_fail_safe = !is_live || timed_out > 0 || cycle_is_control_safe(cy);
 
 	if (is_fail_safe && !cy->was_fail_safe) {

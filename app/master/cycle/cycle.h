@@ -10,6 +10,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "base/slave_set.h"
 #include "cycle/cycle_spec.h"
 
 struct cycle;
@@ -42,11 +43,11 @@ enum cycle_phase {
 /** Context: service thread; takes effect at the next cycle boundary. */
 void cycle_phase_set(struct cycle *cycle, enum cycle_phase phase);
 /**
- * In CYCLE_OP, the slaves that are in OP, a bit each; all at first. The others' outputs are at
+ * In CYCLE_OP, the slaves that are in OP; all at first. The others' outputs are at
  * fail-safe, and their samples are bad and not counted. With a plan that is split only. Context:
  * service thread; takes effect at the next cycle boundary.
  */
-void cycle_slaves_set(struct cycle *cycle, uint64_t slaves);
+void cycle_slaves_set(struct cycle *cycle, const struct slave_set *slaves);
 
 /** The newest frame's DC time and the host time at which it was sent. 0 or -EAGAIN. Context: any.
  */

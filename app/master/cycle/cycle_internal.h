@@ -6,6 +6,7 @@
 #include <stdatomic.h>
 
 #include "base/event.h"
+#include "base/slave_set.h"
 #include "cycle/check.h"
 #include "cycle/cycle.h"
 #include "cycle/dc_servo.h"
@@ -24,6 +25,19 @@ struct event_gate {
 	unsigned count;
 };
 
+/*
+ * A set of slaves from the service thread to the cycle without a lock: each side owns one of three,
+ * and takes the spare one for its own in one atomic step.
+ */
+#define CYCLE_SLAVES_NEW 4u /* added to the spare's index: not taken yet */
+
+struct cycle_slaves {
+	struct slave_set set[3];
+	unsigned filled;        /* [service] index of the one to be filled next */
+	unsigned taken;         /* [cycle] index of the one in force */
+	_Atomic unsigned spare; /* [any] */
+};
+
 struct cycle {
 	struct cycle_spec spec;
 	span_t period;
@@ -37,7 +51,7 @@ struct cycle {
 	struct sample_header sample; /* of the cycle being made */
 	uint8_t image[LIMIT_IMAGE_BYTES];
 	enum cycle_phase phase;
-	uint64_t slaves; /* in OP */
+	struct slave_set slaves; /* in OP */
 	int has_started;
 	int was_fail_safe;
 	int has_overrun;     /* this step has passed edges */
@@ -49,13 +63,19 @@ struct cycle {
 	long faults_at_start;
 	struct event_gate gate[EVENT_COUNT];
 	int result;
-	_Atomic int stop;               /* [any] */
-	_Atomic int wanted_phase;       /* [service] */
-	_Atomic uint64_t wanted_slaves; /* [service] */
-	_Atomic uint64_t dc_sequence;   /* [cycle] odd: the pair below is being written */
-	_Atomic int64_t dc_ns;          /* [cycle] */
-	_Atomic int64_t dc_mono_ns;     /* [cycle] */
+	_Atomic int stop;         /* [any] */
+	_Atomic int wanted_phase; /* [service] */
+	struct cycle_slaves wanted_slaves;
+	_Atomic uint64_t dc_sequence; /* [cycle] odd: the pair below is being written */
+	_Atomic int64_t dc_ns;        /* [cycle] */
+	_Atomic int64_t dc_mono_ns;   /* [cycle] */
 };
+
+/* --- cycle_request.c --- */
+
+void cycle_slaves_init(struct cycle *cy);
+/** The slaves that are in OP as the service thread said last; valid until the next call. */
+const struct slave_set *cycle_slaves_take(struct cycle *cy);
 
 /* --- cycle_event.c --- */
 

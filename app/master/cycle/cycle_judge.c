@@ -3,21 +3,22 @@
 
 #include <errno.h>
 
-static uint64_t all_slaves(const struct cycle *cy)
+#include "base/slave_set.h"
+
+static struct slave_set all_slaves(const struct cycle *cy)
 {
-	return cy->spec.slave_count >= 64 ? UINT64_MAX : (UINT64_C(1) << cy->spec.slave_count) - 1;
+	return slave_set_all(cy->spec.slave_count);
 }
 
 void cycle_push_sample(struct cycle *cy)
 {
-	ring_push(cy->spec.samples, &cy->sample, sizeof(cy->sample), cy->image,
-		  cy->spec.plan->image_bytes);
+	ring_push(cy->spec.samples, &cy->sample, sample_head_bytes((uint32_t)cy->spec.slave_count),
+		  cy->image, cy->spec.plan->image_bytes);
 }
 
 void cycle_skip(struct cycle *cy, uint64_t count)
 {
 	struct sample_header kept = cy->sample;
-	uint64_t all = all_slaves(cy);
 
 	if (count == 0) {
 		return;
@@ -37,7 +38,7 @@ void cycle_skip(struct cycle *cy, uint64_t count)
 			cy->sample.frame_dc_ns = 0;
 			cy->sample.round_trip_ns = -1;
 			cy->sample.wkc = 0;
-			cy->sample.slaves_bad = all;
+			cy->sample.slaves_bad = all_slaves(cy);
 			cy->sample.flags |= SAMPLE_SKIPPED;
 			cycle_push_sample(cy);
 		}
@@ -117,17 +118,17 @@ struct cycle_place cycle_place(struct cycle *cy, const struct exchange_result *r
 }
 
 /* A slave known to be out of OP is not counted, nor is any while the bus is out of OP. */
-static void count_bad(struct cycle *cy, uint64_t bad, int is_explained)
+static void count_bad(struct cycle *cy, int is_explained)
 {
 	struct cycle_stats *st = cy->spec.stats;
 	uint64_t bad_count = 0;
 	uint64_t good_count = 0;
 
-	for (size_t i = 0; i < cy->spec.slave_count; i++) {
-		if (!(cy->slaves >> i & 1)) {
+	for (unsigned i = 0; i < cy->spec.slave_count; i++) {
+		if (!slave_set_has(&cy->slaves, i)) {
 			continue;
 		}
-		if (bad >> i & 1) {
+		if (slave_set_has(&cy->sample.slaves_bad, i)) {
 			bad_count++;
 			ADD(st->slave_bad[i], 1);
 		} else {
@@ -150,25 +151,27 @@ int cycle_has_inputs(const struct cycle *cy, const struct exchange_result *res)
 
 void cycle_judge(struct cycle *cy, const struct exchange_result *res, int is_in_window)
 {
-	uint64_t all = all_slaves(cy);
 	int is_fresh = cycle_has_inputs(cy, res);
-	uint64_t stale = (~cy->slaves | res->slaves_low) & all;
-	uint64_t wrong;
+	struct slave_set stale = all_slaves(cy);
+	struct slave_set wrong;
 	struct check_fault fault;
 
 	if (cy->phase != CYCLE_OP) {
 		cy->sample.flags |= SAMPLE_NOT_OP;
-		cy->sample.slaves_bad = all;
+		cy->sample.slaves_bad = all_slaves(cy);
 		return;
 	}
 	if (!is_fresh || !is_in_window) {
-		cy->sample.slaves_bad = all;
-		count_bad(cy, all, is_fresh || res->status != EXCHANGE_WKC_LOW);
+		cy->sample.slaves_bad = all_slaves(cy);
+		count_bad(cy, is_fresh || res->status != EXCHANGE_WKC_LOW);
 		return;
 	}
-	wrong = check_image(&cy->check, cy->image, cy->sample.cycle, stale, &fault);
-	cy->sample.slaves_bad = wrong | stale;
-	if (wrong != 0) {
+	slave_set_and_not(&stale, &cy->slaves);
+	slave_set_or(&stale, &res->slaves_low);
+	wrong = check_image(&cy->check, cy->image, cy->sample.cycle, &stale, &fault);
+	cy->sample.slaves_bad = stale;
+	slave_set_or(&cy->sample.slaves_bad, &wrong);
+	if (!slave_set_is_empty(&wrong)) {
 		struct event ev = { .id = EVENT_COUNTER_BAD,
 				    .slave_pos = fault.slave_pos,
 				    .value = (int64_t)cy->sample.cycle,
@@ -177,5 +180,5 @@ void cycle_judge(struct cycle *cy, const struct exchange_result *res, int is_in_
 		cy->sample.flags |= SAMPLE_BAD_COUNTER;
 		cycle_emit(cy, &ev);
 	}
-	count_bad(cy, cy->sample.slaves_bad, 0);
+	count_bad(cy, 0);
 }

@@ -16,9 +16,35 @@ void cycle_stop(struct cycle *cycle)
 	atomic_store_explicit(&cycle->stop, 1, memory_order_release);
 }
 
-void cycle_slaves_set(struct cycle *cycle, uint64_t slaves)
+void cycle_slaves_set(struct cycle *cycle, const struct slave_set *slaves)
 {
-	atomic_store_explicit(&cycle->wanted_slaves, slaves, memory_order_release);
+	struct cycle_slaves *ws = &cycle->wanted_slaves;
+
+	ws->set[ws->filled] = *slaves;
+	ws->filled = atomic_exchange_explicit(&ws->spare, ws->filled | CYCLE_SLAVES_NEW,
+					      memory_order_acq_rel) &
+		     ~CYCLE_SLAVES_NEW;
+}
+
+void cycle_slaves_init(struct cycle *cy)
+{
+	struct cycle_slaves *ws = &cy->wanted_slaves;
+
+	ws->filled = 0;
+	ws->taken = 1;
+	ws->set[ws->taken] = slave_set_all(LIMIT_SLAVES);
+	atomic_init(&ws->spare, 2);
+}
+
+const struct slave_set *cycle_slaves_take(struct cycle *cy)
+{
+	struct cycle_slaves *ws = &cy->wanted_slaves;
+
+	if (atomic_load_explicit(&ws->spare, memory_order_relaxed) & CYCLE_SLAVES_NEW) {
+		ws->taken = atomic_exchange_explicit(&ws->spare, ws->taken, memory_order_acq_rel) &
+			    ~CYCLE_SLAVES_NEW;
+	}
+	return &ws->set[ws->taken];
 }
 
 void cycle_phase_set(struct cycle *cycle, enum cycle_phase phase)

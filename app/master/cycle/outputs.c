@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/slave_set.h"
 #include "image/image.h"
 
 static const enum cycle_writer writer_of[] = {
@@ -125,7 +126,7 @@ static uint64_t limited(const struct output *out, uint64_t raw)
 	return physical > out->max ? out->max_raw : raw;
 }
 
-unsigned outputs_choose(struct outputs *outputs, uint8_t *image, uint64_t live_slaves,
+unsigned outputs_choose(struct outputs *outputs, uint8_t *image, const struct slave_set *live,
 			uint64_t cycle)
 {
 	unsigned timed_out = 0;
@@ -136,7 +137,7 @@ unsigned outputs_choose(struct outputs *outputs, uint8_t *image, uint64_t live_s
 		const struct board_set *set = &outputs->set[out->owner];
 		int is_silent = out->timeout_cycles > 0 &&
 				cycle - outputs->alive_cycle[out->owner] > out->timeout_cycles;
-		int is_live = (live_slaves >> out->channel->slave_pos & 1) != 0;
+		int is_live = slave_set_has(live, out->channel->slave_pos);
 		uint64_t raw = out->fail_safe_raw;
 
 		if (is_live && set->is_set[i] && !is_silent) {

@@ -12,6 +12,7 @@
 
 #include "base/board.h"
 #include "base/sample.h"
+#include "base/slave_set.h"
 #include "config/config.h"
 #include "cycle/cycle_spec.h"
 
@@ -41,11 +42,11 @@ int outputs_init(struct outputs *outputs, const struct cycle_spec *spec, char *e
 		 size_t error_bytes);
 
 /**
- * Write all outputs into @image: live for @live_slaves, fail-safe for all others, for a value that
- * is not a number, and for an owner that has been silent for longer than its timeout at @cycle.
- * Returns how many are fail-safe because of the latter.
+ * Write all outputs into @image: live for slaves in @live, fail-safe for all others, for a value
+ * that is not a number, and for an owner that has been silent for longer than its timeout at
+ * @cycle. Returns how many are fail-safe because of the latter.
  */
-unsigned outputs_choose(struct outputs *outputs, uint8_t *image, uint64_t live_slaves,
+unsigned outputs_choose(struct outputs *outputs, uint8_t *image, const struct slave_set *live,
 			uint64_t cycle);
 
 /** The image last written went on the wire in @cycle: answer the boards. */

@@ -152,11 +152,11 @@ static int make_samples(struct session *s, struct failure *failure)
 {
 	static uint8_t meta[META_BYTES_MAX]; /* one session in a process brings up at a time */
 	char path[CONFIG_PATH_BYTES + 16];
+	const struct exchange_plan *plan = bus_plan(s->bus);
 	struct ring_spec spec = {
 		.path = path,
 		.kind = "sample",
-		.payload_bytes =
-			(uint32_t)(sizeof(struct sample_header) + bus_plan(s->bus)->image_bytes),
+		.payload_bytes = sample_head_bytes(plan->slave_count) + plan->image_bytes,
 		.slot_count = (uint64_t)(s->spec.cfg->ring_depth_ns / s->spec.cfg->cycle_period_ns),
 		.meta = meta,
 		.meta_bytes = write_meta(s, meta),

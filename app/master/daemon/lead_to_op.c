@@ -67,6 +67,7 @@ static int64_t newest_diff_ns(struct ring_reader *reader)
 {
 	struct sample_header header;
 
+	/* What it has of slaves_bad is of no interest: with few slaves it is the image. */
 	return ring_peek_newest(reader, &header, sizeof(header)) == RING_OK ? header.dc_diff_ns
 									    : -1;
 }

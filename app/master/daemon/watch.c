@@ -3,6 +3,8 @@
 #include <errno.h>
 #include <stdio.h>
 
+#include "base/limits.h"
+#include "base/slave_set.h"
 #include "daemon/session.h"
 #include "daemon/session_internal.h"
 
@@ -109,27 +111,35 @@ static int can_go_on(const struct session *s, const struct bus_watch_report *rep
 	       report->is_reference_op && (s->state == BUS_OP || s->state == BUS_RECOVERING);
 }
 
-/* The cycle continues with the slaves of @op_mask; 0: outputs safe, no sample is judged. */
-static void go_on_with(struct session *s, uint64_t op_mask)
+/* The cycle continues with @slaves; none: outputs safe, no sample is judged. */
+static void go_on_with(struct session *s, const struct slave_set *slaves)
 {
-	s->is_partial = op_mask != 0 && op_mask != UINT64_MAX;
-	if (op_mask != 0) {
-		cycle_slaves_set(s->cycle, op_mask); /* before the phase, which it is for */
+	int is_none = slave_set_is_empty(slaves);
+
+	if (!is_none) {
+		cycle_slaves_set(s->cycle, slaves); /* before the phase, which it is for */
 	}
-	cycle_phase_set(s->cycle, op_mask != 0 ? CYCLE_OP : CYCLE_SYNCED);
+	cycle_phase_set(s->cycle, is_none ? CYCLE_SYNCED : CYCLE_OP);
 }
 
 static void follow_bus(struct session *s, const struct bus_watch_report *report)
 {
 	uint32_t count = atomic_load_explicit(&s->run.page->slave_count, memory_order_relaxed);
+	struct slave_set live = slave_set_empty();
 	char text[BUS_ERROR_BYTES];
 
 	if (report->is_all_op && s->state == BUS_RECOVERING) {
-		go_on_with(s, UINT64_MAX);
+		live = slave_set_all(LIMIT_SLAVES);
+		s->is_partial = 0;
+		go_on_with(s, &live);
 		session_state_set(s, BUS_OP);
 		session_set_message(s, "");
 	} else if (!report->is_all_op) {
-		go_on_with(s, can_go_on(s, report) ? report->op_mask : 0);
+		if (can_go_on(s, report)) {
+			live = report->in_op;
+		}
+		s->is_partial = !slave_set_is_empty(&live);
+		go_on_with(s, &live);
 		if (s->state == BUS_OP) {
 			session_state_set(s, BUS_RECOVERING);
 		}

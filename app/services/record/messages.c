@@ -216,7 +216,7 @@ size_t messages_encode_cycle(const struct sample_header *h, uint8_t *buf)
 	cdr_put(&c, h->flags, 4);
 	cdr_put(&c, h->wkc, 2);
 	cdr_put(&c, h->wkc_expected, 2);
-	cdr_put(&c, sample_bad_slaves(h), 8);
+	cdr_put(&c, sample_bad_slaves(h)->word[0], 8);
 	return c.len;
 }
 

@@ -61,7 +61,7 @@ static void make_ring(void)
 	};
 	const struct ring_spec spec = { .path = path,
 					.kind = "sample",
-					.payload_bytes = sizeof(struct sample_header) + IMAGE_BYTES,
+					.payload_bytes = sample_head_bytes(SLAVES) + IMAGE_BYTES,
 					.slot_count = SLOTS,
 					.meta = &meta,
 					.meta_bytes = sizeof(meta),
@@ -72,7 +72,7 @@ static void make_ring(void)
 	for (uint64_t i = 0; i < PUSHED; i++) {
 		struct sample_header h = { .cycle = i, .dc_time_ns = (int64_t)i * 1000000 + 1 };
 
-		ring_push(ring, &h, sizeof(h), "12345678", IMAGE_BYTES);
+		ring_push(ring, &h, sample_head_bytes(SLAVES), "12345678", IMAGE_BYTES);
 	}
 	ring_destroy(ring);
 }

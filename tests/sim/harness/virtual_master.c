@@ -180,13 +180,20 @@ static void hash_bytes(uint64_t *hash, const uint8_t *bytes, size_t len)
 	}
 }
 
+static const struct sample_meta *meta_of(const struct virtual_master *vm)
+{
+	size_t bytes;
+
+	return ring_meta(vm->samples, &bytes);
+}
+
 static void count_op(struct virtual_result *res, const struct sample_header *h)
 {
 	static const uint32_t reasons = SAMPLE_LOST | SAMPLE_LATE | SAMPLE_SKIPPED | SAMPLE_WKC_LOW;
 
 	res->op++;
-	res->bad += h->slaves_bad != 0;
-	res->bad_unexplained += h->slaves_bad != 0 && (h->flags & reasons) == 0;
+	res->bad += !slave_set_is_empty(&h->slaves_bad);
+	res->bad_unexplained += !slave_set_is_empty(&h->slaves_bad) && (h->flags & reasons) == 0;
 	res->unlocked += (h->flags & SAMPLE_DC_UNLOCKED) != 0;
 	if (llabs((long long)h->phase_error_ns) > res->phase_max_ns) {
 		res->phase_max_ns = llabs((long long)h->phase_error_ns);
@@ -196,9 +203,10 @@ static void count_op(struct virtual_result *res, const struct sample_header *h)
 static void count_sample(struct virtual_master *vm, size_t payload_bytes)
 {
 	struct virtual_result *res = &vm->result;
-	struct sample_header h;
+	struct sample_header h = { .cycle = 0 };
 
-	memcpy(&h, vm->newest, sizeof(h));
+	memcpy(&h, vm->newest, sample_head_bytes(meta_of(vm)->slave_count));
+	vm->newest_header = h;
 	if (res->samples == 0) {
 		res->first_cycle = h.cycle;
 	} else if (h.cycle != res->last_cycle + 1) {
@@ -358,20 +366,19 @@ void virtual_master_settle(struct virtual_master *vm)
 
 const struct sample_header *virtual_master_sample(const struct virtual_master *vm)
 {
-	return (const struct sample_header *)(const void *)vm->newest;
+	return &vm->newest_header;
 }
 
 uint64_t virtual_master_value(const struct virtual_master *vm, const char *name)
 {
-	size_t bytes;
-	const struct sample_meta *meta = ring_meta(vm->samples, &bytes);
+	const struct sample_meta *meta = meta_of(vm);
 	const struct channel *channels = sample_meta_channels(meta);
 	int n = image_channel_find(channels, meta->channel_count, name);
 
 	if (n < 0) {
 		test_fail(__FILE__, __LINE__, "no channel is named %s", name);
 	}
-	return image_get_raw(vm->newest + sizeof(struct sample_header), &channels[n]);
+	return image_get_raw(vm->newest + sample_head_bytes(meta->slave_count), &channels[n]);
 }
 
 void virtual_master_print_events(const struct virtual_master *vm, uint64_t count)

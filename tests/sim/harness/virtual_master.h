@@ -51,6 +51,7 @@ struct virtual_master {
 	/* Every frame that comes back to the master; NULL: none looks. */
 	void (*each_frame)(struct virtual_master *vm, const uint8_t *frame, size_t frame_len);
 	void *user; /* of those two */
+	struct sample_header newest_header;
 	_Alignas(8) uint8_t newest[sizeof(struct sample_header) + LIMIT_IMAGE_BYTES];
 };
 

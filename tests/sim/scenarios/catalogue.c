@@ -86,7 +86,7 @@ TEST(catalogue, all_its_slaves_come_to_op_with_the_channels_of_their_entries)
 		CHECK(bits[i] <= assigned_bits(i) || assigned_bits(i) == 0);
 		CHECK((bits[i] > 0) == (assigned_bits(i) > 0) || i + 1 == catalogue_count());
 	}
-	CHECK_EQ(virtual_master_sample(&vm)->slaves_bad, 0);
+	CHECK_EQ(virtual_master_sample(&vm)->slaves_bad.word[0], 0);
 	CHECK(vm.result.op > 100);
 	close_all();
 }

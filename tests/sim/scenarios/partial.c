@@ -77,7 +77,7 @@ static void check_others_continue(const char *breaks, const char *restores)
 	CHECK_EQ(bad[1], 0);
 	CHECK(bad[LAST] < 150); /* until it is known to be lost */
 	CHECK_EQ(virtual_master_run(&vm, 1000), SESSION_GOES_ON);
-	CHECK_EQ(virtual_master_sample(&vm)->slaves_bad, 1u << LAST);
+	CHECK_EQ(virtual_master_sample(&vm)->slaves_bad.word[0], 1u << LAST);
 	CHECK_EQ(virtual_master_value(&vm, "a.led"), 1);
 	CHECK_EQ(virtual_master_value(&vm, "c.led"), 0); /* at fail-safe until it is in OP */
 	CHECK_EQ(set_led("b.led", 1), 0);
@@ -140,7 +140,7 @@ TEST(sim_partial, with_one_datagram_a_lost_slave_makes_all_outputs_safe)
 	virtual_bench_fault(&b, "at=10ms power-off slave=2");
 	virtual_master_run(&vm, 500);
 	CHECK_EQ(state(), BUS_RECOVERING);
-	CHECK_EQ(virtual_master_sample(&vm)->slaves_bad, 7);
+	CHECK_EQ(virtual_master_sample(&vm)->slaves_bad.word[0], 7);
 	CHECK_EQ(virtual_master_value(&vm, "a.led"), 0);
 	CHECK_EQ(atomic_load(&stats()->is_fail_safe), 1);
 	CHECK(set_led("b.led", 1) < 0);

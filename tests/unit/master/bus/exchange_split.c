@@ -38,7 +38,7 @@ static struct exchange_plan split_plan(void)
 		.chunk_bytes = { OUT, OUT, IN, IN },
 		.chunk_count = 4,
 		.chunk_wkc = { 2, 2, 1, 1 },
-		.chunk_slaves = { 1, 2, 1, 2 },
+		.chunk_slaves = { { { 1 } }, { { 2 } }, { { 1 } }, { { 2 } } },
 		.wkc_expected = 6,
 		.slave_count = 2,
 		.is_split = 1,
@@ -85,18 +85,18 @@ TEST(exchange, split_image_takes_the_good_parts_and_names_the_bad_slaves)
 	lost_at = 2 * OUT + IN;
 	res = run(b);
 	CHECK_EQ(res.status, EXCHANGE_WKC_LOW);
-	CHECK_EQ(res.slaves_low, 2);
+	CHECK_EQ(res.slaves_low.word[0], 2);
 	CHECK_EQ(res.wkc, 5);
 	CHECK_EQ(b->image[2 * OUT], 0x77);
 	CHECK_EQ(b->image[2 * OUT + IN - 1], 0x77);
 	CHECK_EQ(b->image[2 * OUT + IN], 0x5a);
 	lost_at = 0;
 	res = run(b);
-	CHECK_EQ(res.slaves_low, 1);
+	CHECK_EQ(res.slaves_low.word[0], 1);
 	lost_at = UINT32_MAX;
 	res = run(b);
 	CHECK_EQ(res.status, EXCHANGE_OK);
-	CHECK_EQ(res.slaves_low, 0);
+	CHECK_EQ(res.slaves_low.word[0], 0);
 	CHECK_EQ(b->image[2 * OUT + IN], 0x77);
 	bench_destroy(b);
 }

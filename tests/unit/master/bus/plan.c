@@ -133,7 +133,7 @@ TEST(plan, split_gives_each_slave_its_own_datagrams_in_one_frame)
 	for (unsigned i = 0; i < 4; i++) {
 		CHECK_EQ(plan.chunk_bytes[i], area[i].end - area[i].start);
 		CHECK_EQ(plan.chunk_wkc[i], i < 2 ? 2 : 1);
-		CHECK_EQ(plan.chunk_slaves[i], 1u << (i % 2));
+		CHECK_EQ(plan.chunk_slaves[i].word[0], 1u << (i % 2));
 		CHECK_EQ(plan.chunk_frame[i], 0);
 	}
 }
@@ -152,13 +152,13 @@ TEST(plan, split_keeps_together_what_shares_a_byte_or_is_one_slave_s)
 	CHECK_EQ(plan_chunks(&plan, area, 5, &blocked), 0);
 	CHECK_EQ(plan.chunk_count, 3);
 	CHECK_EQ(plan.chunk_bytes[0], 1);
-	CHECK_EQ(plan.chunk_slaves[0], 3);
+	CHECK_EQ(plan.chunk_slaves[0].word[0], 3);
 	CHECK_EQ(plan.chunk_wkc[0], 4);
 	CHECK_EQ(plan.chunk_bytes[1], 8);
-	CHECK_EQ(plan.chunk_slaves[1], 4);
+	CHECK_EQ(plan.chunk_slaves[1].word[0], 4);
 	CHECK_EQ(plan.chunk_wkc[1], 3);
 	CHECK_EQ(plan.chunk_bytes[2], 3);
-	CHECK_EQ(plan.chunk_slaves[2], 8);
+	CHECK_EQ(plan.chunk_slaves[2].word[0], 8);
 }
 
 TEST(plan, split_fills_frames_in_order_up_to_sixty_four_slaves)

@@ -64,7 +64,7 @@ TEST(control, an_object_that_lacks_a_function_is_reported)
 TEST(control, another_version_of_the_header_is_reported)
 {
 	check_refused(ECDAQ_TEST_PROGRAMS "/other_abi.so", -ENOEXEC,
-		      "was built for version 2 of ecdaq/control.h, this ecdaqd has 1: rebuild it");
+		      "was built for version 3 of ecdaq/control.h, this ecdaqd has 2: rebuild it");
 	check_refused(ECDAQ_TEST_PROGRAMS "/other_bytes.so", -ENOEXEC,
 		      "ecdaq_program.bytes is 8 instead of 40: use ECDAQ_PROGRAM_HEAD");
 	check_refused(ECDAQ_TEST_PROGRAMS "/no_cycle.so", -ENOEXEC, "ecdaq_program has no cycle()");

@@ -79,7 +79,7 @@ TEST(control, a_cycle_sees_inputs_flags_and_which_slaves_are_good)
 	bench.image[10] = 0xfe;
 	bench.image[11] = 0xff;
 	bench.sample.flags = SAMPLE_WKC_LOW;
-	bench.sample.slaves_bad = 2;
+	slave_set_add(&bench.sample.slaves_bad, 1);
 	CHECK_EQ(bench_run(), CONTROL_DONE);
 	CHECK_EQ(bench.status.calls, 1);
 	CHECK_EQ(bench.status.state, CONTROL_RUNNING);

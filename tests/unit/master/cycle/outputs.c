@@ -21,6 +21,7 @@ static const struct channel speed = { .name = "a.speed",
 static struct config cfg;
 static struct board board;
 static struct outputs outputs;
+static const struct slave_set only_slave = { .word = { 1 } };
 
 static void start_with(const struct channel *channel, const struct config_output *rules,
 		       enum cycle_writer writer)
@@ -58,7 +59,7 @@ static int sent(double physical)
 
 	CHECK_EQ(image_physical_to_raw(&valve, physical, &raw), 0);
 	command(raw);
-	CHECK_EQ(outputs_choose(&outputs, image, 1, 1), 0);
+	CHECK_EQ(outputs_choose(&outputs, image, &only_slave, 1), 0);
 	raw = image_get_raw(image, &valve);
 	return raw & 0x800 ? (int)raw - 0x1000 : (int)raw;
 }
@@ -100,7 +101,7 @@ static float speed_sent(const char *text)
 
 	CHECK_EQ(image_raw_parse(&speed, text, &raw), 0);
 	command(raw);
-	CHECK_EQ(outputs_choose(&outputs, image, 1, 1), 0);
+	CHECK_EQ(outputs_choose(&outputs, image, &only_slave, 1), 0);
 	return (float)image_get_physical(image, &speed);
 }
 
@@ -145,9 +146,9 @@ static uint64_t silent_since(int64_t period_ns, int64_t timeout_ns, uint64_t ste
 	cfg.cycle_period_ns = period_ns;
 	CHECK_EQ(outputs_init(&outputs, &spec, error, sizeof(error)), 0);
 	command(7);
-	CHECK_EQ(outputs_choose(&outputs, image, 1, cycle), 0);
+	CHECK_EQ(outputs_choose(&outputs, image, &only_slave, cycle), 0);
 	CHECK_EQ(image_get_raw(image, &valve), 7);
-	while (outputs_choose(&outputs, image, 1, cycle) == 0) {
+	while (outputs_choose(&outputs, image, &only_slave, cycle) == 0) {
 		CHECK_EQ(image_get_raw(image, &valve), 7);
 		cycle += step;
 		CHECK(cycle < 1000);

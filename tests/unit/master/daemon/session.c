@@ -545,7 +545,7 @@ TEST(session, the_ring_describes_its_samples)
 	CHECK_EQ(meta->session, session_page(b.session)->session);
 	CHECK_EQ(bytes, sizeof(*meta) + sizeof(struct slave_info) + 2 * sizeof(struct channel));
 	CHECK_STR(sample_meta_channels(meta)[1].name, "a.adc");
-	CHECK_EQ(ring_payload_bytes(reader), sizeof(struct sample_header) + 3);
+	CHECK_EQ(ring_payload_bytes(reader), sample_head_bytes(meta->slave_count) + 3);
 	ring_reader_destroy(reader);
 	bench_close(&b);
 }

@@ -96,7 +96,7 @@ static void make_rings(struct bench *b, uint64_t slots)
 	const struct ring_spec samples = { .path = b->ring_path,
 					   .kind = "sample",
 					   .payload_bytes =
-						   sizeof(struct sample_header) + BENCH_IMAGE_BYTES,
+						   sample_head_bytes(1) + BENCH_IMAGE_BYTES,
 					   .slot_count = slots,
 					   .meta = &meta,
 					   .meta_bytes = sizeof(meta),
@@ -210,7 +210,7 @@ void bench_push(struct bench *b, uint64_t first, uint64_t count)
 
 		b->newest_tai_ns = h.wake_tai_ns;
 		put_le32(image, (uint32_t)cycle);
-		ring_push(b->ring, &h, sizeof(h), image, sizeof(image));
+		ring_push(b->ring, &h, sample_head_bytes(1), image, sizeof(image));
 	}
 }
 

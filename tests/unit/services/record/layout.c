@@ -181,7 +181,7 @@ TEST(layout, a_bad_sample_is_said_in_the_message_of_its_slave_only)
 	struct layout *l;
 	size_t count;
 	const struct layout_topic *t;
-	struct sample_header header = { .slaves_bad = 1u << 2 };
+	struct sample_header header = { .slaves_bad = { { 1u << 2 } } };
 	uint8_t image[IMAGE_BYTES] = { 0 };
 	uint8_t buf[256];
 
@@ -202,7 +202,7 @@ TEST(layout, a_low_working_counter_does_not_make_the_other_slaves_samples_bad)
 	struct layout *l;
 	size_t count;
 	const struct layout_topic *t;
-	struct sample_header header = { .flags = SAMPLE_WKC_LOW, .slaves_bad = 1u << 2 };
+	struct sample_header header = { .flags = SAMPLE_WKC_LOW, .slaves_bad = { { 1u << 2 } } };
 	uint8_t image[IMAGE_BYTES] = { 0 };
 	uint8_t buf[256];
 

@@ -42,7 +42,7 @@ void fake_master_start(struct fake_master *fm, const char *dir, int64_t period_n
 	const struct ring_spec spec = {
 		.path = fm->path,
 		.kind = "sample",
-		.payload_bytes = sizeof(struct sample_header) + OUTPUT_BYTES,
+		.payload_bytes = sample_head_bytes(FAKE_SLAVES) + OUTPUT_BYTES,
 		.slot_count = SLOTS,
 		.meta = &m,
 		.meta_bytes = sizeof(m),
@@ -78,6 +78,6 @@ void fake_master_push(struct fake_master *fm, uint64_t shot_ns)
 	for (int i = 0; i < 8; i++) {
 		image[SHOT_BIT / 8 + i] = (uint8_t)(shot_ns >> (8 * i));
 	}
-	ring_push(fm->ring, &h, sizeof(h), image, sizeof(image));
+	ring_push(fm->ring, &h, sample_head_bytes(FAKE_SLAVES), image, sizeof(image));
 	fm->dc_ns += fm->period_ns;
 }
