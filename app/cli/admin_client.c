@@ -53,7 +53,7 @@ static int connect_to(const char *path)
 	return fd;
 }
 
-/* 0 with a whole reply, or -errno; -EPROTO: not a reply; -ECONNRESET: ecdaqd went away. */
+/* 0 with the last reply, or -errno; -EPROTO: not a reply; -ECONNRESET: ecdaqd went away. */
 static int exchange(int fd, const struct admin_request *request, struct admin_reply *ret_reply)
 {
 	struct admin_reply reply;
@@ -63,18 +63,20 @@ static int exchange(int fd, const struct admin_request *request, struct admin_re
 		return -errno;
 	}
 	do {
-		n = recv(fd, &reply, sizeof(reply), 0);
-	} while (n < 0 && errno == EINTR);
-	if (n < 0) {
-		return -errno;
-	}
-	if (n == 0) {
-		return -ECONNRESET;
-	}
-	if ((size_t)n != sizeof(reply) || reply.magic != ADMIN_MAGIC ||
-	    reply.data_len > ADMIN_DATA_BYTES) {
-		return -EPROTO;
-	}
+		do {
+			n = recv(fd, &reply, sizeof(reply), 0);
+		} while (n < 0 && errno == EINTR);
+		if (n < 0) {
+			return -errno;
+		}
+		if (n == 0) {
+			return -ECONNRESET;
+		}
+		if ((size_t)n != sizeof(reply) || reply.magic != ADMIN_MAGIC ||
+		    reply.id != request->id || reply.data_len > ADMIN_DATA_BYTES) {
+			return -EPROTO;
+		}
+	} while (reply.kind != ADMIN_REPLY_DONE);
 	reply.text[sizeof(reply.text) - 1] = '\0';
 	*ret_reply = reply;
 	return 0;

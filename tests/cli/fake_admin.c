@@ -122,7 +122,7 @@ static void clear(struct fake *f)
 
 static void answer(struct fake *f, const struct admin_request *rq, struct admin_reply *reply)
 {
-	*reply = (struct admin_reply){ .magic = ADMIN_MAGIC };
+	*reply = (struct admin_reply){ .magic = ADMIN_MAGIC, .id = rq->id };
 	switch ((enum admin_verb)rq->verb) {
 	case ADMIN_PING:
 		break;
@@ -143,6 +143,10 @@ static void answer(struct fake *f, const struct admin_request *rq, struct admin_
 		break;
 	case ADMIN_CLEAR:
 		clear(f);
+		break;
+	case ADMIN_CANCEL:
+	case ADMIN_DATA:
+		refuse(reply, -EINVAL, "not served here");
 		break;
 	}
 }

@@ -1,8 +1,17 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The admin socket of ecdaqd ("admin" in the run directory, SOCK_SEQPACKET, mode 0660, group from
- * configuration): one fixed-size request, one fixed-size reply. Little-endian hosts only; both ends
- * are on one machine. Reading needs no socket: it is done on the status page and the rings.
+ * configuration): requests and replies of fixed size. Little-endian hosts only; both ends are on
+ * one machine. Reading needs no socket: it is done on the status page and the rings.
+ *
+ * A client may have several requests open; each reply carries the id of its request, and replies
+ * come in any order. A request ends with one reply of kind ADMIN_REPLY_DONE; before it, replies of
+ * kind ADMIN_REPLY_PROGRESS (how far it is) and ADMIN_REPLY_DATA (data that do not fit into one
+ * message) may come. ADMIN_CANCEL, a timeout, or closing the socket ends a request early. PING,
+ * STOP and CANCEL are answered at once, whatever else is open.
+ *
+ * A request with more data than ADMIN_DATA_BYTES announces them in data_total; the rest follows in
+ * ADMIN_DATA messages of the same id, in order, and it is executed when all of it is there.
  */
 #ifndef BASE_ADMIN_PROTOCOL_H
 #define BASE_ADMIN_PROTOCOL_H
@@ -12,7 +21,7 @@
 
 #include "limits.h"
 
-#define ADMIN_MAGIC UINT32_C(0x31614445) /* "EDa1" */
+#define ADMIN_MAGIC UINT32_C(0x32614445) /* "EDa2": the digit is the version */
 
 enum admin_verb {
 	ADMIN_PING = 1,
@@ -23,12 +32,23 @@ enum admin_verb {
 	ADMIN_SDO_WRITE = 5, /* slave_pos, index, subindex, data */
 	ADMIN_STOP = 6,      /* orderly stop of the bus and the daemon */
 	ADMIN_CLEAR = 7,     /* histograms and counters to zero */
+	ADMIN_CANCEL = 8,    /* end the open request of this id; no reply of its own unless there is
+				none: -ENOENT */
+	ADMIN_DATA = 9,      /* more data of the request of this id: data_offset, data */
 };
 
 /* Every slave with a one-shot output, all in one cycle or none. */
 #define ADMIN_ALL_SLAVES UINT16_C(0xffff)
 
-enum { ADMIN_ITEMS = 64, ADMIN_DATA_BYTES = 1024, ADMIN_TEXT_BYTES = 256 };
+enum {
+	ADMIN_ITEMS = 64,
+	ADMIN_DATA_BYTES = 1024, /* in one message */
+	ADMIN_TEXT_BYTES = 256,
+	ADMIN_NAME_BYTES = 64,
+	ADMIN_ARGUMENTS = 4,
+	ADMIN_TRANSFER_BYTES = 16 << 20, /* in one request or answer: a firmware image */
+	ADMIN_TIMEOUT_MS_MAX = 3600 * 1000,
+};
 
 struct admin_item {
 	char channel[LIMIT_NAME_BYTES];
@@ -37,31 +57,51 @@ struct admin_item {
 
 struct admin_request {
 	uint32_t magic;
-	uint32_t verb; /* enum admin_verb */
-	uint32_t count;
+	uint32_t verb;       /* enum admin_verb */
+	uint32_t id;         /* chosen by the client, different among its open requests */
+	uint32_t timeout_ms; /* 0: the verb's own */
+	uint32_t count;      /* of item[] */
 	uint16_t slave_pos;
 	uint16_t index;
 	uint8_t subindex;
 	uint8_t is_relative;
-	uint16_t data_len;
-	uint32_t reserved;
+	uint16_t reserved;    /* 0 */
+	uint32_t address;     /* register, or byte of the SII */
+	uint32_t length;      /* bytes to read */
+	uint32_t data_len;    /* bytes in data[] */
+	uint32_t data_total;  /* bytes in all; 0: data_len */
+	uint32_t data_offset; /* ADMIN_DATA: place of data[] among them */
 	int64_t dc_time_ns;
+	uint32_t argument[ADMIN_ARGUMENTS]; /* as the verb says; 0 else */
+	char name[ADMIN_NAME_BYTES];        /* as the verb says; "" else */
 	struct admin_item item[ADMIN_ITEMS];
 	uint8_t data[ADMIN_DATA_BYTES];
 };
 
+enum admin_reply_kind {
+	ADMIN_REPLY_DONE = 0,     /* the last one; with the last data */
+	ADMIN_REPLY_DATA = 1,     /* data_offset, data_len, data; more follow */
+	ADMIN_REPLY_PROGRESS = 2, /* done of total */
+};
+
 struct admin_reply {
 	uint32_t magic;
-	int32_t result;     /* 0 or -errno */
-	uint32_t sdo_abort; /* 0: none */
-	uint32_t data_len;
+	uint32_t id;                 /* of its request */
+	uint32_t kind;               /* enum admin_reply_kind */
+	int32_t result;              /* 0 or -errno */
+	uint32_t sdo_abort;          /* 0: none */
+	uint32_t data_len;           /* bytes in data[] */
+	uint32_t data_offset;        /* their place among data_total */
+	uint32_t data_total;         /* bytes of the whole answer */
+	uint32_t done;               /* PROGRESS: in the unit of total */
+	uint32_t total;              /* 0: not known */
 	uint64_t cycle;              /* in which it took effect; SET, ONESHOT */
 	int64_t dc_time_ns;          /* ONESHOT: the absolute time armed */
 	char text[ADMIN_TEXT_BYTES]; /* one line: why it failed */
 	uint8_t data[ADMIN_DATA_BYTES];
 };
 
-static_assert(sizeof(struct admin_request) == 32 + 64 * 72 + 1024, "both ends agree");
-static_assert(sizeof(struct admin_reply) == 32 + 256 + 1024, "both ends agree");
+static_assert(sizeof(struct admin_request) == 136 + 64 * 72 + 1024, "both ends agree");
+static_assert(sizeof(struct admin_reply) == 56 + 256 + 1024, "both ends agree");
 
 #endif

@@ -17,7 +17,10 @@ struct placed {
 	uint64_t raw;
 };
 
-void admin_reply_refuse(struct admin_reply *reply, int result, const char *format, ...)
+static void refuse(struct admin_reply *reply, int result, const char *format, ...)
+	__attribute__((format(printf, 3, 4)));
+
+static void refuse(struct admin_reply *reply, int result, const char *format, ...)
 {
 	va_list args;
 
@@ -43,7 +46,7 @@ static void emit(const struct admin_target *t, enum event_id id, uint16_t slave_
 static int has_op(const struct admin_target *t, struct admin_reply *reply)
 {
 	if (t->board == NULL || !t->is_op) {
-		admin_reply_refuse(reply, -EAGAIN, "the bus is not in OP");
+		refuse(reply, -EAGAIN, "the bus is not in OP");
 		return 0;
 	}
 	return 1;
@@ -65,7 +68,7 @@ static int place_item(const struct admin_target *t, const struct admin_item *ite
 	int r;
 
 	if (channel < 0) {
-		admin_reply_refuse(reply, -ENOENT, "%s: no such channel", item->channel);
+		refuse(reply, -ENOENT, "%s: no such channel", item->channel);
 		return reply->result;
 	}
 	r = check_output(t, (size_t)channel, item->raw, reply);
@@ -89,14 +92,44 @@ static uint64_t put_all(const struct admin_target *t, const struct placed *place
 	return board_commit(t->board);
 }
 
-static enum admin_outcome run_set(const struct admin_target *t, const struct admin_request *rq,
-				  uint32_t uid, struct admin_reply *reply, uint64_t *ret_sequence)
+/* Each pass: has the cycle put the values on the wire? */
+static void poll_board(struct admin_pending *pending, const struct admin_target *t)
+{
+	/* Sequences only grow: a newer set on the wire holds the values of this one, too. */
+	if (t->board == NULL) {
+		admin_pending_refuse(pending, -ECANCELED, "the cycle has ended");
+	} else if (atomic_load_explicit(&t->board->taken_sequence, memory_order_acquire) >=
+		   pending->sequence) {
+		pending->reply.cycle =
+			atomic_load_explicit(&t->board->taken_cycle, memory_order_relaxed);
+		admin_pending_complete(pending, 0);
+	}
+}
+
+static void abandon(struct admin_pending *pending)
+{
+	admin_pending_complete(pending, -ECANCELED);
+}
+
+static void wait_for_cycle(const struct admin_target *t, struct admin_pending *pending,
+			   const struct placed *placed, size_t count)
+{
+	pending->sequence = put_all(t, placed, count);
+	pending->poll = poll_board;
+	pending->cancel = abandon;
+}
+
+static void run_set(const struct admin_target *t, struct admin_pending *pending)
 {
 	struct placed placed[ADMIN_ITEMS] = { { .channel = 0 } };
+	const struct admin_request *rq = &pending->request;
+	struct admin_reply *reply = &pending->reply;
+	int32_t uid = (int32_t)pending->uid;
 
 	if (!has_op(t, reply)) {
-		emit(t, EVENT_COMMAND_REFUSED, EVENT_NO_SLAVE, -1, reply->result, (int32_t)uid);
-		return ADMIN_DONE;
+		emit(t, EVENT_COMMAND_REFUSED, EVENT_NO_SLAVE, -1, reply->result, uid);
+		admin_pending_complete(pending, reply->result);
+		return;
 	}
 	/* All or nothing: the board is touched when every item has been found good. */
 	for (size_t i = 0; i < rq->count; i++) {
@@ -105,16 +138,16 @@ static enum admin_outcome run_set(const struct admin_target *t, const struct adm
 							 rq->item[i].channel);
 
 			emit(t, EVENT_COMMAND_REFUSED, EVENT_NO_SLAVE, channel < 0 ? -1 : channel,
-			     reply->result, (int32_t)uid);
-			return ADMIN_DONE;
+			     reply->result, uid);
+			admin_pending_complete(pending, reply->result);
+			return;
 		}
 	}
-	*ret_sequence = put_all(t, placed, rq->count);
+	wait_for_cycle(t, pending, placed, rq->count);
 	for (size_t i = 0; i < rq->count; i++) {
 		emit(t, EVENT_OUTPUT_SET, t->channels[placed[i].channel].slave_pos,
-		     (int64_t)placed[i].channel, 0, (int32_t)uid);
+		     (int64_t)placed[i].channel, 0, uid);
 	}
-	return ADMIN_DEFERRED;
 }
 
 /* --- one-shot: fire SYNC0 once, in one slave or in all that can, at one DC time --- */
@@ -145,28 +178,27 @@ static int oneshot_time(const struct admin_target *t, const struct admin_request
 	int64_t at_ns = rq->dc_time_ns;
 
 	if (t->dc_now(t->ctx, &now_ns) < 0) {
-		admin_reply_refuse(reply, -EAGAIN, "the DC time is not known yet");
+		refuse(reply, -EAGAIN, "the DC time is not known yet");
 		return reply->result;
 	}
 	if (rq->is_relative && __builtin_add_overflow(now_ns, rq->dc_time_ns, &at_ns)) {
-		admin_reply_refuse(reply, -ERANGE, "the time is out of range");
+		refuse(reply, -ERANGE, "the time is out of range");
 		return reply->result;
 	}
 	if (at_ns <= now_ns) {
-		admin_reply_refuse(reply, -ETIME,
-				   "the time is in the past (DC time is %" PRId64 " ns)", now_ns);
+		refuse(reply, -ETIME, "the time is in the past (DC time is %" PRId64 " ns)",
+		       now_ns);
 		return reply->result;
 	}
 	if (at_ns - now_ns < margin_ns) {
-		admin_reply_refuse(reply, -ETIME,
-				   "only %" PRId64 " ns ahead, at least %" PRId64 " ns are needed",
-				   at_ns - now_ns, margin_ns);
+		refuse(reply, -ETIME,
+		       "only %" PRId64 " ns ahead, at least %" PRId64 " ns are needed",
+		       at_ns - now_ns, margin_ns);
 		return reply->result;
 	}
 	if (at_ns - now_ns > ADMIN_ONESHOT_AHEAD_NS) {
-		admin_reply_refuse(reply, -ERANGE,
-				   "%" PRId64 " s ahead, at most %" PRId64 " s are taken",
-				   (at_ns - now_ns) / NS_PER_S, ADMIN_ONESHOT_AHEAD_NS / NS_PER_S);
+		refuse(reply, -ERANGE, "%" PRId64 " s ahead, at most %" PRId64 " s are taken",
+		       (at_ns - now_ns) / NS_PER_S, ADMIN_ONESHOT_AHEAD_NS / NS_PER_S);
 		return reply->result;
 	}
 	*ret_time_ns = at_ns;
@@ -180,14 +212,13 @@ static int place_oneshot(const struct admin_target *t, uint16_t slave_pos, int64
 	int r;
 
 	if (channel < 0) {
-		admin_reply_refuse(reply, -EOPNOTSUPP, "%s: has no output " ONESHOT_ENTRY,
-				   t->slaves[slave_pos].name);
+		refuse(reply, -EOPNOTSUPP, "%s: has no output " ONESHOT_ENTRY,
+		       t->slaves[slave_pos].name);
 		return reply->result;
 	}
 	if (!config_is_oneshot(t->cfg, slave_pos)) {
-		admin_reply_refuse(reply, -EOPNOTSUPP,
-				   "%s: is in periodic mode (slaves[%u].mode: oneshot)",
-				   t->slaves[slave_pos].name, slave_pos);
+		refuse(reply, -EOPNOTSUPP, "%s: is in periodic mode (slaves[%u].mode: oneshot)",
+		       t->slaves[slave_pos].name, slave_pos);
 		return reply->result;
 	}
 	r = check_output(t, (size_t)channel, (uint64_t)at_ns, reply);
@@ -214,8 +245,8 @@ static int place_oneshots(const struct admin_target *t, const struct admin_reque
 		return reply->result;
 	}
 	if (!is_all && rq->slave_pos >= t->slave_count) {
-		admin_reply_refuse(reply, -ENODEV, "slave %u: there are %zu slaves", rq->slave_pos,
-				   t->slave_count);
+		refuse(reply, -ENODEV, "slave %u: there are %zu slaves", rq->slave_pos,
+		       t->slave_count);
 		return reply->result;
 	}
 	for (uint16_t pos = 0; pos < t->slave_count; pos++) {
@@ -229,7 +260,7 @@ static int place_oneshots(const struct admin_target *t, const struct admin_reque
 		count++;
 	}
 	if (count == 0) {
-		admin_reply_refuse(reply, -EOPNOTSUPP, "no slave has an output " ONESHOT_ENTRY);
+		refuse(reply, -EOPNOTSUPP, "no slave has an output " ONESHOT_ENTRY);
 		return reply->result;
 	}
 	if (oneshot_time(t, rq, &at_ns, reply) < 0) {
@@ -245,104 +276,131 @@ static int place_oneshots(const struct admin_target *t, const struct admin_reque
 	return count;
 }
 
-static enum admin_outcome run_oneshot(const struct admin_target *t, const struct admin_request *rq,
-				      uint32_t uid, struct admin_reply *reply,
-				      uint64_t *ret_sequence)
+static void run_oneshot(const struct admin_target *t, struct admin_pending *pending)
 {
 	struct placed placed[LIMIT_SLAVES] = { { .channel = 0 } };
+	const struct admin_request *rq = &pending->request;
+	struct admin_reply *reply = &pending->reply;
 	int count = place_oneshots(t, rq, placed, reply);
 
 	if (count < 0) {
-		emit(t, EVENT_COMMAND_REFUSED, rq->slave_pos, -1, reply->result, (int32_t)uid);
-		return ADMIN_DONE;
-	}
-	*ret_sequence = put_all(t, placed, (size_t)count);
-	emit(t, EVENT_COMMAND, rq->slave_pos, reply->dc_time_ns, ADMIN_ONESHOT, (int32_t)uid);
-	return ADMIN_DEFERRED;
-}
-
-/* --- SDO --- */
-
-static void sdo_result(const struct admin_target *t, const struct admin_request *rq, int r,
-		       struct admin_reply *reply)
-{
-	const char *what = rq->verb == ADMIN_SDO_READ ? "read" : "write";
-	int32_t object = (int32_t)((uint32_t)rq->index << 8 | rq->subindex);
-
-	if (r == 0) {
+		emit(t, EVENT_COMMAND_REFUSED, rq->slave_pos, -1, reply->result,
+		     (int32_t)pending->uid);
+		admin_pending_complete(pending, reply->result);
 		return;
 	}
-	if (reply->sdo_abort != 0) {
-		emit(t, EVENT_SDO_ABORT, rq->slave_pos, reply->sdo_abort, object, 0);
-		admin_reply_refuse(reply, r, "slave %u: SDO %s of 0x%04x:%02x: abort code 0x%08x",
-				   rq->slave_pos, what, rq->index, rq->subindex, reply->sdo_abort);
-		return;
-	}
-	admin_reply_refuse(reply, r, "slave %u: SDO %s of 0x%04x:%02x: no answer (error %d)",
-			   rq->slave_pos, what, rq->index, rq->subindex, -r);
+	wait_for_cycle(t, pending, placed, (size_t)count);
+	emit(t, EVENT_COMMAND, rq->slave_pos, reply->dc_time_ns, ADMIN_ONESHOT,
+	     (int32_t)pending->uid);
 }
 
-static void run_sdo(const struct admin_target *t, const struct admin_request *rq, uint32_t uid,
-		    struct admin_reply *reply)
-{
-	size_t len = ADMIN_DATA_BYTES;
-	int r;
+/* --- requests to one slave --- */
 
-	if (t->sdo_read == NULL || t->sdo_write == NULL || t->slave_count == 0) {
-		admin_reply_refuse(reply, -EAGAIN, "the bus is down");
-		return;
-	}
-	if (rq->slave_pos >= t->slave_count) {
-		admin_reply_refuse(reply, -ENODEV, "slave %u: there are %zu slaves", rq->slave_pos,
-				   t->slave_count);
-		return;
-	}
-	if (rq->verb == ADMIN_SDO_READ) {
-		r = t->sdo_read(t->ctx, rq, reply->data, &len, &reply->sdo_abort);
-		reply->data_len = r == 0 ? (uint32_t)len : 0;
-	} else {
-		emit(t, EVENT_COMMAND, rq->slave_pos, (int64_t)rq->index << 8 | rq->subindex,
-		     ADMIN_SDO_WRITE, (int32_t)uid);
-		r = t->sdo_write(t->ctx, rq, &reply->sdo_abort);
-	}
-	sdo_result(t, rq, r, reply);
-}
-
-enum admin_outcome admin_command_run(const struct admin_target *target,
-				     const struct admin_request *request, uint32_t uid,
-				     struct admin_reply *reply, uint64_t *ret_sequence)
+/* 1 if the slave is there; else the refusal. */
+static int has_slave(const struct admin_target *t, struct admin_pending *pending)
 {
-	*reply = (struct admin_reply){ .magic = ADMIN_MAGIC };
-	switch ((enum admin_verb)request->verb) {
-	case ADMIN_PING:
-		return ADMIN_DONE;
-	case ADMIN_SET:
-		return run_set(target, request, uid, reply, ret_sequence);
-	case ADMIN_ONESHOT:
-		return run_oneshot(target, request, uid, reply, ret_sequence);
-	case ADMIN_SDO_READ:
-	case ADMIN_SDO_WRITE:
-		run_sdo(target, request, uid, reply);
-		return ADMIN_DONE;
-	case ADMIN_STOP:
-		emit(target, EVENT_COMMAND, EVENT_NO_SLAVE, 0, ADMIN_STOP, (int32_t)uid);
-		target->stop(target->ctx);
-		return ADMIN_DONE;
-	case ADMIN_CLEAR:
-		emit(target, EVENT_COMMAND, EVENT_NO_SLAVE, 0, ADMIN_CLEAR, (int32_t)uid);
-		target->clear(target->ctx);
-		return ADMIN_DONE;
-	}
-	admin_reply_refuse(reply, -EINVAL, "unknown verb %u", request->verb);
-	return ADMIN_DONE;
-}
-
-int admin_reply_finish(const struct board *board, uint64_t sequence, struct admin_reply *reply)
-{
-	/* Sequences only grow: a newer set on the wire holds the values of this one, too. */
-	if (atomic_load_explicit(&board->taken_sequence, memory_order_acquire) < sequence) {
+	if (t->slave_count == 0) {
+		admin_pending_refuse(pending, -EAGAIN, "the bus is down");
 		return 0;
 	}
-	reply->cycle = atomic_load_explicit(&board->taken_cycle, memory_order_relaxed);
+	if (pending->request.slave_pos >= t->slave_count) {
+		admin_pending_refuse(pending, -ENODEV, "slave %u: there are %zu slaves",
+				     pending->request.slave_pos, t->slave_count);
+		return 0;
+	}
 	return 1;
+}
+
+static void run_sdo(const struct admin_target *t, struct admin_pending *pending)
+{
+	const struct admin_request *rq = &pending->request;
+
+	if (t->sdo == NULL) {
+		admin_pending_refuse(pending, -EAGAIN, "the bus is down");
+		return;
+	}
+	if (!has_slave(t, pending)) {
+		return;
+	}
+	if (rq->verb == ADMIN_SDO_WRITE) {
+		emit(t, EVENT_COMMAND, rq->slave_pos, (int64_t)rq->index << 8 | rq->subindex,
+		     ADMIN_SDO_WRITE, (int32_t)pending->uid);
+	}
+	t->sdo(t->ctx, pending);
+}
+
+static void report_sdo(const struct admin_target *t, struct admin_pending *pending)
+{
+	const struct admin_request *rq = &pending->request;
+	const char *what = rq->verb == ADMIN_SDO_READ ? "read" : "write";
+	int32_t object = (int32_t)((uint32_t)rq->index << 8 | rq->subindex);
+	struct admin_reply *reply = &pending->reply;
+
+	if (reply->sdo_abort != 0) {
+		emit(t, EVENT_SDO_ABORT, rq->slave_pos, reply->sdo_abort, object, 0);
+		refuse(reply, reply->result, "slave %u: SDO %s of 0x%04x:%02x: abort code 0x%08x",
+		       rq->slave_pos, what, rq->index, rq->subindex, reply->sdo_abort);
+	}
+}
+
+/* --- all --- */
+
+void admin_command_report(const struct admin_target *target, struct admin_pending *pending)
+{
+	enum admin_verb verb = (enum admin_verb)pending->request.verb;
+
+	if (pending->is_reported) {
+		return;
+	}
+	pending->is_reported = 1;
+	if (verb == ADMIN_SDO_READ || verb == ADMIN_SDO_WRITE) {
+		report_sdo(target, pending);
+	}
+}
+
+static void run_simple(const struct admin_target *t, struct admin_pending *pending,
+		       void (*act)(void *ctx))
+{
+	emit(t, EVENT_COMMAND, EVENT_NO_SLAVE, 0, (int32_t)pending->request.verb,
+	     (int32_t)pending->uid);
+	act(t->ctx);
+	admin_pending_complete(pending, 0);
+}
+
+void admin_command_run(const struct admin_target *target, struct admin_pending *pending)
+{
+	switch ((enum admin_verb)pending->request.verb) {
+	case ADMIN_PING:
+		admin_pending_complete(pending, 0);
+		return;
+	case ADMIN_SET:
+		run_set(target, pending);
+		return;
+	case ADMIN_ONESHOT:
+		run_oneshot(target, pending);
+		return;
+	case ADMIN_SDO_READ:
+	case ADMIN_SDO_WRITE:
+		run_sdo(target, pending);
+		return;
+	case ADMIN_STOP:
+		run_simple(target, pending, target->stop);
+		return;
+	case ADMIN_CLEAR:
+		run_simple(target, pending, target->clear);
+		return;
+	case ADMIN_CANCEL:
+	case ADMIN_DATA:
+		break; /* the server's own */
+	}
+	admin_pending_refuse(pending, -EINVAL, "unknown verb %u", pending->request.verb);
+}
+
+int64_t admin_command_timeout_ns(const struct admin_request *request)
+{
+	if (request->timeout_ms != 0) {
+		return request->timeout_ms * NS_PER_MS;
+	}
+	return request->verb == ADMIN_SET || request->verb == ADMIN_ONESHOT ? ADMIN_CYCLE_TIMEOUT_NS
+									    : ADMIN_TIMEOUT_NS;
 }

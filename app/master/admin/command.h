@@ -9,6 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "admin/pending.h"
 #include "base/admin_protocol.h"
 #include "base/board.h"
 #include "base/clock.h"
@@ -18,6 +19,9 @@
 
 /* A one-shot time must be this many periods ahead: the next frames carry the value first. */
 enum { ADMIN_ONESHOT_MARGIN_CYCLES = 5 };
+/* Timeout of the cycle's answer to a set of outputs; of any other request that names none. */
+#define ADMIN_CYCLE_TIMEOUT_NS (1 * NS_PER_S)
+#define ADMIN_TIMEOUT_NS (20 * NS_PER_S)
 /* Latest time of a one-shot from now: a later one is probably a typing error. */
 #define ADMIN_ONESHOT_AHEAD_NS (3600 * NS_PER_S)
 
@@ -33,19 +37,16 @@ struct admin_target {
 	int is_op;
 	/** DC time now. 0 or -EAGAIN. */
 	int (*dc_now)(void *ctx, int64_t *ret_dc_ns);
-	/** As bus_sdo_read() and bus_sdo_write(); NULL while there is no bus. */
-	int (*sdo_read)(void *ctx, const struct admin_request *request, uint8_t *ret_data,
-			size_t *len, uint32_t *ret_abort);
-	int (*sdo_write)(void *ctx, const struct admin_request *request, uint32_t *ret_abort);
+	/**
+	 * Start an SDO transfer: ADMIN_SDO_READ or ADMIN_SDO_WRITE of a slave that exists. It is
+	 * completed at once or later, with reply.sdo_abort if the slave aborted it. NULL while
+	 * there is no bus.
+	 */
+	void (*sdo)(void *ctx, struct admin_pending *pending);
 	void (*stop)(void *ctx);
 	void (*clear)(void *ctx);
 	void (*emit)(void *ctx, const struct event *ev);
 	void *ctx;
-};
-
-enum admin_outcome {
-	ADMIN_DONE,     /* the reply is complete */
-	ADMIN_DEFERRED, /* complete as soon as the cycle has answered the board's set */
 };
 
 /**
@@ -57,19 +58,18 @@ int admin_request_parse(const void *message, size_t len, struct admin_request *r
 			char *why);
 
 /**
- * Execute a parsed @request of user @uid. @reply is filled; with ADMIN_DEFERRED, the
- * board's set *ret_sequence must be on the wire before it is sent (admin_reply_finish()). Context:
- * service thread; SDO requests block.
+ * Start an open request: it is complete afterwards, or will be. Context: service thread; never
+ * waits itself.
  */
-enum admin_outcome admin_command_run(const struct admin_target *target,
-				     const struct admin_request *request, uint32_t uid,
-				     struct admin_reply *reply, uint64_t *ret_sequence);
+void admin_command_run(const struct admin_target *target, struct admin_pending *pending);
 
-/** 1 and the cycle number in @reply once the cycle has put set @sequence on the wire; else 0. */
-int admin_reply_finish(const struct board *board, uint64_t sequence, struct admin_reply *reply);
+/**
+ * Once for each request that was completed, before its answer goes out: events, and the text of an
+ * SDO that failed.
+ */
+void admin_command_report(const struct admin_target *target, struct admin_pending *pending);
 
-/** Make @reply the refusal @result with a line of text. */
-void admin_reply_refuse(struct admin_reply *reply, int result, const char *format, ...)
-	__attribute__((format(printf, 3, 4)));
+/** How long a request of @verb may stay open if it does not say. */
+int64_t admin_command_timeout_ns(const struct admin_request *request);
 
 #endif

@@ -59,6 +59,8 @@ static int check_verb(const struct admin_request *rq, char *why)
 	case ADMIN_PING:
 	case ADMIN_STOP:
 	case ADMIN_CLEAR:
+	case ADMIN_CANCEL:
+	case ADMIN_DATA:
 		return 0;
 	case ADMIN_SET:
 		return check_items(rq, why);
@@ -70,16 +72,36 @@ static int check_verb(const struct admin_request *rq, char *why)
 	case ADMIN_SDO_READ:
 		return check_slave(rq, why);
 	case ADMIN_SDO_WRITE:
-		if (rq->data_len == 0 || rq->data_len > ADMIN_DATA_BYTES) {
-			snprintf(why, ADMIN_TEXT_BYTES,
-				 "%u bytes of data: an SDO takes 1 to ADMIN_DATA_BYTES = %d",
-				 rq->data_len, ADMIN_DATA_BYTES);
-			return -EINVAL;
+		if (rq->data_len == 0) {
+			return refuse(why, -EINVAL, "an SDO takes 1 byte of data at least");
 		}
 		return check_slave(rq, why);
 	}
 	snprintf(why, ADMIN_TEXT_BYTES, "unknown verb %u", rq->verb);
 	return -EINVAL;
+}
+
+/* What every verb may have. */
+static int check_common(const struct admin_request *rq, char *why)
+{
+	if (rq->reserved != 0) {
+		return refuse(why, -EINVAL, "the reserved field is not zero");
+	}
+	if (rq->data_len > ADMIN_DATA_BYTES || rq->data_total > ADMIN_TRANSFER_BYTES) {
+		snprintf(why, ADMIN_TEXT_BYTES,
+			 "%u of %u bytes of data: a message has up to %d, a request up to %d",
+			 rq->data_len, rq->data_total, ADMIN_DATA_BYTES, ADMIN_TRANSFER_BYTES);
+		return -EINVAL;
+	}
+	if (rq->timeout_ms > ADMIN_TIMEOUT_MS_MAX) {
+		snprintf(why, ADMIN_TEXT_BYTES, "timeout of %u ms: at most %d ms are taken",
+			 rq->timeout_ms, ADMIN_TIMEOUT_MS_MAX);
+		return -EINVAL;
+	}
+	if (strnlen(rq->name, ADMIN_NAME_BYTES) == ADMIN_NAME_BYTES) {
+		return refuse(why, -EINVAL, "the name does not end");
+	}
+	return 0;
 }
 
 int admin_request_parse(const void *message, size_t len, struct admin_request *ret_request,
@@ -97,10 +119,8 @@ int admin_request_parse(const void *message, size_t len, struct admin_request *r
 	if (rq.magic != ADMIN_MAGIC) {
 		return refuse(why, -EPROTO, "not a request of this version");
 	}
-	if (rq.reserved != 0) {
-		return refuse(why, -EINVAL, "the reserved field is not zero");
-	}
-	r = check_verb(&rq, why);
+	r = check_common(&rq, why);
+	r = r < 0 ? r : check_verb(&rq, why);
 	if (r < 0) {
 		return r;
 	}

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The admin socket: SOCK_SEQPACKET, up to ADMIN_CLIENTS of them, driven from the service thread by
- * polling; it never blocks on a client. The socket's mode and group decide who may connect.
+ * polling; it never waits, neither for a client nor for a request. The socket's mode and group
+ * decide who may connect.
  */
 #ifndef ADMIN_SERVER_H
 #define ADMIN_SERVER_H
@@ -12,9 +13,8 @@
 #include "admin/command.h"
 #include "base/clock.h"
 
-enum { ADMIN_CLIENTS = 16 };
-/* Timeout of the cycle's answer to a set of outputs. */
-#define ADMIN_ANSWER_TIMEOUT_NS (1 * NS_PER_S)
+/* Clients, and open requests of all of them. */
+enum { ADMIN_CLIENTS = 16, ADMIN_PENDING = 64 };
 
 struct admin_server;
 
@@ -38,10 +38,16 @@ void admin_server_destroy(struct admin_server *server);
 int admin_server_fd(const struct admin_server *server);
 
 /**
- * One pass: new clients, requests, answers that have become due at @now. Returns how many replies
- * still wait for the cycle. Context: service thread; blocks only for SDO requests.
+ * One pass: new clients, requests, answers that have become due at @now. Returns how many requests
+ * are open. Context: service thread.
  */
 unsigned admin_server_service(struct admin_server *server, const struct admin_target *target,
 			      mono_t now);
+
+/**
+ * Cancel every open request: what they work on is about to go. An executor that cannot complete a
+ * request in its cancel() must do so before that.
+ */
+void admin_server_cancel_all(struct admin_server *server);
 
 #endif

@@ -25,23 +25,17 @@ static int dc_now(void *ctx, int64_t *ret_dc_ns)
 	return 0;
 }
 
-static int sdo_read(void *ctx, const struct admin_request *request, uint8_t *ret_data, size_t *len,
-		    uint32_t *ret_abort)
+static void sdo(void *ctx, struct admin_pending *pending)
 {
-	(void)ctx;
-	assert(request->slave_pos < 2 && *len == ADMIN_DATA_BYTES);
-	memset(ret_data, 0x55, *len);
-	*ret_abort = request->index % 2 != 0 ? 0x06020000 : 0;
-	return *ret_abort != 0 ? -EIO : 0;
-}
+	struct admin_reply *reply = &pending->reply;
 
-static int sdo_write(void *ctx, const struct admin_request *request, uint32_t *ret_abort)
-{
 	(void)ctx;
-	assert(request->slave_pos < 2 && request->data_len >= 1 &&
-	       request->data_len <= ADMIN_DATA_BYTES);
-	*ret_abort = 0;
-	return 0;
+	assert(pending->request.slave_pos < 2);
+	assert(pending->request.verb == ADMIN_SDO_READ || pending->data_len >= 1);
+	reply->sdo_abort = pending->request.index % 2 != 0 ? 0x06020000 : 0;
+	memset(reply->data, 0x55, sizeof(reply->data));
+	reply->data_len = sizeof(reply->data);
+	admin_pending_complete(pending, reply->sdo_abort != 0 ? -EIO : 0);
 }
 
 static void nothing(void *ctx)
@@ -88,8 +82,7 @@ static struct admin_target make_target(void)
 		.board = &board,
 		.is_op = 1,
 		.dc_now = dc_now,
-		.sdo_read = sdo_read,
-		.sdo_write = sdo_write,
+		.sdo = sdo,
 		.stop = nothing,
 		.clear = nothing,
 		.emit = emit,
@@ -107,19 +100,26 @@ static void check_board(void)
 
 static void run(const struct admin_request *request)
 {
+	static struct admin_pending pending;
 	struct admin_target target = make_target();
-	struct admin_reply reply;
-	uint64_t sequence = UINT64_MAX;
 
-	if (admin_command_run(&target, request, 0, &reply, &sequence) == ADMIN_DEFERRED) {
-		assert(sequence != UINT64_MAX && reply.result == 0);
-		board_answer(&board, sequence, 7);
-		assert(admin_reply_finish(&board, sequence, &reply) == 1 && reply.cycle == 7);
+	assert(admin_pending_init(&pending, request, 0) == 0);
+	if (pending.state == ADMIN_PENDING_OPEN) {
+		admin_command_run(&target, &pending);
 	}
-	assert(memchr(reply.text, '\0', sizeof(reply.text)) != NULL);
-	assert(reply.data_len <= ADMIN_DATA_BYTES);
-	assert(reply.result != 0 || reply.text[0] == '\0');
+	if (pending.state == ADMIN_PENDING_OPEN) {
+		board_answer(&board, pending.sequence, 7);
+		pending.poll(&pending, &target);
+		assert(pending.state == ADMIN_PENDING_COMPLETE && pending.reply.cycle == 7);
+	}
+	if (pending.state == ADMIN_PENDING_COMPLETE) {
+		admin_command_report(&target, &pending);
+	}
+	assert(memchr(pending.reply.text, '\0', sizeof(pending.reply.text)) != NULL);
+	assert(pending.reply.data_len <= ADMIN_DATA_BYTES);
+	assert(pending.reply.result != 0 || pending.reply.text[0] == '\0');
 	check_board();
+	admin_pending_release(&pending);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);

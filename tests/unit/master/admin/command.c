@@ -8,20 +8,35 @@
 
 enum { USER = 1000, OUTPUT_LED = 0, OUTPUT_LEVEL = 1, OUTPUT_ONESHOT = 2 };
 
+enum outcome { DONE, DEFERRED };
+
+/* Started, not finished. */
+static struct admin_pending *start(const struct admin_target *target,
+				   const struct admin_request *rq)
+{
+	static struct admin_pending pending;
+
+	CHECK_EQ(admin_pending_init(&pending, rq, USER), 0);
+	admin_command_run(target, &pending);
+	return &pending;
+}
+
 static struct admin_reply run(struct fake *fake, const struct admin_request *rq,
-			      enum admin_outcome wanted)
+			      enum outcome wanted)
 {
 	struct admin_target target = fake_target(fake);
-	struct admin_reply reply;
-	uint64_t sequence = 0;
+	struct admin_pending *pending = start(&target, rq);
 
-	CHECK_EQ(admin_command_run(&target, rq, USER, &reply, &sequence), wanted);
-	CHECK_EQ(reply.magic, ADMIN_MAGIC);
-	return reply;
+	CHECK_EQ(pending->state == ADMIN_PENDING_COMPLETE, wanted == DONE);
+	if (wanted == DONE) {
+		admin_command_report(&target, pending);
+	}
+	CHECK_EQ(pending->reply.magic, ADMIN_MAGIC);
+	return pending->reply;
 }
 
 static struct admin_reply set_one(struct fake *fake, const char *channel, uint64_t raw,
-				  enum admin_outcome wanted)
+				  enum outcome wanted)
 {
 	struct admin_request rq = fake_request(ADMIN_SET);
 
@@ -39,22 +54,23 @@ TEST(admin, a_set_goes_to_the_board_and_is_answered_with_the_cycle_of_its_frame)
 	struct fake fake;
 	struct admin_target target;
 	struct admin_request rq = fake_request(ADMIN_SET);
-	struct admin_reply reply;
-	uint64_t sequence = 0;
+	struct admin_pending *pending;
 
 	fake_init(&fake);
 	target = fake_target(&fake);
 	fake_item(&rq, "a.led", 1);
 	fake_item(&rq, "a.level", 0xf9); /* -7 */
-	CHECK_EQ(admin_command_run(&target, &rq, USER, &reply, &sequence), ADMIN_DEFERRED);
-	CHECK_EQ(admin_reply_finish(&fake.board, sequence, &reply), 0);
+	pending = start(&target, &rq);
+	pending->poll(pending, &target);
+	CHECK_EQ(pending->state, ADMIN_PENDING_OPEN);
 	CHECK_EQ(fake.board.output[OUTPUT_LED].raw, 1);
 	CHECK_EQ(fake.board.output[OUTPUT_LEVEL].raw, 0xf9);
 	CHECK_EQ(is_set(&fake, OUTPUT_ONESHOT), 0);
 	fake_cycle(&fake, 4711);
-	CHECK_EQ(admin_reply_finish(&fake.board, sequence, &reply), 1);
-	CHECK_EQ(reply.result, 0);
-	CHECK_EQ(reply.cycle, 4711);
+	pending->poll(pending, &target);
+	CHECK_EQ(pending->state, ADMIN_PENDING_COMPLETE);
+	CHECK_EQ(pending->reply.result, 0);
+	CHECK_EQ(pending->reply.cycle, 4711);
 	CHECK_EQ(fake.events, 2);
 	CHECK_EQ(fake.event[0].id, EVENT_OUTPUT_SET);
 	CHECK_EQ(fake.event[0].value, FAKE_LED);
@@ -70,7 +86,7 @@ TEST(admin, one_bad_item_leaves_the_whole_board_unchanged)
 	fake_init(&fake);
 	fake_item(&rq, "a.led", 1);
 	fake_item(&rq, "a.nothing", 1);
-	reply = run(&fake, &rq, ADMIN_DONE);
+	reply = run(&fake, &rq, DONE);
 	CHECK_EQ(reply.result, -ENOENT);
 	CHECK_STR(reply.text, "a.nothing: no such channel");
 	CHECK_EQ(is_set(&fake, OUTPUT_LED), 0);
@@ -85,7 +101,7 @@ TEST(admin, an_input_is_not_set)
 	struct admin_reply reply;
 
 	fake_init(&fake);
-	reply = set_one(&fake, "a.adc", 1, ADMIN_DONE);
+	reply = set_one(&fake, "a.adc", 1, DONE);
 	CHECK_EQ(reply.result, -EPERM);
 	CHECK_STR(reply.text, "a.adc: is an input");
 }
@@ -96,10 +112,10 @@ TEST(admin, an_output_with_another_owner_is_refused)
 
 	fake_init(&fake);
 	fake.cfg.output[0].owner = CONFIG_OWNER_REMOTE;
-	CHECK_STR(set_one(&fake, "a.level", 1, ADMIN_DONE).text,
+	CHECK_STR(set_one(&fake, "a.level", 1, DONE).text,
 		  "a.level: owned by remote, not local (outputs[].owner)");
 	fake.cfg.output[0].owner = CONFIG_OWNER_PROGRAM;
-	CHECK_EQ(set_one(&fake, "a.level", 1, ADMIN_DONE).result, -EPERM);
+	CHECK_EQ(set_one(&fake, "a.level", 1, DONE).result, -EPERM);
 	CHECK_EQ(is_set(&fake, OUTPUT_LEVEL), 0);
 }
 
@@ -108,12 +124,12 @@ TEST(admin, values_outside_the_limits_or_the_type_are_refused)
 	struct fake fake;
 
 	fake_init(&fake);
-	CHECK_EQ(set_one(&fake, "a.level", 11, ADMIN_DONE).result, -ERANGE);
-	CHECK_EQ(set_one(&fake, "a.level", 0xf5, ADMIN_DONE).result, -ERANGE); /* -11 */
-	CHECK_EQ(set_one(&fake, "a.level", 0x100, ADMIN_DONE).result, -ERANGE);
-	CHECK_EQ(set_one(&fake, "a.led", 2, ADMIN_DONE).result, -ERANGE);
-	CHECK_EQ(set_one(&fake, "a.level", 10, ADMIN_DEFERRED).result, 0);
-	CHECK_EQ(set_one(&fake, "a.level", 0xf6, ADMIN_DEFERRED).result, 0); /* -10 */
+	CHECK_EQ(set_one(&fake, "a.level", 11, DONE).result, -ERANGE);
+	CHECK_EQ(set_one(&fake, "a.level", 0xf5, DONE).result, -ERANGE); /* -11 */
+	CHECK_EQ(set_one(&fake, "a.level", 0x100, DONE).result, -ERANGE);
+	CHECK_EQ(set_one(&fake, "a.led", 2, DONE).result, -ERANGE);
+	CHECK_EQ(set_one(&fake, "a.level", 10, DEFERRED).result, 0);
+	CHECK_EQ(set_one(&fake, "a.level", 0xf6, DEFERRED).result, 0); /* -10 */
 }
 
 TEST(admin, nothing_is_set_unless_the_bus_is_in_op)
@@ -121,19 +137,15 @@ TEST(admin, nothing_is_set_unless_the_bus_is_in_op)
 	struct fake fake;
 	struct admin_target target;
 	struct admin_request rq = fake_request(ADMIN_SET);
-	struct admin_reply reply;
-	uint64_t sequence = 0;
 
 	fake_init(&fake);
 	fake_item(&rq, "a.led", 1);
 	target = fake_target(&fake);
 	target.is_op = 0;
-	CHECK_EQ(admin_command_run(&target, &rq, USER, &reply, &sequence), ADMIN_DONE);
-	CHECK_STR(reply.text, "the bus is not in OP");
+	CHECK_STR(start(&target, &rq)->reply.text, "the bus is not in OP");
 	target.is_op = 1;
 	target.board = NULL;
-	CHECK_EQ(admin_command_run(&target, &rq, USER, &reply, &sequence), ADMIN_DONE);
-	CHECK_EQ(reply.result, -EAGAIN);
+	CHECK_EQ(start(&target, &rq)->reply.result, -EAGAIN);
 	CHECK_EQ(fake.board.sequence, 0);
 }
 
@@ -154,13 +166,13 @@ TEST(admin, a_one_shot_time_goes_out_as_an_absolute_time)
 	struct admin_reply reply;
 
 	fake_init(&fake);
-	reply = run(&fake, &rq, ADMIN_DEFERRED);
+	reply = run(&fake, &rq, DEFERRED);
 	CHECK_EQ(reply.dc_time_ns, FAKE_NOW_NS + 20 * FAKE_PERIOD_NS);
 	CHECK_EQ(fake.board.output[OUTPUT_ONESHOT].raw, FAKE_NOW_NS + 20 * FAKE_PERIOD_NS);
 	CHECK_EQ(fake.event[0].id, EVENT_COMMAND);
 	CHECK_EQ(fake.event[0].value, reply.dc_time_ns);
 	rq = oneshot(1, 0, FAKE_NOW_NS + 5 * FAKE_PERIOD_NS);
-	CHECK_EQ(run(&fake, &rq, ADMIN_DEFERRED).dc_time_ns, FAKE_NOW_NS + 5 * FAKE_PERIOD_NS);
+	CHECK_EQ(run(&fake, &rq, DEFERRED).dc_time_ns, FAKE_NOW_NS + 5 * FAKE_PERIOD_NS);
 }
 
 TEST(admin, a_one_shot_time_in_the_past_or_too_near_is_refused)
@@ -173,12 +185,12 @@ TEST(admin, a_one_shot_time_in_the_past_or_too_near_is_refused)
 	struct admin_request far = oneshot(1, 1, INT64_MAX);
 
 	fake_init(&fake);
-	CHECK_EQ(run(&fake, &past, ADMIN_DONE).result, -ETIME);
-	CHECK(strstr(run(&fake, &past, ADMIN_DONE).text, "in the past") != NULL);
-	CHECK_EQ(run(&fake, &now, ADMIN_DONE).result, -ETIME);
-	CHECK_EQ(run(&fake, &near, ADMIN_DONE).result, -ETIME);
-	CHECK_EQ(run(&fake, &back, ADMIN_DONE).result, -ETIME);
-	CHECK_EQ(run(&fake, &far, ADMIN_DONE).result, -ERANGE);
+	CHECK_EQ(run(&fake, &past, DONE).result, -ETIME);
+	CHECK(strstr(run(&fake, &past, DONE).text, "in the past") != NULL);
+	CHECK_EQ(run(&fake, &now, DONE).result, -ETIME);
+	CHECK_EQ(run(&fake, &near, DONE).result, -ETIME);
+	CHECK_EQ(run(&fake, &back, DONE).result, -ETIME);
+	CHECK_EQ(run(&fake, &far, DONE).result, -ERANGE);
 	CHECK_EQ(fake.board.sequence, 0);
 	CHECK_EQ(fake.event[0].id, EVENT_COMMAND_REFUSED);
 }
@@ -191,19 +203,19 @@ TEST(admin, a_one_shot_needs_a_slave_that_can_and_is_in_that_mode)
 	struct admin_request right = oneshot(1, 1, 20 * FAKE_PERIOD_NS);
 
 	fake_init(&fake);
-	CHECK_EQ(run(&fake, &cannot, ADMIN_DONE).result, -EOPNOTSUPP);
-	CHECK_EQ(run(&fake, &absent, ADMIN_DONE).result, -ENODEV);
+	CHECK_EQ(run(&fake, &cannot, DONE).result, -EOPNOTSUPP);
+	CHECK_EQ(run(&fake, &absent, DONE).result, -ENODEV);
 	fake.cfg.slave[1].mode = CONFIG_MODE_PERIODIC;
-	CHECK_STR(run(&fake, &right, ADMIN_DONE).text,
+	CHECK_STR(run(&fake, &right, DONE).text,
 		  "b: is in periodic mode (slaves[1].mode: oneshot)");
 	fake.cfg.slave[1].mode = CONFIG_MODE_UNSET;
-	CHECK_EQ(run(&fake, &right, ADMIN_DONE).result, -EOPNOTSUPP);
+	CHECK_EQ(run(&fake, &right, DONE).result, -EOPNOTSUPP);
 	fake.cfg.sdo[0] =
 		(struct config_sdo){ .slave_pos = 1, .index = 0x8000, .subindex = 1, .value = 1 };
 	fake.cfg.sdo_count = 1;
-	CHECK_EQ(run(&fake, &right, ADMIN_DEFERRED).result, 0);
+	CHECK_EQ(run(&fake, &right, DEFERRED).result, 0);
 	fake.has_dc = 0;
-	CHECK_EQ(run(&fake, &right, ADMIN_DONE).result, -EAGAIN);
+	CHECK_EQ(run(&fake, &right, DONE).result, -EAGAIN);
 }
 
 /* Both slaves of the fake with a one-shot output: its LED's channel becomes the first one's. */
@@ -225,7 +237,7 @@ TEST(admin, a_one_shot_of_all_slaves_is_one_set)
 	struct admin_reply reply;
 
 	make_both_oneshot(&fake);
-	reply = run(&fake, &all, ADMIN_DEFERRED);
+	reply = run(&fake, &all, DEFERRED);
 	CHECK_EQ(fake.board.sequence, 2);
 	CHECK_EQ(fake.board.output[OUTPUT_LED].raw, reply.dc_time_ns);
 	CHECK_EQ(fake.board.output[OUTPUT_ONESHOT].raw, reply.dc_time_ns);
@@ -238,13 +250,12 @@ TEST(admin, a_one_shot_of_all_slaves_arms_none_if_one_cannot)
 
 	make_both_oneshot(&fake);
 	fake.cfg.slave[1].mode = CONFIG_MODE_PERIODIC;
-	CHECK_STR(run(&fake, &all, ADMIN_DONE).text,
-		  "b: is in periodic mode (slaves[1].mode: oneshot)");
+	CHECK_STR(run(&fake, &all, DONE).text, "b: is in periodic mode (slaves[1].mode: oneshot)");
 	CHECK_EQ(fake.board.sequence, 0);
 	fake.channels[FAKE_LED].name[0] = 'x';
 	fake.channels[FAKE_LED].direction = CHANNEL_INPUT;
 	fake.channels[FAKE_ONESHOT].direction = CHANNEL_INPUT;
-	CHECK_EQ(run(&fake, &all, ADMIN_DONE).result, -EOPNOTSUPP);
+	CHECK_EQ(run(&fake, &all, DONE).result, -EOPNOTSUPP);
 	CHECK_EQ(fake.board.sequence, 0);
 }
 
@@ -255,9 +266,9 @@ TEST(admin, a_one_shot_more_than_an_hour_ahead_is_refused)
 	struct admin_request just = oneshot(1, 1, ADMIN_ONESHOT_AHEAD_NS);
 
 	fake_init(&fake);
-	CHECK_STR(run(&fake, &far, ADMIN_DONE).text, "3600 s ahead, at most 3600 s are taken");
+	CHECK_STR(run(&fake, &far, DONE).text, "3600 s ahead, at most 3600 s are taken");
 	CHECK_EQ(fake.board.sequence, 0);
-	CHECK_EQ(run(&fake, &just, ADMIN_DEFERRED).result, 0);
+	CHECK_EQ(run(&fake, &just, DEFERRED).result, 0);
 }
 
 TEST(admin, an_sdo_gives_data_or_its_abort_code)
@@ -269,13 +280,13 @@ TEST(admin, an_sdo_gives_data_or_its_abort_code)
 	fake_init(&fake);
 	rq.index = 0x8000;
 	rq.subindex = 2;
-	reply = run(&fake, &rq, ADMIN_DONE);
+	reply = run(&fake, &rq, DONE);
 	CHECK_EQ(reply.result, 0);
 	CHECK_EQ(reply.data_len, 1);
 	CHECK_EQ(reply.data[0], 2);
 	fake.sdo_result = -EIO;
 	fake.sdo_abort = 0x06020000;
-	reply = run(&fake, &rq, ADMIN_DONE);
+	reply = run(&fake, &rq, DONE);
 	CHECK_EQ(reply.sdo_abort, 0x06020000);
 	CHECK_EQ(reply.data_len, 0);
 	CHECK_STR(reply.text, "slave 0: SDO read of 0x8000:02: abort code 0x06020000");
@@ -283,9 +294,9 @@ TEST(admin, an_sdo_gives_data_or_its_abort_code)
 	fake.sdo_abort = 0;
 	rq.verb = ADMIN_SDO_WRITE;
 	rq.data_len = 1;
-	CHECK_EQ(run(&fake, &rq, ADMIN_DONE).result, -EIO);
+	CHECK_EQ(run(&fake, &rq, DONE).result, -EIO);
 	rq.slave_pos = 2;
-	CHECK_EQ(run(&fake, &rq, ADMIN_DONE).result, -ENODEV);
+	CHECK_EQ(run(&fake, &rq, DONE).result, -ENODEV);
 }
 
 TEST(admin, an_sdo_without_a_bus_is_refused)
@@ -293,14 +304,12 @@ TEST(admin, an_sdo_without_a_bus_is_refused)
 	struct fake fake;
 	struct admin_request rq = fake_request(ADMIN_SDO_READ);
 	struct admin_target target;
-	struct admin_reply reply;
-	uint64_t sequence;
 
 	fake_init(&fake);
 	target = fake_target(&fake);
-	target.sdo_read = NULL;
-	CHECK_EQ(admin_command_run(&target, &rq, USER, &reply, &sequence), ADMIN_DONE);
-	CHECK_EQ(reply.result, -EAGAIN);
+	target.sdo = NULL;
+	CHECK_EQ(start(&target, &rq)->state, ADMIN_PENDING_COMPLETE);
+	CHECK_EQ(start(&target, &rq)->reply.result, -EAGAIN);
 }
 
 TEST(admin, stop_and_clear_are_passed_on_and_logged_with_their_user)
@@ -311,10 +320,10 @@ TEST(admin, stop_and_clear_are_passed_on_and_logged_with_their_user)
 	struct admin_request clear = fake_request(ADMIN_CLEAR);
 
 	fake_init(&fake);
-	CHECK_EQ(run(&fake, &ping, ADMIN_DONE).result, 0);
+	CHECK_EQ(run(&fake, &ping, DONE).result, 0);
 	CHECK_EQ(fake.events, 0);
-	run(&fake, &stop, ADMIN_DONE);
-	run(&fake, &clear, ADMIN_DONE);
+	run(&fake, &stop, DONE);
+	run(&fake, &clear, DONE);
 	CHECK_EQ(fake.stops, 1);
 	CHECK_EQ(fake.clears, 1);
 	CHECK_EQ(fake.events, 2);

@@ -47,6 +47,30 @@ TEST(admin, unknown_verbs_and_reserved_bits_are_refused)
 	rq.verb = ADMIN_PING;
 	rq.reserved = 1;
 	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+	rq.reserved = 0;
+	memset(rq.name, 'x', sizeof(rq.name));
+	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+	CHECK_STR(why, "the name does not end");
+}
+
+TEST(admin, data_and_timeouts_beyond_their_limits_are_refused)
+{
+	struct admin_request rq = fake_request(ADMIN_SDO_WRITE);
+	struct admin_request got;
+	char why[ADMIN_TEXT_BYTES];
+
+	rq.data_len = ADMIN_DATA_BYTES;
+	rq.data_total = ADMIN_TRANSFER_BYTES;
+	rq.timeout_ms = ADMIN_TIMEOUT_MS_MAX;
+	CHECK_EQ(parse(&rq, &got, why), 0);
+	rq.data_total++;
+	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+	CHECK_STR(why, "1024 of 16777217 bytes of data: a message has up to 1024, a request up to "
+		       "16777216");
+	rq.data_total--;
+	rq.timeout_ms++;
+	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+	CHECK_STR(why, "timeout of 3600001 ms: at most 3600000 ms are taken");
 }
 
 TEST(admin, a_set_takes_1_to_64_items_with_whole_printable_names)

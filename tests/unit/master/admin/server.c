@@ -169,7 +169,7 @@ TEST(admin_server, a_set_that_the_cycle_does_not_take_times_out_after_a_second)
 
 	bench_open(&b);
 	fd = connect_and_set(&b);
-	b.now.ns += ADMIN_ANSWER_TIMEOUT_NS - 1;
+	b.now.ns += ADMIN_CYCLE_TIMEOUT_NS - 1;
 	CHECK_EQ(service(&b), 1);
 	b.now.ns += 1;
 	CHECK_EQ(service(&b), 0);
@@ -202,17 +202,31 @@ TEST(admin_server, the_seventeenth_client_is_rejected_and_the_others_continue)
 {
 	struct bench b;
 	struct admin_request rq = fake_request(ADMIN_PING);
+	struct admin_request set = fake_request(ADMIN_SET);
+	struct admin_request stop = fake_request(ADMIN_STOP);
 	int fd[ADMIN_CLIENTS];
 	int late;
 
 	bench_open(&b);
+	fake_item(&set, "a.led", 1);
 	for (int i = 0; i < ADMIN_CLIENTS; i++) {
 		fd[i] = bench_connect(&b);
 		service(&b);
 	}
 	late = bench_connect(&b);
+	ask(late, &set);
 	service(&b);
 	CHECK_EQ(answer(late).result, -EBUSY);
+	close(late);
+	/* But whether it lives, and that it shall stop, can always be said. */
+	late = bench_connect(&b);
+	ask(late, &rq);
+	service(&b);
+	CHECK_EQ(answer(late).result, 0);
+	ask(late, &stop);
+	service(&b);
+	CHECK_EQ(answer(late).result, 0);
+	CHECK_EQ(b.fake.stops, 1);
 	close(late);
 	ask(fd[ADMIN_CLIENTS - 1], &rq);
 	service(&b);
@@ -238,9 +252,333 @@ TEST(admin_server, a_client_that_disconnects_while_it_waits_does_no_harm)
 	bench_open(&b);
 	fd = connect_and_set(&b);
 	close(fd);
-	CHECK_EQ(service(&b), 1);
+	CHECK_EQ(service(&b), 0);
 	fake_cycle(&b.fake, 5);
 	CHECK_EQ(service(&b), 0);
+	bench_close(&b);
+}
+
+/* --- requests that are answered later --- */
+
+static int connect_and_read_sdo(struct bench *b, uint32_t id, uint32_t timeout_ms)
+{
+	struct admin_request rq = fake_request(ADMIN_SDO_READ);
+	int fd = bench_connect(b);
+
+	b->fake.is_sdo_slow = 1;
+	rq.id = id;
+	rq.timeout_ms = timeout_ms;
+	rq.index = 0x1018;
+	ask(fd, &rq);
+	CHECK_EQ(service(b), 1);
+	CHECK(!has_answer(fd));
+	return fd;
+}
+
+/* The same beside another one. */
+static int connect_and_open(struct bench *b, uint32_t id)
+{
+	struct admin_request rq = fake_request(ADMIN_SDO_READ);
+	int fd = bench_connect(b);
+
+	rq.id = id;
+	ask(fd, &rq);
+	CHECK_EQ(service(b), 2);
+	return fd;
+}
+
+static void ask_verb(int fd, enum admin_verb verb, uint32_t id)
+{
+	struct admin_request rq = fake_request(verb);
+
+	rq.id = id;
+	ask(fd, &rq);
+}
+
+TEST(admin_server, ping_and_stop_are_answered_while_a_request_of_the_same_client_is_open)
+{
+	struct bench b;
+	struct admin_reply reply;
+	int fd;
+
+	bench_open(&b);
+	fd = connect_and_read_sdo(&b, 7, 0);
+	ask_verb(fd, ADMIN_PING, 8);
+	ask_verb(fd, ADMIN_STOP, 9);
+	CHECK_EQ(service(&b), 1);
+	CHECK_EQ(answer(fd).id, 8);
+	CHECK_EQ(answer(fd).id, 9);
+	CHECK_EQ(b.fake.stops, 1);
+	b.fake.pending->reply.data[0] = 0x42;
+	b.fake.pending->reply.data_len = 1;
+	admin_pending_complete(b.fake.pending, 0);
+	CHECK_EQ(service(&b), 0);
+	reply = answer(fd);
+	CHECK_EQ(reply.id, 7);
+	CHECK_EQ(reply.result, 0);
+	CHECK_EQ(reply.data[0], 0x42);
+	close(fd);
+	bench_close(&b);
+}
+
+TEST(admin_server, progress_comes_before_the_answer)
+{
+	struct bench b;
+	struct admin_reply reply;
+	int fd;
+
+	bench_open(&b);
+	fd = connect_and_read_sdo(&b, 7, 0);
+	admin_pending_progress(b.fake.pending, 300, 1000);
+	service(&b);
+	reply = answer(fd);
+	CHECK_EQ(reply.kind, ADMIN_REPLY_PROGRESS);
+	CHECK_EQ(reply.id, 7);
+	CHECK_EQ(reply.done, 300);
+	CHECK_EQ(reply.total, 1000);
+	service(&b);
+	CHECK(!has_answer(fd)); /* once */
+	admin_pending_complete(b.fake.pending, 0);
+	service(&b);
+	CHECK_EQ(answer(fd).kind, ADMIN_REPLY_DONE);
+	close(fd);
+	bench_close(&b);
+}
+
+TEST(admin_server, a_request_ends_by_cancel_by_its_timeout_and_with_its_client)
+{
+	struct bench b;
+	struct admin_reply reply;
+	int fd;
+
+	bench_open(&b);
+	fd = connect_and_read_sdo(&b, 7, 0);
+	ask_verb(fd, ADMIN_CANCEL, 7);
+	CHECK_EQ(service(&b), 0);
+	reply = answer(fd);
+	CHECK_EQ(reply.id, 7);
+	CHECK_EQ(reply.result, -ECANCELED);
+	CHECK_EQ(b.fake.cancels, 1);
+	ask_verb(fd, ADMIN_CANCEL, 7);
+	service(&b);
+	CHECK_EQ(answer(fd).result, -ENOENT);
+	close(fd);
+
+	fd = connect_and_read_sdo(&b, 8, 300);
+	b.now.ns += 300 * NS_PER_MS - 1;
+	CHECK_EQ(service(&b), 1);
+	b.now.ns += 1;
+	CHECK_EQ(service(&b), 0);
+	reply = answer(fd);
+	CHECK_EQ(reply.id, 8);
+	CHECK_EQ(reply.result, -ETIMEDOUT);
+	CHECK_EQ(b.fake.cancels, 2);
+	close(fd);
+
+	fd = connect_and_read_sdo(&b, 9, 0);
+	close(fd);
+	CHECK_EQ(service(&b), 0);
+	CHECK_EQ(b.fake.cancels, 3);
+	bench_close(&b);
+}
+
+TEST(admin_server, a_cancelled_request_stays_valid_until_its_executor_has_completed_it)
+{
+	struct bench b;
+	struct admin_pending *old;
+	int fd;
+
+	bench_open(&b);
+	b.fake.is_cancel_slow = 1;
+	fd = connect_and_read_sdo(&b, 7, 0);
+	old = b.fake.pending;
+	close(fd);
+	CHECK_EQ(service(&b), 1);
+	CHECK_EQ(b.fake.cancels, 1);
+	fd = connect_and_open(&b, 7);
+	CHECK(b.fake.pending != old);
+	CHECK_EQ(old->request.index, 0x1018);
+	admin_pending_complete(old, -ECANCELED);
+	CHECK_EQ(service(&b), 1);
+	CHECK(!has_answer(fd)); /* nothing for the new one, which has the same id */
+	admin_pending_complete(b.fake.pending, 0);
+	CHECK_EQ(service(&b), 0);
+	CHECK_EQ(answer(fd).result, 0);
+	CHECK_EQ(b.fake.cancels, 1);
+	close(fd);
+	bench_close(&b);
+}
+
+TEST(admin_server, all_requests_can_be_cancelled_and_their_clients_get_an_answer)
+{
+	struct bench b;
+	int fd;
+	int second;
+
+	bench_open(&b);
+	fd = connect_and_read_sdo(&b, 7, 0);
+	second = connect_and_open(&b, 1);
+	admin_server_cancel_all(b.server);
+	CHECK_EQ(service(&b), 0);
+	CHECK_EQ(answer(fd).result, -ECANCELED);
+	CHECK_EQ(answer(second).result, -ECANCELED);
+	close(fd);
+	close(second);
+	bench_close(&b);
+}
+
+/* Octet @i of a long transfer. */
+static uint8_t octet(size_t i)
+{
+	return (uint8_t)(i * 7 + i / 251);
+}
+
+TEST(admin_server, a_long_answer_comes_in_parts_and_waits_for_its_reader)
+{
+	enum { BYTES = 1 << 20 };
+	struct bench b;
+	struct admin_reply reply = { .kind = ADMIN_REPLY_DATA };
+	size_t got = 0;
+	uint8_t *room;
+	int fd;
+
+	bench_open(&b);
+	fd = connect_and_read_sdo(&b, 7, 0);
+	room = admin_pending_reserve(b.fake.pending, BYTES + 10);
+	for (size_t i = 0; i < BYTES; i++) {
+		room[i] = octet(i);
+	}
+	admin_pending_answer_len(b.fake.pending, BYTES);
+	admin_pending_complete(b.fake.pending, 0);
+	CHECK_EQ(service(&b), 1); /* more than a socket takes */
+	ask_verb(fd, ADMIN_PING, 8);
+	while (reply.kind == ADMIN_REPLY_DATA) {
+		if (!has_answer(fd)) {
+			service(&b);
+		}
+		reply = answer(fd);
+		if (reply.id == 8) {
+			reply.kind = ADMIN_REPLY_DATA;
+			continue;
+		}
+		CHECK_EQ(reply.data_total, BYTES);
+		CHECK_EQ(reply.data_offset, got);
+		for (size_t i = 0; i < reply.data_len; i++) {
+			CHECK_EQ(reply.data[i], octet(got + i));
+		}
+		got += reply.data_len;
+	}
+	CHECK_EQ(got, BYTES);
+	CHECK_EQ(service(&b), 0);
+	close(fd);
+	bench_close(&b);
+}
+
+TEST(admin_server, a_client_that_does_not_read_its_answer_is_closed_after_two_seconds)
+{
+	struct bench b;
+	int fd;
+
+	bench_open(&b);
+	fd = connect_and_read_sdo(&b, 7, 0);
+	CHECK(admin_pending_reserve(b.fake.pending, ADMIN_TRANSFER_BYTES) != NULL);
+	CHECK(admin_pending_reserve(b.fake.pending, ADMIN_TRANSFER_BYTES + 1) == NULL);
+	memset(b.fake.pending->answer, 0, ADMIN_TRANSFER_BYTES);
+	admin_pending_answer_len(b.fake.pending, ADMIN_TRANSFER_BYTES);
+	admin_pending_complete(b.fake.pending, 0);
+	CHECK_EQ(service(&b), 1);
+	b.now.ns += 2 * NS_PER_S - 1;
+	CHECK_EQ(service(&b), 1);
+	b.now.ns += 1;
+	service(&b);
+	CHECK_EQ(service(&b), 0);
+	close(fd);
+	bench_close(&b);
+}
+
+TEST(admin_server, long_data_of_a_request_are_collected_before_it_is_executed)
+{
+	enum { BYTES = 5000 };
+	struct bench b;
+	struct admin_request rq = fake_request(ADMIN_SDO_WRITE);
+	int fd;
+
+	bench_open(&b);
+	b.fake.is_sdo_slow = 1;
+	fd = bench_connect(&b);
+	rq.id = 3;
+	rq.data_total = BYTES;
+	for (size_t at = 0; at < BYTES; at += rq.data_len) {
+		rq.data_offset = (uint32_t)at;
+		rq.data_len =
+			BYTES - at < ADMIN_DATA_BYTES ? (uint32_t)(BYTES - at) : ADMIN_DATA_BYTES;
+		for (size_t i = 0; i < rq.data_len; i++) {
+			rq.data[i] = octet(at + i);
+		}
+		CHECK(b.fake.pending == NULL);
+		ask(fd, &rq);
+		rq.verb = ADMIN_DATA;
+		service(&b);
+	}
+	CHECK(b.fake.pending != NULL);
+	CHECK_EQ(b.fake.pending->data_len, BYTES);
+	for (size_t i = 0; i < BYTES; i++) {
+		CHECK_EQ(b.fake.pending->data[i], octet(i));
+	}
+	admin_pending_complete(b.fake.pending, 0);
+	CHECK_EQ(service(&b), 0);
+	CHECK_EQ(answer(fd).id, 3);
+	close(fd);
+	bench_close(&b);
+}
+
+TEST(admin_server, data_out_of_order_end_the_request)
+{
+	struct bench b;
+	struct admin_request rq = fake_request(ADMIN_SDO_WRITE);
+	int fd;
+
+	bench_open(&b);
+	fd = bench_connect(&b);
+	rq.id = 3;
+	rq.data_total = 5000;
+	rq.data_len = ADMIN_DATA_BYTES;
+	ask(fd, &rq);
+	rq.verb = ADMIN_DATA;
+	rq.data_offset = 2 * ADMIN_DATA_BYTES;
+	ask(fd, &rq);
+	CHECK_EQ(service(&b), 0);
+	CHECK_EQ(answer(fd).result, -EINVAL);
+	ask(fd, &rq);
+	CHECK_EQ(service(&b), 0);
+	CHECK_EQ(answer(fd).result, -ENOENT);
+	CHECK(b.fake.pending == NULL);
+	close(fd);
+	bench_close(&b);
+}
+
+TEST(admin_server, a_client_has_eight_requests_open_at_most_and_ids_are_its_own)
+{
+	struct bench b;
+	struct admin_request rq = fake_request(ADMIN_SDO_READ);
+	int fd;
+
+	bench_open(&b);
+	fd = connect_and_read_sdo(&b, 0, 0);
+	ask(fd, &rq);
+	service(&b);
+	CHECK_EQ(answer(fd).result, -EEXIST);
+	for (rq.id = 1; rq.id < 8; rq.id++) {
+		ask(fd, &rq);
+	}
+	CHECK_EQ(service(&b), 8);
+	CHECK(!has_answer(fd));
+	ask(fd, &rq);
+	CHECK_EQ(service(&b), 8);
+	CHECK_EQ(answer(fd).result, -EBUSY);
+	close(fd);
+	CHECK_EQ(service(&b), 0);
+	CHECK_EQ(b.fake.cancels, 8);
 	bench_close(&b);
 }
 

@@ -57,26 +57,32 @@ static int dc_now(void *ctx, int64_t *ret_dc_ns)
 	return 0;
 }
 
-static int sdo_read(void *ctx, const struct admin_request *request, uint8_t *ret_data, size_t *len,
-		    uint32_t *ret_abort)
+static void cancel_sdo(struct admin_pending *pending)
 {
-	const struct fake *fake = ctx;
+	struct fake *fake = pending->work;
 
-	*ret_abort = fake->sdo_abort;
-	if (fake->sdo_result == 0) {
-		ret_data[0] = request->subindex;
-		*len = 1;
+	fake->cancels++;
+	if (!fake->is_cancel_slow) {
+		admin_pending_complete(pending, -ECANCELED);
 	}
-	return fake->sdo_result;
 }
 
-static int sdo_write(void *ctx, const struct admin_request *request, uint32_t *ret_abort)
+static void sdo(void *ctx, struct admin_pending *pending)
 {
-	const struct fake *fake = ctx;
+	struct fake *fake = ctx;
 
-	(void)request;
-	*ret_abort = fake->sdo_abort;
-	return fake->sdo_result;
+	fake->pending = pending;
+	if (fake->is_sdo_slow) {
+		pending->work = fake;
+		pending->cancel = cancel_sdo;
+		return;
+	}
+	pending->reply.sdo_abort = fake->sdo_abort;
+	if (fake->sdo_result == 0 && pending->request.verb == ADMIN_SDO_READ) {
+		pending->reply.data[0] = pending->request.subindex;
+		pending->reply.data_len = 1;
+	}
+	admin_pending_complete(pending, fake->sdo_result);
 }
 
 static void stop(void *ctx)
@@ -111,8 +117,7 @@ struct admin_target fake_target(struct fake *fake)
 		.board = &fake->board,
 		.is_op = 1,
 		.dc_now = dc_now,
-		.sdo_read = sdo_read,
-		.sdo_write = sdo_write,
+		.sdo = sdo,
 		.stop = stop,
 		.clear = clear,
 		.emit = emit,

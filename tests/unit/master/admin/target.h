@@ -18,6 +18,10 @@ struct fake {
 	int has_dc;
 	int sdo_result;
 	uint32_t sdo_abort;
+	int is_sdo_slow;    /* an SDO stays open */
+	int is_cancel_slow; /* also after it was cancelled */
+	int cancels;
+	struct admin_pending *pending; /* of the last SDO */
 	struct event event[FAKE_EVENTS];
 	unsigned events;
 };
