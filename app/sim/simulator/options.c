@@ -68,7 +68,10 @@ void sim_options_read(int argc, char **argv, struct sim_options *opt)
 		  "where the master is: a veth, a tap, a real NIC" },
 		{ "slaves", 0, args_text, &opt->slaves, "WHAT",
 		  "1 to 64: number of FB1111+Piccolo slaves (default 2); or names, in the order of "
-		  "the line: ek1100,el2828,el3104. See --list-slaves. wago_750_354+430+530 has "
+		  "the line: ek1100,el2828,el3104, or a tree: "
+		  "ek1100(el2828,el3104),ek1100(el2004), "
+		  "where parentheses hold what hangs on port 1, (2:...) on port 2, of the slave "
+		  "before them. See --list-slaves. wago_750_354+430+530 has "
 		  "these modules (default 457, 557, 430, 530); plant[:TAU_MS[:GAIN]] is a "
 		  "first-order lag (default plant:50:1)" },
 		{ "sii", 0, args_text, &opt->sii_dir, "DIR",

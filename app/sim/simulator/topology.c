@@ -14,9 +14,12 @@
 #include "devices/plant.h"
 #include "devices/wago_750_354.h"
 #include "devices/wago_node.h"
+#include "segment/slave_list.h"
 #include "wire/sii.h"
 
-enum { NAME_BYTES = 96, PATH_BYTES = 1024, LINE_BYTES = PATH_BYTES + 200 };
+/* Two bits of register 0x0007 a port: 0 and 1 none, 2 E-bus, 3 MII. */
+enum { PORT_KIND_EBUS = 2 };
+enum { PATH_BYTES = 1024, LINE_BYTES = PATH_BYTES + 200 };
 
 #define PPM_LIMIT 1000.0
 
@@ -24,25 +27,22 @@ struct topology {
 	const struct sim_options *opt;
 	struct prng prng;
 	int count;
-	char name[LIMIT_SLAVES][NAME_BYTES];
+	struct slave_list_entry entry[LIMIT_SLAVES];
 	struct segment_slave_spec spec[LIMIT_SLAVES];
 	uint8_t sii[LIMIT_SLAVES][SEGMENT_SII_BYTES];
 };
 
-static int take_names(struct topology *l)
+static int take_list(struct topology *l)
 {
-	const char *text = l->opt->slaves;
+	char why[128];
+	char line[LINE_BYTES];
+	int count = slave_list_parse(l->opt->slaves, l->entry, LIMIT_SLAVES, why, sizeof(why));
 
-	while (*text != '\0') {
-		size_t len = strcspn(text, ",");
-
-		if (l->count == LIMIT_SLAVES || len == 0 || len >= NAME_BYTES ||
-		    memchr(text, '/', len) != NULL) {
-			return sim_error("--slaves: expected NAME,NAME,..., at most 64");
-		}
-		snprintf(l->name[l->count++], NAME_BYTES, "%.*s", (int)len, text);
-		text += len + (text[len] == ',');
+	if (count < 0) {
+		snprintf(line, sizeof(line), "--slaves: %s", why);
+		return sim_error(line);
 	}
+	l->count = count;
 	return 0;
 }
 
@@ -52,13 +52,15 @@ static int take_slaves(struct topology *l)
 	long count = strtol(l->opt->slaves, &end, 10);
 
 	if (*end != '\0' || end == l->opt->slaves) {
-		return take_names(l);
+		return take_list(l);
 	}
 	if (count < 1 || count > LIMIT_SLAVES) {
 		return sim_error("--slaves: expected a number from 1 to 64");
 	}
 	for (; l->count < (int)count; l->count++) {
-		snprintf(l->name[l->count], NAME_BYTES, "fb1111_piccolo");
+		l->entry[l->count] = (struct slave_list_entry){ .name = "fb1111_piccolo",
+								.parent = l->count - 1,
+								.parent_port = 1 };
 	}
 	return 0;
 }
@@ -117,7 +119,7 @@ static int read_image(struct topology *l, int i, size_t *ret_bytes)
 	if (l->opt->sii_dir == NULL) {
 		return 0;
 	}
-	if (snprintf(path, sizeof(path), "%s/%s.bin", l->opt->sii_dir, l->name[i]) >=
+	if (snprintf(path, sizeof(path), "%s/%s.bin", l->opt->sii_dir, l->entry[i].name) >=
 	    (int)sizeof(path)) {
 		return sim_error("--sii: path too long");
 	}
@@ -134,12 +136,12 @@ static int read_image(struct topology *l, int i, size_t *ret_bytes)
 
 static int unknown_slave(const struct topology *l, int i)
 {
-	char near[NAME_BYTES];
+	char near[SLAVE_LIST_NAME_BYTES];
 	char line[LINE_BYTES];
 
-	catalogue_near(l->name[i], near, sizeof(near));
-	snprintf(line, sizeof(line), "slave '%s': not in the catalogue%s%s%s%s: %s", l->name[i],
-		 l->opt->sii_dir != NULL ? " nor in " : "",
+	catalogue_near(l->entry[i].name, near, sizeof(near));
+	snprintf(line, sizeof(line), "slave '%s': not in the catalogue%s%s%s%s: %s",
+		 l->entry[i].name, l->opt->sii_dir != NULL ? " nor in " : "",
 		 l->opt->sii_dir != NULL ? l->opt->sii_dir : "",
 		 near[0] != '\0' ? ": did you mean " : "", near,
 		 near[0] != '\0' ? "see --list-slaves"
@@ -150,13 +152,13 @@ static int unknown_slave(const struct topology *l, int i)
 static int make_wago(struct topology *l, int i)
 {
 	char line[LINE_BYTES];
-	int r = wago_750_354_by_name(i, l->name[i], &l->spec[i]);
+	int r = wago_750_354_by_name(i, l->entry[i].name, &l->spec[i]);
 
 	if (r == -EINVAL || r == -E2BIG) {
 		snprintf(line, sizeof(line),
 			 "slave '%s': expected wago_750_354[+MODULE...], MODULE 430, 457, 530 "
 			 "or 557, at most %d",
-			 l->name[i], WAGO_MODULES_MAX);
+			 l->entry[i].name, WAGO_MODULES_MAX);
 		return sim_error(line);
 	}
 	return r < 0 ? sim_error("no memory") : 0;
@@ -165,13 +167,13 @@ static int make_wago(struct topology *l, int i)
 static int make_plant(struct topology *l, int i)
 {
 	char line[LINE_BYTES];
-	int r = plant_by_name(i, l->name[i], &l->spec[i]);
+	int r = plant_by_name(i, l->entry[i].name, &l->spec[i]);
 
 	if (r == -EINVAL) {
 		snprintf(line, sizeof(line),
 			 "slave '%s': expected plant[:TAU_MS[:GAIN]], each above 0 and up to "
 			 "1000000",
-			 l->name[i]);
+			 l->entry[i].name);
 		return sim_error(line);
 	}
 	return r < 0 ? sim_error("no memory") : 0;
@@ -183,14 +185,14 @@ static int make_slave(struct topology *l, int i)
 	size_t bytes = 0;
 	int r;
 
-	if (wago_750_354_is_name(l->name[i])) {
+	if (wago_750_354_is_name(l->entry[i].name)) {
 		return make_wago(l, i);
 	}
-	if (plant_is_name(l->name[i])) {
+	if (plant_is_name(l->entry[i].name)) {
 		return make_plant(l, i);
 	}
 
-	if (strcmp(l->name[i], "fb1111_piccolo") == 0) {
+	if (strcmp(l->entry[i].name, "fb1111_piccolo") == 0) {
 		r = fb1111_piccolo_slave(i, &l->spec[i]);
 		return r < 0 ? sim_error("no memory") : 0;
 	}
@@ -200,12 +202,36 @@ static int make_slave(struct topology *l, int i)
 	}
 	if (r > 0) {
 		r = catalogue_sii_slave(l->sii[i], bytes, i, &l->spec[i]);
-	} else if (catalogue_find(l->name[i], &model) == 0) {
+	} else if (catalogue_find(l->entry[i].name, &model) == 0) {
 		r = catalogue_slave(&model, i, &l->spec[i]);
 	} else {
 		return unknown_slave(l, i);
 	}
 	return r < 0 ? sim_error("no memory") : 0;
+}
+
+/* --- cables --- */
+
+/* A chip without a third port cannot have a branch there. */
+static int connect_slave(struct topology *l, int i)
+{
+	const struct slave_list_entry *entry = &l->entry[i];
+	struct segment_slave_spec *spec = &l->spec[i];
+	char line[LINE_BYTES];
+	unsigned kind;
+
+	spec->parent = entry->parent;
+	spec->parent_port = entry->parent_port;
+	if (entry->parent < 0) {
+		return 0;
+	}
+	kind = l->spec[entry->parent].features->port_descriptor >> 2 * entry->parent_port & 3u;
+	if (kind < PORT_KIND_EBUS) {
+		snprintf(line, sizeof(line), "--slaves: %s: port %u of %s is not there",
+			 entry->name, entry->parent_port, l->entry[entry->parent].name);
+		return sim_error(line);
+	}
+	return 0;
 }
 
 /* --- crystals --- */
@@ -251,7 +277,7 @@ static int make(struct topology *l, int64_t t_ns, struct segment **ret_segment)
 		return -1;
 	}
 	for (int i = 0; i < l->count; i++) {
-		if (make_slave(l, i) < 0) {
+		if (make_slave(l, i) < 0 || connect_slave(l, i) < 0) {
 			return -1;
 		}
 	}
