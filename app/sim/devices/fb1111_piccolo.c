@@ -4,6 +4,7 @@
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "devices/pdi_spi.h"
 #include "firmware/fb1111_piccolo/host/sii.h"
@@ -29,6 +30,11 @@ struct board {
 	uint8_t is_adc_overrun;
 	uint8_t is_edge_pending;
 	uint8_t is_led_on;
+	/* The flash keeps what it has without power. */
+	uint8_t *slot[2]; /* PICCOLO_FLASH_OCTETS; NULL: never written */
+	uint8_t running;  /* slot of the running image */
+	uint8_t is_restart;
+	int64_t erased_ns; /* end of the last erase */
 };
 
 static struct board *board_of(struct sim_device *dev)
@@ -93,6 +99,61 @@ static int hal_adc_overrun(void *ctx)
 	return was;
 }
 
+/* --- the HAL's flash --- */
+
+static void hal_flash_erase(void *ctx)
+{
+	struct board *b = ctx;
+	uint8_t **slot = &b->slot[!b->running];
+
+	if (*slot == NULL) {
+		*slot = malloc(PICCOLO_FLASH_OCTETS);
+	}
+	if (*slot != NULL) {
+		memset(*slot, 0xff, PICCOLO_FLASH_OCTETS);
+	}
+	b->erased_ns = b->spi.now_ns + FB1111_PICCOLO_ERASE_NS;
+}
+
+static int hal_flash_is_busy(void *ctx)
+{
+	const struct board *b = ctx;
+
+	return b->spi.now_ns < b->erased_ns;
+}
+
+static int hal_flash_write(void *ctx, uint32_t offset, const octet_t *data, uint16_t len)
+{
+	struct board *b = ctx;
+	uint8_t *slot = b->slot[!b->running];
+
+	if (slot == NULL || offset > PICCOLO_FLASH_OCTETS || len > PICCOLO_FLASH_OCTETS - offset) {
+		return 1;
+	}
+	memcpy(slot + offset, data, len);
+	return 0;
+}
+
+/* The image in slot 0 was programmed through JTAG: without a header. */
+static int hal_flash_running(void *ctx, octet_t *ret_header)
+{
+	const struct board *b = ctx;
+
+	if (b->slot[b->running] == NULL) {
+		return 0;
+	}
+	memcpy(ret_header, b->slot[b->running], PICCOLO_IMAGE_HEADER_OCTETS);
+	return 1;
+}
+
+static void hal_flash_start(void *ctx)
+{
+	struct board *b = ctx;
+
+	b->running = !b->running;
+	b->is_restart = 1;
+}
+
 static void hal_led(void *ctx, int on)
 {
 	((struct board *)ctx)->is_led_on = on != 0;
@@ -123,6 +184,11 @@ static void start_firmware(struct board *b)
 		.adc_start = hal_adc_start,
 		.adc_read = hal_adc_read,
 		.adc_overrun = hal_adc_overrun,
+		.flash_erase = hal_flash_erase,
+		.flash_is_busy = hal_flash_is_busy,
+		.flash_write = hal_flash_write,
+		.flash_running = hal_flash_running,
+		.flash_start = hal_flash_start,
 		.led = hal_led,
 		.time_us = hal_time_us,
 		.interrupts_off = hal_interrupts,
@@ -142,6 +208,8 @@ static void power_on(struct sim_device *dev, int64_t t_ns)
 	b->edge_ns = b->copy_ns = 0;
 	b->adc = 0;
 	b->is_adc_on = b->is_adc_unread = b->is_adc_overrun = b->is_edge_pending = 0;
+	b->is_restart = 0;
+	b->erased_ns = 0;
 	pdi_spi_init(&b->spi, dev->esc, t_ns);
 	start_firmware(b);
 }
@@ -169,6 +237,12 @@ static void run_step(struct board *b, int64_t t_ns)
 	wait_ns = (int64_t)piccolo_step(&b->firmware) * 1000;
 	b->busy_until_ns = b->spi.now_ns;
 	b->step_ns = b->busy_until_ns + later(wait_ns, FB1111_PICCOLO_LOOP_NS);
+	if (b->is_restart) {
+		b->is_restart = 0;
+		b->is_adc_on = 0;
+		b->step_ns = b->busy_until_ns + FB1111_PICCOLO_RESTART_NS;
+		start_firmware(b);
+	}
 }
 
 static int64_t next_wake_ns(const struct sim_device *dev)
@@ -215,6 +289,8 @@ static void sync0(struct sim_device *dev, int64_t t_ns, uint64_t system_time_ns)
 
 static void destroy(struct sim_device *dev)
 {
+	free(board_of(dev)->slot[0]);
+	free(board_of(dev)->slot[1]);
 	free(dev);
 }
 

@@ -13,9 +13,11 @@
 #include "segment/segment.h"
 
 enum {
-	FB1111_PICCOLO_INTERRUPT_NS = 500,  /* SYNC0 edge to the first SPI octet, at 90 MHz */
-	FB1111_PICCOLO_CONVERSION_NS = 650, /* SYNC0 edge to the end of the conversion */
-	FB1111_PICCOLO_LOOP_NS = 2000,      /* one idle pass of the main loop */
+	FB1111_PICCOLO_INTERRUPT_NS = 500,    /* SYNC0 edge to the first SPI octet, at 90 MHz */
+	FB1111_PICCOLO_CONVERSION_NS = 650,   /* SYNC0 edge to the end of the conversion */
+	FB1111_PICCOLO_LOOP_NS = 2000,        /* one idle pass of the main loop */
+	FB1111_PICCOLO_ERASE_NS = 300000000,  /* a slot of the flash */
+	FB1111_PICCOLO_RESTART_NS = 20000000, /* reset to the first pass of the main loop */
 };
 
 /**

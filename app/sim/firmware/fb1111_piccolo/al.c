@@ -2,6 +2,7 @@
 #include "al.h"
 
 #include "esc_register.h"
+#include "foe.h"
 #include "mailbox.h"
 #include "objects.h"
 #include "pdo.h"
@@ -34,13 +35,14 @@ static int sm_fits(struct piccolo *p, enum piccolo_sm_index index, octet_t *ret_
 	       (sm[SM_OFFSET_ACTIVATE] & SM_ACTIVATE_ENABLE) != 0;
 }
 
-static enum piccolo_al_code check_mailbox(struct piccolo *p)
+/* The mailboxes of BOOT are the same; only the code differs. */
+static enum piccolo_al_code check_mailbox(struct piccolo *p, enum piccolo_al_code code)
 {
 	octet_t control;
 
 	if (!sm_fits(p, PICCOLO_SM_MAILBOX_OUT, &control) ||
 	    !sm_fits(p, PICCOLO_SM_MAILBOX_IN, &control)) {
-		return AL_INVALID_MAILBOX_CONFIG;
+		return code;
 	}
 	return AL_OK;
 }
@@ -103,12 +105,15 @@ static enum piccolo_al_code enter_preop(struct piccolo *p)
 {
 	enum piccolo_al_code code;
 
+	if (p->al.state == PICCOLO_BOOT) {
+		return AL_INVALID_STATE_CHANGE;
+	}
 	if (p->al.state != PICCOLO_INIT) {
 		leave_to(p, PICCOLO_PREOP);
 		piccolo_pdo_reset(p);
 		return AL_OK;
 	}
-	code = check_mailbox(p);
+	code = check_mailbox(p, AL_INVALID_MAILBOX_CONFIG);
 	if (code == AL_OK) {
 		piccolo_mailbox_reset(p);
 		piccolo_settings_reset(p);
@@ -117,11 +122,30 @@ static enum piccolo_al_code enter_preop(struct piccolo *p)
 	return code;
 }
 
+/* BOOT is entered from INIT and left to INIT only. */
+static enum piccolo_al_code enter_boot(struct piccolo *p)
+{
+	enum piccolo_al_code code;
+
+	if (p->al.state == PICCOLO_BOOT) {
+		return AL_OK;
+	}
+	if (p->al.state != PICCOLO_INIT) {
+		return AL_INVALID_STATE_CHANGE;
+	}
+	code = check_mailbox(p, AL_INVALID_MAILBOX_CONFIG_BOOT);
+	if (code == AL_OK) {
+		piccolo_mailbox_reset(p);
+		piccolo_foe_reset(p);
+	}
+	return code;
+}
+
 static enum piccolo_al_code enter_safeop(struct piccolo *p)
 {
 	enum piccolo_al_code code;
 
-	if (p->al.state == PICCOLO_INIT) {
+	if (p->al.state == PICCOLO_INIT || p->al.state == PICCOLO_BOOT) {
 		return AL_INVALID_STATE_CHANGE;
 	}
 	if (p->al.state != PICCOLO_PREOP) {
@@ -170,7 +194,8 @@ static enum piccolo_al_code change(struct piccolo *p, unsigned wanted)
 		code = enter_op(p);
 		break;
 	case PICCOLO_BOOT:
-		return AL_BOOT_NOT_SUPPORTED;
+		code = enter_boot(p);
+		break;
 	default: /* four bits of the wire, not an enum */
 		return AL_UNKNOWN_STATE;
 	}
@@ -195,6 +220,10 @@ static void handle(struct piccolo *p, uint16_t control)
 	p->al.has_error = OCTET(code != AL_OK);
 	p->al.code = (uint16_t)code;
 	show(p);
+	if (p->al.state == PICCOLO_INIT && piccolo_foe_has_image(p)) {
+		piccolo_foe_reset(p);
+		p->hal.flash_start(p->hal.ctx);
+	}
 }
 
 /* OP is shown when outputs and, in periodic mode, an edge of SYNC0 have come. */
@@ -232,12 +261,13 @@ static void check_sm_change(struct piccolo *p)
 		return;
 	}
 	piccolo_mailbox_sm1_activated(p, activate[PICCOLO_SM_MAILBOX_IN]);
-	code = check_mailbox(p);
+	code = check_mailbox(p, p->al.state == PICCOLO_BOOT ? AL_INVALID_MAILBOX_CONFIG_BOOT
+							    : AL_INVALID_MAILBOX_CONFIG);
 	if (code != AL_OK) {
 		piccolo_al_fail(p, PICCOLO_INIT, code);
 		return;
 	}
-	if (p->al.state == PICCOLO_PREOP) {
+	if (p->al.state == PICCOLO_PREOP || p->al.state == PICCOLO_BOOT) {
 		return;
 	}
 	code = check_process_data(p);

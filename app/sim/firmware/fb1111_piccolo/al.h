@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The application layer state machine (ETG.1000.6, ETG.1020). INIT, PREOP, SAFEOP and OP; BOOT is
- * refused. Requests come by AL event (seen at most PICCOLO_EVENT_POLL_US late) and, should an event
+ * The application layer state machine (ETG.1000.6, ETG.1020). INIT, PREOP, BOOT, SAFEOP and OP.
+ * Requests come by AL event (seen at most PICCOLO_EVENT_POLL_US late) and, should an event
  * be lost, by reading AL control every PICCOLO_AL_POLL_US.
  */
 #ifndef FB1111_PICCOLO_AL_H

@@ -14,6 +14,9 @@
 #define PICCOLO_SERIAL UINT32_C(0)
 #define PICCOLO_DEVICE_TYPE UINT32_C(0x00001389) /* ETG.5001: 0x6000 inputs, 0x7000 outputs */
 
+/* A slot of the flash, header included: sectors B to E of the F28069. */
+#define PICCOLO_FLASH_OCTETS UINT32_C(131072)
+
 #define PICCOLO_MIN_CYCLE_NS UINT32_C(100000)
 #define PICCOLO_MAX_CYCLE_NS UINT32_C(1000000000)
 /* SYNC0 edge to inputs in SM3: 28 SPI octets of 799.7 ns and the interrupt's entry. */
@@ -24,6 +27,8 @@ enum piccolo_size {
 	PICCOLO_OUTPUT_OCTETS = 9,
 	PICCOLO_INPUT_OCTETS = 13,
 	PICCOLO_EEPROM_OCTETS = 2048,
+	PICCOLO_VERSION_OCTETS = 16,
+	PICCOLO_IMAGE_HEADER_OCTETS = 32,
 	PICCOLO_CONFIG_OCTETS = 14, /* EEPROM words 0 to 6; word 7 is their checksum */
 	PICCOLO_SM_COUNT = 4,
 	PICCOLO_FMMU_COUNT = 3,

@@ -28,6 +28,19 @@ struct piccolo_hal {
 	/** Nonzero if a conversion ended before the last one was read (ADCINTOVF); clears it. */
 	int (*adc_overrun)(void *ctx);
 
+	/*
+	 * The flash has two slots; the boot loader starts the one that was activated last. Erase
+	 * the other one: it begins at once, and flash_is_busy() is nonzero until it is done.
+	 */
+	void (*flash_erase)(void *ctx);
+	int (*flash_is_busy)(void *ctx);
+	/** Write @len octets at @offset of the erased slot. 0, or nonzero if the flash refused. */
+	int (*flash_write)(void *ctx, uint32_t offset, const octet_t *data, uint16_t len);
+	/** Header (IMAGE_HEADER octets) of the running image. 0: it was programmed without one. */
+	int (*flash_running)(void *ctx, octet_t *ret_header);
+	/** Activate the written slot and reset the CPU; may return. */
+	void (*flash_start)(void *ctx);
+
 	void (*led)(void *ctx, int on);
 	/** Free-running microseconds, wraps at 2^32; only differences are used. */
 	uint32_t (*time_us)(void *ctx);

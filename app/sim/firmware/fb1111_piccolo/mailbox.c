@@ -3,6 +3,7 @@
 
 #include "coe.h"
 #include "esc_register.h"
+#include "foe.h"
 #include "spi.h"
 
 enum { COUNTER_MASK = 7, COUNTER_SHIFT = 4, ERROR_REPLY_TYPE = 1, ERROR_REPLY_LENGTH = 4 };
@@ -76,16 +77,19 @@ static void execute(struct piccolo *p)
 
 	if (octets_get16(m->rx) > MAILBOX_DATA_MAX) {
 		error = MAILBOX_INVALID_SIZE;
-	} else if (type != MAILBOX_TYPE_COE) {
-		error = MAILBOX_UNSUPPORTED_PROTOCOL;
-	} else {
+	} else if (type == MAILBOX_TYPE_COE && p->al.state != PICCOLO_BOOT) {
 		error = piccolo_coe(p, m->rx + MAILBOX_HEADER, octets_get16(m->rx),
 				    m->tx + MAILBOX_HEADER, &answer_len);
+	} else if (type == MAILBOX_TYPE_FOE) {
+		error = piccolo_foe(p, m->rx + MAILBOX_HEADER, octets_get16(m->rx),
+				    m->tx + MAILBOX_HEADER, &answer_len);
+	} else {
+		error = MAILBOX_UNSUPPORTED_PROTOCOL;
 	}
 	if (error != MAILBOX_OK) {
 		answer_error(m, error);
 	} else if (answer_len > 0) {
-		finish_answer(m, MAILBOX_TYPE_COE, answer_len);
+		finish_answer(m, type, answer_len);
 	} else {
 		m->tx_len = 0; /* an abort of the master: nothing to say, nothing to repeat */
 		m->phase = MAILBOX_IDLE;

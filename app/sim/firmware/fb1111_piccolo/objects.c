@@ -136,13 +136,12 @@ static uint32_t mapped(const struct piccolo_pdo *pdo, uint32_t i)
 	return (uint32_t)e->index << 16 | (uint32_t)e->subindex << 8 | e->bits;
 }
 
-static const char *text_of(enum piccolo_value value)
+static const char *text_of(const struct piccolo *p, enum piccolo_value value)
 {
 	if (value == VALUE_NAME) {
 		return piccolo_description.name;
 	}
-	return value == VALUE_HARDWARE ? piccolo_description.hardware_version
-				       : piccolo_description.software_version;
+	return value == VALUE_HARDWARE ? piccolo_description.hardware_version : p->version;
 }
 
 /* Inputs belong to the ISR; they are copied with interrupts off. */
@@ -217,7 +216,7 @@ uint16_t piccolo_object_read(struct piccolo *p, const struct piccolo_object *obj
 	uint16_t i;
 
 	if (object->type == PICCOLO_STRING) {
-		const char *text = text_of(object->value);
+		const char *text = text_of(p, object->value);
 
 		len = (uint16_t)strlen(text);
 		for (i = 0; i < len && i < OBJECT_OCTETS_MAX; i++) {

@@ -5,6 +5,7 @@
 
 #include "al.h"
 #include "esc_register.h"
+#include "foe.h"
 #include "mailbox.h"
 #include "objects.h"
 #include "pdo.h"
@@ -12,6 +13,24 @@
 #include "sync0.h"
 
 enum { START_RETRY_US = 1000 };
+
+/* What 0x100A says: the version in the running image's header, or the one it was built with. */
+static void read_version(struct piccolo *p)
+{
+	const char *built = piccolo_description.software_version;
+	octet_t header[IMAGE_HEADER];
+	unsigned i;
+
+	if (!p->hal.flash_running(p->hal.ctx, header)) {
+		for (i = 0; i < PICCOLO_VERSION_OCTETS && built[i] != '\0'; i++) {
+			p->version[i] = built[i];
+		}
+		return;
+	}
+	for (i = 0; i < PICCOLO_VERSION_OCTETS; i++) {
+		p->version[i] = (char)header[IMAGE_VERSION + i];
+	}
+}
 
 static void reset(struct piccolo *p)
 {
@@ -22,6 +41,7 @@ static void reset(struct piccolo *p)
 	p->hal = hal;
 	p->al.state = PICCOLO_INIT;
 	piccolo_settings_reset(p);
+	read_version(p);
 	hal.led(hal.ctx, 0);
 	hal.interrupts_on(hal.ctx);
 }

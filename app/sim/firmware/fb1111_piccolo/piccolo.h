@@ -27,7 +27,7 @@ enum piccolo_al_code {
 	AL_OK = 0x0000,
 	AL_INVALID_STATE_CHANGE = 0x0011,
 	AL_UNKNOWN_STATE = 0x0012,
-	AL_BOOT_NOT_SUPPORTED = 0x0013,
+	AL_INVALID_MAILBOX_CONFIG_BOOT = 0x0015,
 	AL_INVALID_MAILBOX_CONFIG = 0x0016,
 	AL_SM_WATCHDOG = 0x001b,
 	AL_INVALID_OUTPUT_CONFIG = 0x001d,
@@ -116,6 +116,16 @@ struct piccolo_mailbox {
 	uint32_t blocked_us;
 };
 
+/* A firmware image on its way into the flash. */
+struct piccolo_update {
+	octet_t is_open;
+	octet_t is_complete; /* whole and checked; started on leaving BOOT */
+	uint32_t packet;     /* the last one taken */
+	uint32_t received;   /* octets */
+	uint32_t crc;        /* of those behind the header */
+	octet_t header[PICCOLO_IMAGE_HEADER_OCTETS];
+};
+
 struct piccolo {
 	struct piccolo_hal hal;
 	int is_started; /* EEPROM_LOADED seen and the ET1100 answers */
@@ -136,6 +146,8 @@ struct piccolo {
 	struct piccolo_outputs outputs;
 	struct piccolo_sync0 sync0;
 	struct piccolo_mailbox mailbox;
+	struct piccolo_update update;
+	char version[PICCOLO_VERSION_OCTETS + 1]; /* 0x100A */
 };
 
 /** Power-on: all state as after a reset. Touches the LED, never the SPI bus. */

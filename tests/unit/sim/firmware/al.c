@@ -73,19 +73,34 @@ TEST(firmware, states_cannot_be_skipped)
 	expect(&b, AL_OP, ERROR_PREOP, AL_CODE_INVALID_STATE_CHANGE);
 }
 
-TEST(firmware, boot_and_unknown_states_are_refused_and_the_state_stays)
+TEST(firmware, unknown_states_and_boot_out_of_preop_are_refused_and_the_state_stays)
 {
 	static const uint16_t unknown[] = { 0, 5, 6, 7, 9, 15 };
 	struct board b;
 
-	board_init(&b);
-	board_start(&b);
-	expect(&b, AL_BOOT, ERROR_INIT, AL_CODE_BOOT_NOT_SUPPORTED);
 	board_lead_to(&b, PICCOLO_PREOP);
-	expect(&b, AL_BOOT, ERROR_PREOP, AL_CODE_BOOT_NOT_SUPPORTED);
+	expect(&b, AL_BOOT, ERROR_PREOP, AL_CODE_INVALID_STATE_CHANGE);
 	for (size_t i = 0; i < sizeof(unknown) / sizeof(unknown[0]); i++) {
 		expect(&b, (uint16_t)(unknown[i] | AL_ERROR), ERROR_PREOP, AL_CODE_UNKNOWN_STATE);
 	}
+}
+
+TEST(firmware, boot_needs_mailboxes_and_is_left_to_init_only)
+{
+	struct board b;
+
+	board_init(&b);
+	board_start(&b);
+	expect(&b, AL_BOOT, ERROR_INIT, AL_CODE_INVALID_MAILBOX_CONFIG_BOOT);
+	board_master_mailbox_sms(&b);
+	expect(&b, AL_BOOT | AL_ERROR, AL_BOOT, 0);
+	expect(&b, AL_BOOT, AL_BOOT, 0);
+	expect(&b, AL_PREOP, AL_BOOT | AL_ERROR, AL_CODE_INVALID_STATE_CHANGE);
+	expect(&b, AL_SAFEOP | AL_ERROR, AL_BOOT | AL_ERROR, AL_CODE_INVALID_STATE_CHANGE);
+	expect(&b, AL_OP | AL_ERROR, AL_BOOT | AL_ERROR, AL_CODE_INVALID_STATE_CHANGE);
+	expect(&b, AL_INIT | AL_ERROR, AL_INIT, 0);
+	expect(&b, AL_PREOP, AL_PREOP, 0);
+	CHECK_EQ(board_breaches(&b), 0);
 }
 
 TEST(firmware, no_request_counts_until_the_error_is_acknowledged)
@@ -226,7 +241,7 @@ TEST(firmware, a_refused_request_ends_the_wait_for_op)
 
 	board_lead_to(&b, PICCOLO_SAFEOP);
 	expect(&b, AL_OP, AL_SAFEOP, 0);
-	expect(&b, AL_BOOT, ERROR_SAFEOP, AL_CODE_BOOT_NOT_SUPPORTED);
+	expect(&b, AL_BOOT, ERROR_SAFEOP, AL_CODE_INVALID_STATE_CHANGE);
 	board_sync0(&b, 1000000);
 	board_master_outputs(&b, 0, 0);
 	board_run(&b, 3000);

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/bytes.h"
+#include "harness/test.h"
 #include "wire/esc_reg.h"
 
 enum {
@@ -164,6 +165,50 @@ static void interrupts_off(void *ctx)
 	b->octets_masked = 0;
 }
 
+static void flash_erase(void *ctx)
+{
+	struct board *b = ctx;
+
+	memset(b->flash, 0xff, sizeof(b->flash));
+	b->erasures++;
+}
+
+static int flash_is_busy(void *ctx)
+{
+	struct board *b = ctx;
+
+	return b->busy > 0 ? (int)b->busy-- : 0;
+}
+
+static int flash_write(void *ctx, uint32_t offset, const octet_t *data, uint16_t len)
+{
+	struct board *b = ctx;
+
+	CHECK(offset <= PICCOLO_FLASH_OCTETS && len <= PICCOLO_FLASH_OCTETS - offset);
+	memcpy(b->flash + offset, data, len);
+	return b->is_flash_broken;
+}
+
+static int flash_running(void *ctx, octet_t *ret_header)
+{
+	struct board *b = ctx;
+
+	if (b->is_image_running) {
+		memcpy(ret_header, b->flash, PICCOLO_IMAGE_HEADER_OCTETS);
+	}
+	return b->is_image_running;
+}
+
+/* The CPU is reset: what the program knew is gone. */
+static void flash_start(void *ctx)
+{
+	struct board *b = ctx;
+	struct piccolo_hal hal = b->fw.hal;
+
+	b->is_image_running = 1;
+	piccolo_init(&b->fw, &hal);
+}
+
 static void run_isr(struct board *b)
 {
 	b->is_edge_pending = 0;
@@ -195,6 +240,11 @@ void board_init(struct board *b)
 		.adc_start = adc_start,
 		.adc_read = adc_read,
 		.adc_overrun = adc_overrun,
+		.flash_erase = flash_erase,
+		.flash_is_busy = flash_is_busy,
+		.flash_write = flash_write,
+		.flash_running = flash_running,
+		.flash_start = flash_start,
 		.led = led,
 		.time_us = time_us,
 		.interrupts_off = interrupts_off,

@@ -51,6 +51,13 @@ struct board {
 	int adc_started;
 	int led;
 
+	/* the update slot */
+	uint8_t flash[PICCOLO_FLASH_OCTETS];
+	unsigned erasures;
+	unsigned busy; /* so many times more is the flash busy */
+	int is_flash_broken;
+	int is_image_running; /* the slot's image was started */
+
 	/* what the firmware wrote */
 	unsigned input_writes;
 	unsigned activation_writes;

@@ -149,7 +149,7 @@ TEST(firmware, what_is_not_an_sdo_gets_a_mailbox_error)
 	uint8_t data[128] = { 0 };
 
 	expect_error(2, data, 20, 2); /* EoE */
-	expect_error(4, data, 20, 2); /* FoE */
+	expect_error(5, data, 20, 2); /* SoE */
 	expect_error(0, data, 4, 2);
 	data[1] = 0x80;
 	expect_error(COE, data, 10, 4); /* SDO information */

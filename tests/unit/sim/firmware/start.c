@@ -102,7 +102,7 @@ TEST(firmware, registers_are_those_of_the_wire_module)
 
 	CHECK_EQ(AL_INVALID_STATE_CHANGE, AL_CODE_INVALID_STATE_CHANGE);
 	CHECK_EQ(AL_UNKNOWN_STATE, AL_CODE_UNKNOWN_STATE);
-	CHECK_EQ(AL_BOOT_NOT_SUPPORTED, AL_CODE_BOOT_NOT_SUPPORTED);
+	CHECK_EQ(AL_INVALID_MAILBOX_CONFIG_BOOT, AL_CODE_INVALID_MAILBOX_CONFIG_BOOT);
 	CHECK_EQ(AL_INVALID_MAILBOX_CONFIG, AL_CODE_INVALID_MAILBOX_CONFIG);
 	CHECK_EQ(AL_SM_WATCHDOG, AL_CODE_SM_WATCHDOG);
 	CHECK_EQ(AL_INVALID_OUTPUT_CONFIG, AL_CODE_INVALID_OUTPUT_CONFIG);
@@ -198,7 +198,11 @@ TEST(firmware, sii_is_what_the_master_reads_out_of_it)
 	CHECK_EQ(sii.size_bytes, sizeof(image));
 	CHECK_EQ(sii.mailbox_out_start, d->sm[PICCOLO_SM_MAILBOX_OUT].start);
 	CHECK_EQ(sii.mailbox_in_len, d->sm[PICCOLO_SM_MAILBOX_IN].length);
-	CHECK_EQ(sii.mailbox_protocols, SII_MAILBOX_COE);
+	CHECK_EQ(sii.mailbox_protocols, SII_MAILBOX_COE | SII_MAILBOX_FOE);
+	CHECK_EQ(sii.boot_out_start, 0x1000);
+	CHECK_EQ(sii.boot_out_len, 128);
+	CHECK_EQ(sii.boot_in_start, 0x1080);
+	CHECK_EQ(sii.boot_in_len, 128);
 	CHECK_EQ(sii.sm_count, PICCOLO_SM_COUNT);
 	CHECK_EQ(sii.sm[PICCOLO_SM_OUTPUTS].control, 0x64);
 	CHECK_EQ(sii.dc_assign_activate, 0x0300);

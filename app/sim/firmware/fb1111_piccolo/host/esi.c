@@ -129,6 +129,11 @@ static void put_dc(FILE *out)
 	fputs("        </Dc>\n", out);
 }
 
+static void put_le16(FILE *out, uint16_t value)
+{
+	fprintf(out, "%02X%02X", value & 0xffu, value >> 8u);
+}
+
 static void put_eeprom(FILE *out)
 {
 	fputs("        <Eeprom>\n", out);
@@ -137,7 +142,12 @@ static void put_eeprom(FILE *out)
 	for (unsigned i = 0; i < PICCOLO_CONFIG_OCTETS; i++) {
 		fprintf(out, "%02X", (unsigned)piccolo_description.config[i]);
 	}
-	fputs("</ConfigData>\n        </Eeprom>\n", out);
+	fputs("</ConfigData>\n          <BootStrap>", out);
+	for (unsigned i = 0; i < 2; i++) {
+		put_le16(out, piccolo_description.sm[i].start);
+		put_le16(out, piccolo_description.sm[i].length);
+	}
+	fputs("</BootStrap>\n        </Eeprom>\n", out);
 }
 
 static void put_device(FILE *out)
@@ -160,6 +170,7 @@ static void put_device(FILE *out)
 	fputs("        <Mailbox DataLinkLayer=\"1\">\n"
 	      "          <CoE SdoInfo=\"0\" PdoAssign=\"0\" PdoConfig=\"0\" "
 	      "CompleteAccess=\"0\"/>\n"
+	      "          <FoE/>\n"
 	      "        </Mailbox>\n",
 	      out);
 	put_dc(out);

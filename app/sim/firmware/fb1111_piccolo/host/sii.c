@@ -12,7 +12,9 @@ enum sii_offset {
 	SII_PRODUCT = 0x14,
 	SII_REVISION = 0x18,
 	SII_SERIAL = 0x1c,
-	SII_MAILBOX_RECEIVE = 0x30, /* offset 2, size 2 */
+	SII_BOOT_RECEIVE = 0x28, /* offset 2, size 2 */
+	SII_BOOT_SEND = 0x2c,
+	SII_MAILBOX_RECEIVE = 0x30,
 	SII_MAILBOX_SEND = 0x34,
 	SII_MAILBOX_PROTOCOLS = 0x38,
 	SII_SIZE = 0x7c, /* Kibit - 1 */
@@ -32,6 +34,8 @@ enum sii_category {
 
 enum {
 	PROTOCOL_COE = 0x0004,
+	PROTOCOL_FOE = 0x0008,
+	HAS_FOE = 1,
 	COE_SDO = 0x01, /* and neither information service nor complete access */
 	PORTS_MII_MII = 0x0011,
 	PDO_FIXED_MANDATORY = 0x0011,
@@ -156,7 +160,8 @@ static void put_general(struct image *im)
 	put8(im, string_index(im, d->name));
 	put8(im, 0);
 	put8(im, COE_SDO);
-	for (unsigned i = 0; i < 6; i++) { /* FoE, EoE, three reserved, flags: none */
+	put8(im, HAS_FOE);
+	for (unsigned i = 0; i < 5; i++) { /* EoE, three reserved, flags: none */
 		put8(im, 0);
 	}
 	put16(im, 0); /* E-bus current */
@@ -254,9 +259,11 @@ static void put_fixed(uint8_t *bytes)
 	octets_put32(bytes + SII_PRODUCT, PICCOLO_PRODUCT_CODE);
 	octets_put32(bytes + SII_REVISION, PICCOLO_REVISION);
 	octets_put32(bytes + SII_SERIAL, PICCOLO_SERIAL);
+	put_mailbox(bytes + SII_BOOT_RECEIVE, &d->sm[PICCOLO_SM_MAILBOX_OUT]);
+	put_mailbox(bytes + SII_BOOT_SEND, &d->sm[PICCOLO_SM_MAILBOX_IN]);
 	put_mailbox(bytes + SII_MAILBOX_RECEIVE, &d->sm[PICCOLO_SM_MAILBOX_OUT]);
 	put_mailbox(bytes + SII_MAILBOX_SEND, &d->sm[PICCOLO_SM_MAILBOX_IN]);
-	octets_put16(bytes + SII_MAILBOX_PROTOCOLS, PROTOCOL_COE);
+	octets_put16(bytes + SII_MAILBOX_PROTOCOLS, PROTOCOL_COE | PROTOCOL_FOE);
 	octets_put16(bytes + SII_SIZE, PICCOLO_EEPROM_OCTETS * 8 / 1024 - 1);
 	octets_put16(bytes + SII_VERSION, 1);
 }
