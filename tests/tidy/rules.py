@@ -37,7 +37,8 @@ MODULES: dict[str, dict[str, set[str]]] = {
     "master": {
         "control": {"base", "config", "image"},
         "link": {"base", "wire", "image"},
-        "bus": {"base", "wire", "config", "image", "link"},
+        "mailbox": {"base", "wire"},
+        "bus": {"base", "wire", "config", "image", "link", "mailbox"},
         "cycle": {"base", "wire", "config", "image", "link", "bus", "control"},
         "admin": {"base", "wire", "config", "image", "cycle"},
         "daemon": {"base", "wire", "config", "image", "link", "bus", "control", "cycle", "admin"}

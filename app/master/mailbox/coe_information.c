@@ -1,0 +1,161 @@
+/* SPDX-License-Identifier: MIT */
+/* SDO information: list of objects, description of an object, of an entry; in fragments. */
+#include <errno.h>
+#include <string.h>
+
+#include "mailbox/coe.h"
+#include "mailbox/coe_internal.h"
+
+enum opcode {
+	GET_LIST = 1,
+	LIST = 2,
+	GET_OBJECT = 3,
+	OBJECT = 4,
+	GET_ENTRY = 5,
+	ENTRY = 6,
+	INFORMATION_ERROR = 7,
+	OPCODE_MASK = 0x7f,
+};
+
+enum layout {
+	OPCODE_AT = 2,
+	FRAGMENTS_AT = 4,
+	BODY_AT = 6,
+	INDEX_BYTES = 2,
+	ENTRY_REQUEST_BYTES = BODY_AT + 4,
+	OBJECT_BYTES = 6,
+	ENTRY_BYTES = 10,
+	/* access rights, category, mapping: the name follows at once */
+	VALUE_INFO = 0x07,
+};
+
+static uint8_t opcode_of(const struct mailbox_request *rq)
+{
+	switch (rq->with.coe.operation) {
+	case COE_OBJECT:
+		return GET_OBJECT;
+	case COE_ENTRY:
+		return GET_ENTRY;
+	case COE_LIST:
+	case COE_UPLOAD:
+	case COE_DOWNLOAD:
+		break;
+	}
+	return GET_LIST;
+}
+
+int coe_information_compose(struct mailbox_request *rq, uint8_t *data, size_t capacity)
+{
+	const struct coe_parameters *with = &rq->with.coe;
+
+	if (capacity < ENTRY_REQUEST_BYTES) {
+		return -EMSGSIZE;
+	}
+	memset(data, 0, ENTRY_REQUEST_BYTES);
+	put_le16(data, (uint16_t)(COE_SDO_INFORMATION << COE_SERVICE_SHIFT));
+	data[OPCODE_AT] = opcode_of(rq);
+	put_le16(data + BODY_AT,
+		 with->operation == COE_LIST ? (uint16_t)with->list_type : with->index);
+	if (with->operation != COE_ENTRY) {
+		return BODY_AT + INDEX_BYTES;
+	}
+	data[BODY_AT + 2] = with->subindex;
+	data[BODY_AT + 3] = VALUE_INFO;
+	return ENTRY_REQUEST_BYTES;
+}
+
+/* Does the first fragment answer this request, or an earlier one? */
+static int is_of_request(const struct mailbox_request *rq, const uint8_t *body, size_t body_len)
+{
+	const struct coe_parameters *with = &rq->with.coe;
+
+	if (with->operation == COE_LIST) {
+		return get_le16(body) == (uint16_t)with->list_type;
+	}
+	return get_le16(body) == with->index &&
+	       (with->operation != COE_ENTRY || (body_len > 2 && body[2] == with->subindex));
+}
+
+static int take_fragment(struct mailbox_request *rq, const uint8_t *body, size_t body_len,
+			 uint16_t left)
+{
+	struct coe_state *st = &rq->state.coe;
+
+	if (body_len > rq->capacity - rq->len) {
+		return -EMSGSIZE;
+	}
+	memcpy(rq->buffer + rq->len, body, body_len);
+	rq->len += body_len;
+	st->has_fragment = 1;
+	st->fragments_left = left;
+	return left == 0 ? MAILBOX_DONE : MAILBOX_WAIT;
+}
+
+int coe_information_received(struct mailbox_request *rq, const uint8_t *data, size_t len)
+{
+	struct coe_state *st = &rq->state.coe;
+	const uint8_t *body = data + BODY_AT;
+	size_t body_len = len - BODY_AT;
+	uint8_t opcode = data[OPCODE_AT] & OPCODE_MASK;
+	uint16_t left;
+
+	if (len < BODY_AT + INDEX_BYTES) {
+		return -EPROTO;
+	}
+	if (opcode == INFORMATION_ERROR) {
+		rq->detail = body_len >= 4 ? get_le32(body) : 0;
+		return -EREMOTEIO;
+	}
+	if (opcode != opcode_of(rq) + 1) {
+		return MAILBOX_IGNORE;
+	}
+	left = get_le16(data + FRAGMENTS_AT);
+	if (st->has_fragment) {
+		/* One lost in between would make a list with a hole. */
+		return left + 1 == st->fragments_left ? take_fragment(rq, body, body_len, left)
+						      : -EPROTO;
+	}
+	if (!is_of_request(rq, body, body_len)) {
+		return MAILBOX_IGNORE;
+	}
+	if (rq->with.coe.operation == COE_LIST) {
+		body += INDEX_BYTES; /* the list's type, in the first fragment only */
+		body_len -= INDEX_BYTES;
+	}
+	return take_fragment(rq, body, body_len, left);
+}
+
+static void get_name(const uint8_t *text, size_t len, char *ret_name)
+{
+	size_t n = len < COE_NAME_BYTES - 1 ? len : COE_NAME_BYTES - 1;
+
+	memcpy(ret_name, text, n);
+	ret_name[n] = '\0';
+}
+
+int coe_object_get(const uint8_t *buffer, size_t len, struct coe_object *ret)
+{
+	if (len < OBJECT_BYTES) {
+		return -EPROTO;
+	}
+	*ret = (struct coe_object){ .index = get_le16(buffer),
+				    .data_type = get_le16(buffer + 2),
+				    .subindex_max = buffer[4],
+				    .object_code = buffer[5] };
+	get_name(buffer + OBJECT_BYTES, len - OBJECT_BYTES, ret->name);
+	return 0;
+}
+
+int coe_entry_get(const uint8_t *buffer, size_t len, struct coe_entry *ret)
+{
+	if (len < ENTRY_BYTES) {
+		return -EPROTO;
+	}
+	*ret = (struct coe_entry){ .index = get_le16(buffer),
+				   .subindex = buffer[2],
+				   .data_type = get_le16(buffer + 4),
+				   .bit_len = get_le16(buffer + 6),
+				   .access = get_le16(buffer + 8) };
+	get_name(buffer + ENTRY_BYTES, len - ENTRY_BYTES, ret->name);
+	return 0;
+}
