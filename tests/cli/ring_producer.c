@@ -5,9 +5,10 @@
  * same a quarter period later; counters count; sample_time is the DC time of the edge.
  *
  * usage: test_ring_producer RUN_DIR --cycles N [--pace] [--first N] [--skip FROM:COUNT] [--depth N]
- *        [--no-close] [--wait] [--events N]
+ *        [--no-close] [--wait] [--events N] [--bad N]
  * --pace: one sample each millisecond; otherwise at once. --skip: cycle numbers with no sample.
- * --no-close: leave the ring open, as after a crash. --wait: end when standard input does.
+ * --no-close: leave the ring open, as after a crash. --wait: end when standard input does. --bad:
+ * in every Nth cycle, from 0, the sample of piccolo1 is bad.
  */
 #include <errno.h>
 #include <inttypes.h>
@@ -24,6 +25,7 @@
 #include "base/platform.h"
 #include "base/ring.h"
 #include "base/sample.h"
+#include "base/slave_set.h"
 #include "config/config.h"
 
 enum { SLAVES = 2, CHANNELS = 7, SLAVE_BYTES = 14, IMAGE_BYTES = 1 + SLAVES * SLAVE_BYTES };
@@ -38,6 +40,7 @@ struct arguments {
 	uint64_t skip_count;
 	uint64_t depth;
 	uint64_t events;
+	uint64_t bad_every;
 	int has_pace;
 	int is_left_open;
 	int has_wait;
@@ -69,6 +72,8 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
 			a->depth = strtoull(argv[++i] != NULL ? value : "", NULL, 10);
 		} else if (strcmp(argv[i], "--events") == 0) {
 			a->events = strtoull(argv[++i] != NULL ? value : "", NULL, 10);
+		} else if (strcmp(argv[i], "--bad") == 0) {
+			a->bad_every = strtoull(argv[++i] != NULL ? value : "", NULL, 10);
 		} else if (strcmp(argv[i], "--skip") == 0) {
 			if (sscanf(value, "%" SCNu64 ":%" SCNu64, &a->skip_from, &a->skip_count) !=
 			    2) {
@@ -168,6 +173,9 @@ static void push(struct ring *ring, const struct arguments *a, uint64_t cycle, i
 	};
 	uint8_t image[IMAGE_BYTES];
 
+	if (a->bad_every > 0 && cycle % a->bad_every == 0) {
+		slave_set_add(&h.slaves_bad, 1);
+	}
 	fill_image(image, cycle, dc_ns);
 	ring_push(ring, &h, sample_head_bytes(SLAVES), image, sizeof(image));
 }

@@ -9,6 +9,7 @@ import io
 import itertools
 import json
 import os
+import shutil
 import signal
 import subprocess
 import time
@@ -24,6 +25,7 @@ from mcap_ros2.decoder import DecoderFactory
 
 RECORD = BIN / "ecdaq-record"
 PRODUCER = BUILD / "tests" / "cli" / "test_ring_producer"
+OLD_RECORDING = Path(__file__).parent / "recordings" / "bad_slaves_in_one_word.mcap"
 PERIOD_NS = 1_000_000
 # More than a file has before its first sample: schemas, IDL, channel table.
 HEAD = 30_000
@@ -138,6 +140,48 @@ def test_every_sample_decodes_and_is_what_the_ring_held(bench: Bench) -> None:
     assert [m.value for m in events if m.name == "output_set"] == [0, 1, 2]
     assert [m.name for m in events if m.sequence == 2**64 - 1] == ["record_started"]
     assert len(list(bench.messages("/ecdaq/timemap"))) >= 2
+
+
+def bad_slaves(message: Any) -> list[int]:
+    octets = message.slaves_bad
+    return [n for n in range(len(octets) * 8) if octets[n // 8] >> n % 8 & 1]
+
+
+def test_bad_slaves_are_octets_as_many_as_the_slaves_need(bench: Bench) -> None:
+    bench.produce("--cycles", "20", "--bad", "5").wait(60)
+    bench.record_all()
+    cycles = [m for _, m in bench.messages("/ecdaq/cycle")]
+    assert [m.cycle for m in cycles] == list(range(20))
+    assert {len(m.slaves_bad) for m in cycles} == {1}
+    assert [m.cycle for m in cycles if bad_slaves(m) == [1]] == [0, 5, 10, 15]
+    assert [m.cycle for m in cycles if bad_slaves(m) == []] == [n for n in range(20) if n % 5]
+    samples = [m for _, m in bench.messages("/ecdaq/piccolo1")]
+    assert [m.cycle for m in samples if not m.good] == [0, 5, 10, 15]
+
+
+def test_a_recording_with_bad_slaves_in_one_word_is_still_read(bench: Bench) -> None:
+    shutil.copy(OLD_RECORDING, bench.folder)
+    cycles = [m for _, m in bench.messages("/ecdaq/cycle")]
+    assert [m.cycle for m in cycles if m.slaves_bad == 2] == [0, 5, 10, 15]
+    checked = bench.log("check", "--json", *bench.files())
+    assert checked.returncode == 0, checked.stderr
+    assert '"cycles":20' in checked.stdout
+    exported = bench.log("export", *bench.files())
+    assert exported.returncode == 0, exported.stderr
+    rows = list(csv.DictReader(io.StringIO(exported.stdout)))
+    assert [row["cycle"] for row in rows if row["piccolo1.good"] == "0"] == ["0", "5", "10", "15"]
+    assert all(row["piccolo0.good"] == "1" for row in rows)
+    info = bench.log("info", *bench.files())
+    assert info.returncode == 0, info.stderr
+
+
+def test_an_unfinished_recording_with_bad_slaves_in_one_word_is_recovered(bench: Bench) -> None:
+    cut = bench.folder / f"{OLD_RECORDING.name}.part"
+    cut.write_bytes(OLD_RECORDING.read_bytes()[:-200])
+    recovered = bench.log("recover", cut)
+    assert recovered.returncode == 0, recovered.stderr
+    cycles = [m for _, m in bench.messages("/ecdaq/cycle")]
+    assert [m.cycle for m in cycles] == list(range(20))
 
 
 def test_the_file_describes_itself(bench: Bench, tmp_path: Path) -> None:

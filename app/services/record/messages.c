@@ -1,9 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 #include "record/messages.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <string.h>
 
+#include "base/limits.h"
+#include "base/slave_set.h"
 #include "reader/table.h"
 #include "record/cdr.h"
 
@@ -53,8 +56,9 @@ static const struct {
 				      "working counter of the process data" },
 				    { "uint16", "unsigned short", "wkc_expected",
 				      "what it should be" },
-				    { "uint64", "unsigned long long", "slaves_bad",
-				      "bit n: the sample of slave n is not good" },
+				    { "uint8[<=64]", "sequence<octet, 64>", "slaves_bad",
+				      "bit n % 8 of octet n / 8: the sample of slave n is not "
+				      "good" },
 			    } },
 	[MESSAGE_EVENT] = { "/ecdaq/event",
 			    "Event",
@@ -200,7 +204,20 @@ void messages_put_idl(enum messages_kind kind, FILE *out)
 	fprintf(out, "  };\n");
 }
 
-size_t messages_encode_cycle(const struct sample_header *h, uint8_t *buf)
+static_assert(LIMIT_SLAVES <= 64 * 8, "the bound of slaves_bad above");
+
+/* Only the octets that @slave_count slaves need. */
+static void put_slaves(struct cdr *c, const struct slave_set *set, uint32_t slave_count)
+{
+	uint32_t octets = (slave_count + 7) / 8;
+
+	cdr_put(c, octets, 4);
+	for (uint32_t i = 0; i < octets; i++) {
+		cdr_put(c, set->word[i / 8] >> i % 8 * 8 & 0xff, 1);
+	}
+}
+
+size_t messages_encode_cycle(const struct sample_header *h, uint32_t slave_count, uint8_t *buf)
 {
 	struct cdr c = cdr_begin(buf, MESSAGES_LARGEST_BYTES);
 
@@ -216,7 +233,7 @@ size_t messages_encode_cycle(const struct sample_header *h, uint8_t *buf)
 	cdr_put(&c, h->flags, 4);
 	cdr_put(&c, h->wkc, 2);
 	cdr_put(&c, h->wkc_expected, 2);
-	cdr_put(&c, sample_bad_slaves(h)->word[0], 8);
+	put_slaves(&c, sample_bad_slaves(h), slave_count);
 	return c.len;
 }
 

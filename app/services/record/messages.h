@@ -39,8 +39,10 @@ struct messages_event {
 	const char *text;
 };
 
-/* CDR into @buf of MESSAGES_LARGEST_BYTES. Return the length. Context: any. */
-size_t messages_encode_cycle(const struct sample_header *header, uint8_t *buf);
+/* CDR into @buf of MESSAGES_LARGEST_BYTES. Return the length. @slave_count: 0 to LIMIT_SLAVES.
+ * Context: any. */
+size_t messages_encode_cycle(const struct sample_header *header, uint32_t slave_count,
+			     uint8_t *buf);
 size_t messages_encode_event(const struct messages_event *ev, uint8_t *buf);
 size_t messages_encode_timemap(const struct timemap_state *state, uint8_t *buf);
 size_t messages_encode_sync0(const struct sync0_result *result, int64_t utc_ns, uint8_t *buf);

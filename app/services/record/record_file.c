@@ -138,7 +138,8 @@ int record_file_sample(struct record_file *f, const struct sample_header *header
 		return r;
 	}
 	go_to(f, utc_ns);
-	r = put(f, MESSAGE_CYCLE, sequence, messages_encode_cycle(header, f->buf));
+	r = put(f, MESSAGE_CYCLE, sequence,
+		messages_encode_cycle(header, layout_meta(f->layout)->slave_count, f->buf));
 	for (size_t i = 0; i < f->topic_count && r == 0; i++) {
 		r = put(f, MESSAGE_KINDS + (unsigned)i, sequence,
 			layout_encode(&f->topic[i], header, image, f->buf, f->buf_len));

@@ -40,7 +40,7 @@ uint32 flags  # 1 lost, 2 late, 4 WKC low, 8 not OP, 16 fail-safe, 32 skipped, 6
 128 DC unlocked, 256 doubled
 uint16 wkc  # not published: 0
 uint16 wkc_expected  # not published: 0
-uint64 slaves_bad  # bit n: the sample of slave n is not good
+uint8[<=64] slaves_bad  # bit n % 8 of octet n / 8: the sample of slave n is not good
 """
 EVENT = """\
 # Something that happened.
@@ -67,7 +67,7 @@ int64 step_ns  # size of the newest step of the host's clock
 uint64 steps  # number of steps so far
 int32 tai_offset_s  # TAI minus UTC; 0: unset, CLOCK_TAI is taken for UTC
 """
-CYCLE_BYTES = struct.Struct("<4sQqqqqiiiiIHHQ")
+CYCLE_BYTES = struct.Struct("<4sQqqqqiiiiIHHI")  # and the octets of slaves_bad
 TIMEMAP_BYTES = struct.Struct("<4sqqqqqQi")
 EVENT_BYTES = struct.Struct("<4sqqQQqiiiH")
 # ROS type and struct letter for 1, 2, 4, 8 bytes.
@@ -290,7 +290,7 @@ class McapFile:
         entry = self._pending.setdefault(
             sample.cycle, [sample.dc_time_ns, sample.utc_ns, sample.flags, 0, 0]
         )
-        if not sample.is_good and sample.slave < 64:
+        if not sample.is_good:
             entry[3] |= 1 << sample.slave
         entry[4] += 1
         if entry[4] == len(self.slaves):
@@ -303,10 +303,11 @@ class McapFile:
             if samples < len(self.slaves) and cycle > too_old:
                 return
             del self._pending[cycle]
-            self._put(
-                self._ids["cycle"], utc,
-                CYCLE_BYTES.pack(CDR_LE, cycle, dc, 0, 0, 0, 0, 0, 0, 0, flags, 0, 0, bad),
+            octets = bad.to_bytes((len(self.slaves) + 7) // 8, "little")
+            head = CYCLE_BYTES.pack(
+                CDR_LE, cycle, dc, 0, 0, 0, 0, 0, 0, 0, flags, 0, 0, len(octets)
             )  # fmt: skip
+            self._put(self._ids["cycle"], utc, head + octets)
             self.cycles += 1
             self.last_cycle = cycle
 
