@@ -22,6 +22,7 @@
 #include "base/limits.h"
 #include "base/platform.h"
 #include "mailbox/coe.h"
+#include "mailbox/foe.h"
 #include "wire/mailbox.h"
 
 enum { MAILBOX_TYPES = 16 };
@@ -88,6 +89,7 @@ struct mailbox_request {
 	uint16_t slave_pos;
 	union {
 		struct coe_parameters coe;
+		struct foe_parameters foe;
 	} with;          /* parameters */
 	uint8_t *buffer; /* what is written, or where it is read to */
 	size_t capacity; /* of the buffer; of what is written: its length */
@@ -108,6 +110,7 @@ struct mailbox_request {
 	/* --- the engine's and the protocol's --- */
 	union {
 		struct coe_state coe;
+		struct foe_state foe;
 	} state;
 	uint16_t mail_capacity; /* data bytes of a mail to this slave */
 	uint16_t mail_room;     /* data bytes of a mail of this slave */
