@@ -24,14 +24,14 @@ uint8_t dc_track_command(struct dc_track *track, mono_t at, int64_t *ret_payload
 	return ECAT_CMD_FRMW;
 }
 
-/* The reference overwrites the payload; the others only take it. */
-static int has_reference_answered(const struct dc_track *track, uint8_t cmd, uint16_t wkc,
-				  int64_t time_ns)
+/*
+ * The reference overwrites the payload; the others only take it. With fewer answers than there
+ * were, an unchanged payload is either a reference that shows just the time that was predicted, or
+ * nobody's.
+ */
+static int is_unsure(const struct dc_track *track, uint8_t cmd, uint16_t wkc, int64_t time_ns)
 {
-	if (wkc == 0 || time_ns == 0) {
-		return 0;
-	}
-	return cmd == ECAT_CMD_FPRD || wkc >= track->wkc_full || time_ns != track->sent_ns;
+	return cmd == ECAT_CMD_FRMW && wkc < track->wkc_full && time_ns == track->sent_ns;
 }
 
 int64_t dc_track_answer(struct dc_track *track, uint8_t cmd, uint16_t wkc, int64_t time_ns,
@@ -39,7 +39,7 @@ int64_t dc_track_answer(struct dc_track *track, uint8_t cmd, uint16_t wkc, int64
 {
 	int64_t off_ns = time_ns - predict(track, sent);
 
-	if (!has_reference_answered(track, cmd, wkc, time_ns)) {
+	if (wkc == 0 || time_ns == 0) {
 		track->is_following = 0;
 		return 0;
 	}
@@ -54,7 +54,9 @@ int64_t dc_track_answer(struct dc_track *track, uint8_t cmd, uint16_t wkc, int64
 	}
 	track->rejected = 0;
 	track->is_known = 1;
-	track->is_following = 1;
+	/* Either way the time is right; the next frame only reads, and its WKC is the reference's.
+	 */
+	track->is_following = !is_unsure(track, cmd, wkc, time_ns);
 	track->last_ns = time_ns;
 	track->last_at = sent;
 	return time_ns;

@@ -3,7 +3,8 @@
  * What the cyclic frame does with the reference clock. Normally FRMW reads its time and writes it
  * to the slaves behind. While the reference does not answer, an FRMW would write the master's own
  * payload into all others (T17): then the frame only reads (FPRD), until the reference answers with
- * a plausible time. Context: cycle thread.
+ * a plausible time. Whether a payload that came back unchanged under a low WKC was its answer is
+ * found out by reading it in the next frame. Context: cycle thread.
  */
 #ifndef BUS_EXCHANGE_DC_H
 #define BUS_EXCHANGE_DC_H

@@ -6,6 +6,7 @@
  *   WHEN ACTION [KEY=VALUE...]
  *   at=2s lose                         one frame, the first after 2 s
  *   frame=1000 delay by=300us          the 1000th frame
+ *   p=1 jitter by=500ns                each frame reaches the slaves later by 0 to 500 ns
  *   frame=1000 hold                    it comes back only when the next frame is sent
  *   at=2s damage slave=1               its check sum is wrong from the wire towards slave 1 on
  *   every=500 double                   each 500th frame
@@ -39,6 +40,7 @@ enum fault_action {
 	FAULT_LOSE,     /* the frame goes through the slaves and is lost on the way back */
 	FAULT_DROP,     /* the frame is lost before the first slave */
 	FAULT_DELAY,    /* it comes back later by @by_ns */
+	FAULT_JITTER,   /* it reaches the slaves later by up to @by_ns */
 	FAULT_HOLD,     /* it comes back when the next frame is sent */
 	FAULT_DOUBLE,   /* it comes back twice */
 	FAULT_TRUNCATE, /* it comes back short */
@@ -89,8 +91,9 @@ struct fault_verdict {
 	int is_dropped; /* before the slaves */
 	int is_lost;    /* behind them */
 	int is_doubled;
-	int is_held; /* until the next frame is sent */
-	int64_t delay_ns;
+	int is_held;        /* until the next frame is sent */
+	int64_t delay_ns;   /* on the way back */
+	int64_t transit_ns; /* on the way to the slaves */
 	size_t truncate_to; /* 0: not */
 	size_t corrupt_at;  /* 0: not */
 	uint8_t corrupt_xor;

@@ -20,6 +20,7 @@ static const struct {
 	{ "lose", FAULT_LOSE, 1, NULL },
 	{ "drop", FAULT_DROP, 1, NULL },
 	{ "delay", FAULT_DELAY, 1, "by" },
+	{ "jitter", FAULT_JITTER, 1, "by" },
 	{ "hold", FAULT_HOLD, 1, NULL },
 	{ "double", FAULT_DOUBLE, 1, NULL },
 	{ "truncate", FAULT_TRUNCATE, 1, NULL },

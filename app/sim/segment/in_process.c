@@ -152,6 +152,7 @@ static int ip_send(void *ctx, const uint8_t *frame, size_t frame_len)
 		release_held(ip);
 		v = fault_plan_judge(ip->spec.faults, ip->spec.segment, out_ns, frame_len);
 	}
+	out_ns += v.transit_ns;
 	if (v.is_dropped ||
 	    segment_frame(ip->spec.segment, out_ns, copy, frame_len, &back_ns) < 0 || v.is_lost) {
 		return 0;

@@ -64,6 +64,14 @@ static int open_all(struct simulation *sim)
 	if (sim->faults == NULL) {
 		return sim_error("no memory");
 	}
+	if (sim->opt.transit_jitter_ns.value > 0) {
+		char line[64];
+
+		snprintf(line, sizeof(line), "p=1 jitter by=%ldns",
+			 (long)sim->opt.transit_jitter_ns.value);
+		fault_plan_add(sim->faults, line, segment_slave_count(sim->segment), error,
+			       sizeof(error));
+	}
 	if (sim->opt.faults != NULL &&
 	    fault_plan_load(sim->faults, sim->opt.faults, segment_slave_count(sim->segment), error,
 			    sizeof(error)) < 0) {
@@ -171,6 +179,7 @@ static void answer(struct simulation *sim, uint8_t *frame, size_t len, int64_t t
 	if (v.is_dropped) {
 		return;
 	}
+	t_ns += v.transit_ns;
 	if (segment_frame(sim->segment, t_ns, frame, len, &back_ns) < 0) {
 		sim->bad_frames++;
 		return;

@@ -17,8 +17,8 @@ static const char notes_text[] =
 	"\n"
 	"fault lines: WHEN WHAT [KEY=VALUE...]\n"
 	"  WHEN   at=TIME [for=TIME], frame=N, every=N, p=CHANCE; times as 2s, 300us\n"
-	"  WHAT   to frames: lose, drop, delay by=TIME, hold, double, truncate, corrupt,\n"
-	"         damage slave=N\n"
+	"  WHAT   to frames: lose, drop, delay by=TIME, jitter by=TIME, hold, double, truncate,\n"
+	"         corrupt, damage slave=N\n"
 	"         to slaves (slave=N): cut, heal, power-off, power-on, reset, drift ppm=X,\n"
 	"         al-error code=X, port-error port=N, watchdog, mailbox-stuck [for=TIME],\n"
 	"         identity product=X, sync0-lost [count=N], unplug, plug [address=X],\n"
@@ -85,6 +85,8 @@ void sim_options_read(int argc, char **argv, struct sim_options *opt)
 		  "crystals drift within +-PPM (default 0.5)" },
 		{ "jitter", 0, args_integer, &opt->jitter_ns, "NS",
 		  "jitter of the time stamps of frames (default 10)" },
+		{ "transit-jitter", 0, args_integer, &opt->transit_jitter_ns, "NS",
+		  "each frame reaches the slaves later by 0 to NS (default 0)" },
 		{ "signal", 0, parse_signal, &opt->signal, "SPEC",
 		  "sine:HZ:V:OFFSET_V[:PHASE_DEG] at every ADC (default sine:1:0.5:1)" },
 		{ "seed", 0, args_integer, &opt->seed, "N",
@@ -138,6 +140,7 @@ struct sim_options sim_options_default(void)
 		.signal = signal_default(),
 		.wander_ppm = 0.5,
 		.jitter_ns = { .low = 0, .high = 10000, .value = 10 },
+		.transit_jitter_ns = { .low = 0, .high = 1000000 },
 		.seed = { .low = 0, .high = INT32_MAX, .value = 1 },
 		.edges_keep_mib = { .low = 1, .high = 1 << 20 },
 		.priority = { .low = 1, .high = 99 },

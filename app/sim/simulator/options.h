@@ -20,6 +20,7 @@ struct sim_options {
 	struct signal_spec signal;
 	double wander_ppm;
 	struct args_integer jitter_ns;
+	struct args_integer transit_jitter_ns;
 	struct args_integer seed;
 	struct args_integer priority; /* 0: not real-time */
 	struct args_integer cpu;      /* -1: any */

@@ -10,15 +10,20 @@ enum { BACK_MS = 1400 }; /* to OP: three times what was measured */
 static struct virtual_bench b;
 static struct virtual_master vm;
 
-static void open_all(const char *datagrams)
+static void open_with(struct virtual_spec spec, const char *datagrams)
 {
 	const char *const settings[] = { datagrams, "slaves[0].name=a", "slaves[1].name=b",
 					 "slaves[2].name=c", NULL };
 
-	virtual_bench_init(
-		&b, &(struct virtual_spec){ .slaves = SLAVES, .ppm = { 30, -40, 15 }, .seed = 41 });
+	virtual_bench_init(&b, &spec);
 	virtual_master_init(&vm, &b, settings);
 	virtual_master_settle(&vm);
+}
+
+static void open_all(const char *datagrams)
+{
+	open_with((struct virtual_spec){ .slaves = SLAVES, .ppm = { 30, -40, 15 }, .seed = 41 },
+		  datagrams);
 }
 
 static void close_all(void)
@@ -145,4 +150,35 @@ TEST(sim_partial, with_one_datagram_a_lost_slave_makes_all_outputs_safe)
 	CHECK_EQ(atomic_load(&stats()->is_fail_safe), 1);
 	CHECK(set_led("b.led", 1) < 0);
 	close_all();
+}
+
+/* Reference and host at the same rate, or with jitter between them: the reference's answer equals
+ * the prediction again and again. */
+static void check_coincidences(double reference_ppm, const char *jitter)
+{
+	uint64_t bad;
+	uint64_t unexplained;
+
+	open_with((struct virtual_spec){ .slaves = SLAVES,
+					 .ppm = { reference_ppm, -40, 15 },
+					 .seed = 5 },
+		  "bus.datagrams=per_slave");
+	if (jitter != NULL) {
+		virtual_bench_fault(&b, jitter);
+	}
+	virtual_bench_fault(&b, "at=10ms power-off slave=2");
+	virtual_master_run(&vm, 1000);
+	bad = atomic_load(&stats()->slave_bad[0]);
+	unexplained = atomic_load(&stats()->samples_bad_unexplained);
+	virtual_master_run(&vm, 5000);
+	CHECK_EQ(atomic_load(&stats()->slave_bad[0]), bad);
+	CHECK_EQ(atomic_load(&stats()->samples_bad_unexplained), unexplained);
+	close_all();
+}
+
+TEST(sim_partial, an_answer_of_the_reference_as_predicted_is_not_its_loss)
+{
+	check_coincidences(0, NULL);
+	check_coincidences(0.5, NULL);
+	check_coincidences(30, "p=1 jitter by=300ns");
 }

@@ -2,6 +2,7 @@
 /* The reference clock in the cyclic frame: followed, lost, back, implausible. */
 #include "bus/exchange_dc.h"
 
+#include "base/prng.h"
 #include "unit/master/bus/exchange_bench.h"
 
 static uint8_t dc_command(const struct bench *b)
@@ -78,7 +79,7 @@ static void answer_without_reference(struct fake_wire *wire, uint8_t *frame, siz
 	}
 }
 
-TEST(exchange, payload_that_no_slave_overwrote_is_no_time)
+TEST(exchange, payload_that_no_slave_overwrote_ends_with_the_next_frame)
 {
 	struct exchange_plan plan = small_plan();
 	struct bench *b = bench_create(&plan);
@@ -88,8 +89,66 @@ TEST(exchange, payload_that_no_slave_overwrote_is_no_time)
 	run(b);
 	run(b);
 	b->wire.answer = answer_without_reference;
-	CHECK_EQ(run(b).dc_time_ns, 0);
+	CHECK_EQ(run(b).dc_time_ns, b->dc_offset_ns + 4 * PERIOD_NS); /* as predicted */
+	for (int i = 0; i < 10; i++) {
+		CHECK_EQ(run(b).dc_time_ns, 0);
+		CHECK_EQ(dc_command(b), ECAT_CMD_FPRD);
+	}
+	b->wire.answer = play_slaves;
+	CHECK(run(b).dc_time_ns > 0);
 	run(b);
-	CHECK_EQ(dc_command(b), ECAT_CMD_FPRD);
+	CHECK_EQ(dc_command(b), ECAT_CMD_FRMW);
 	bench_destroy(b);
+}
+
+/* Sum of twelve even ones: about a standard normal distribution. */
+static double noise(struct prng *prng)
+{
+	double sum = -6;
+
+	for (int i = 0; i < 12; i++) {
+		sum += prng_unit(prng);
+	}
+	return sum;
+}
+
+enum { JITTER_CYCLES = 100000, GRAIN_NS = 10 };
+
+/* One of three slaves is lost, and transit jitter makes the reference's answer equal the
+ * prediction now and then. */
+static void check_jitter(int64_t sigma_ns)
+{
+	struct dc_track track = { 0 };
+	struct prng prng = { .state = (uint64_t)sigma_ns };
+	mono_t at = { 0 };
+	int64_t payload;
+	unsigned coincidences = 0;
+	unsigned following = 0;
+
+	dc_track_command(&track, at, &payload);
+	dc_track_answer(&track, ECAT_CMD_FPRD, 1, NS_PER_S, at);
+	dc_track_command(&track, at, &payload);
+	dc_track_answer(&track, ECAT_CMD_FRMW, 3, NS_PER_S + GRAIN_NS, at);
+	for (unsigned i = 0; i < JITTER_CYCLES; i++) {
+		int64_t dc_ns;
+		uint8_t cmd;
+
+		at = mono_add(at, (span_t){ NS_PER_MS });
+		cmd = dc_track_command(&track, at, &payload);
+		dc_ns = NS_PER_S + at.ns + (int64_t)(noise(&prng) * (double)sigma_ns);
+		dc_ns -= dc_ns % GRAIN_NS;
+		coincidences += cmd == ECAT_CMD_FRMW && dc_ns == payload;
+		following += cmd == ECAT_CMD_FRMW;
+		CHECK_EQ(dc_track_answer(&track, cmd, cmd == ECAT_CMD_FRMW ? 2 : 1, dc_ns, at),
+			 dc_ns);
+	}
+	CHECK(coincidences > JITTER_CYCLES / 1000);
+	CHECK_EQ(following, JITTER_CYCLES - coincidences);
+}
+
+TEST(exchange, an_answer_that_equals_the_prediction_is_an_answer)
+{
+	check_jitter(100);
+	check_jitter(300);
+	check_jitter(900);
 }

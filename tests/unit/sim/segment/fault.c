@@ -39,6 +39,7 @@ TEST(sim_fault, a_line_that_makes_no_sense_is_refused_with_its_reason)
 	check_refused("p=1.5 lose", "p: bad value");
 	check_refused("p=nan lose", "p: bad value");
 	check_refused("at=1s delay", "delay: by= is missing");
+	check_refused("p=1 jitter", "jitter: by= is missing");
 	check_refused("at=1s cut", "cut: slave= is missing");
 	check_refused("at=1s cut slave=2", "slave: bad value");
 	check_refused("at=1s cut slave=x", "slave: bad value");
@@ -152,6 +153,31 @@ TEST(sim_fault, frame_and_every_count_frames)
 	}
 	fault_plan_destroy(third);
 	fault_plan_destroy(every);
+	bench_destroy(b);
+}
+
+TEST(sim_fault, transit_jitter_is_spread_over_its_range_and_follows_the_seed)
+{
+	struct bench *b = two_slaves();
+	struct fault_plan *plan = plan_of("p=1 jitter by=500ns");
+	struct fault_plan *again = plan_of("p=1 jitter by=500ns");
+	int64_t low = INT64_MAX;
+	int64_t high = 0;
+	int64_t sum = 0;
+
+	for (int n = 0; n < 1000; n++) {
+		int64_t ns = judge(plan, b).transit_ns;
+
+		CHECK_EQ(judge(again, b).transit_ns, ns);
+		low = ns < low ? ns : low;
+		high = ns > high ? ns : high;
+		sum += ns;
+	}
+	CHECK(low >= 0 && low < 10);
+	CHECK(high <= 500 && high > 490);
+	CHECK(sum > 230 * 1000 && sum < 270 * 1000);
+	fault_plan_destroy(plan);
+	fault_plan_destroy(again);
 	bench_destroy(b);
 }
 
