@@ -42,6 +42,11 @@ static const struct {
 	[EVENT_RECORD_RESUMED] = { "record_resumed", EVENT_NOTICE },
 	[EVENT_COMMAND] = { "command", EVENT_NOTICE },
 	[EVENT_EMERGENCY] = { "emergency", EVENT_WARNING },
+	[EVENT_STRANGER] = { "stranger", EVENT_WARNING },
+	[EVENT_STRANGER_GONE] = { "stranger_gone", EVENT_NOTICE },
+	[EVENT_SLAVE_WRONG] = { "slave_wrong", EVENT_ERROR },
+	[EVENT_SLAVE_UNREADABLE] = { "slave_unreadable", EVENT_ERROR },
+	[EVENT_SLAVE_ALARM] = { "slave_alarm", EVENT_ERROR },
 	[EVENT_CONTROL_OVERRUN] = { "control_overrun", EVENT_WARNING },
 	[EVENT_CONTROL_CRASHED] = { "control_crashed", EVENT_ERROR },
 	[EVENT_SYNC0_LOST] = { "sync0_lost", EVENT_ERROR },
@@ -269,6 +274,53 @@ static int format_emergency(const struct event *ev, char *buf, size_t buf_len)
 			(unsigned)(data >> 32 & 0xff));
 }
 
+/* A device that is none of the slaves, by vendor and product where they are known. */
+static int format_stranger(const struct event *ev, char *buf, size_t buf_len)
+{
+	uint64_t identity = (uint64_t)ev->value;
+	char what[56] = "";
+	char whose[48] = "";
+
+	if (identity != 0) {
+		snprintf(what, sizeof(what), ", vendor 0x%08" PRIx64 " product 0x%08" PRIx64,
+			 identity >> 32, identity & 0xffffffff);
+	}
+	if (ev->slave_pos != EVENT_NO_SLAVE && ev->id != EVENT_SLAVE_WRONG) {
+		snprintf(whose, sizeof(whose),
+			 ev->id == EVENT_SLAVE_UNREADABLE ? " in the place of slave %u"
+							  : ", had the address of slave %u",
+			 ev->slave_pos);
+	}
+	switch (ev->id) {
+	case EVENT_STRANGER:
+		return snprintf(buf, buf_len,
+				"position %" PRId32
+				": a device that is not configured%s%s; isolated",
+				ev->arg[0], what, whose);
+	case EVENT_STRANGER_GONE:
+		return snprintf(buf, buf_len,
+				"position %" PRId32 ": the device that is not configured is gone%s",
+				ev->arg[0], what);
+	case EVENT_SLAVE_WRONG:
+		return snprintf(buf, buf_len,
+				"slave %u: wrong device in its place, position %" PRId32 "%s",
+				ev->slave_pos, ev->arg[0], what);
+	default:
+		return snprintf(buf, buf_len,
+				"position %" PRId32 ": EEPROM blank, damaged or unreadable%s",
+				ev->arg[0], whose);
+	}
+}
+
+static int format_alarm(const struct event *ev, char *buf, size_t buf_len)
+{
+	return snprintf(buf, buf_len,
+			"slave %u: stays in %s%s after %" PRId32
+			" attempts, AL status code 0x%04" PRIx64 "; not tried again until cleared",
+			ev->slave_pos, al_name(ev->arg[0]), ev->arg[0] & 0x10 ? "+ERROR" : "",
+			ev->arg[1], (uint64_t)ev->value & 0xffff);
+}
+
 /* NOLINTNEXTLINE(readability-function-size): a table, one text an event */
 int event_format(const struct event *ev, char *buf, size_t buf_len)
 {
@@ -362,6 +414,13 @@ int event_format(const struct event *ev, char *buf, size_t buf_len)
 				reason(a[1]));
 	case EVENT_EMERGENCY:
 		return format_emergency(ev, buf, buf_len);
+	case EVENT_STRANGER:
+	case EVENT_STRANGER_GONE:
+	case EVENT_SLAVE_WRONG:
+	case EVENT_SLAVE_UNREADABLE:
+		return format_stranger(ev, buf, buf_len);
+	case EVENT_SLAVE_ALARM:
+		return format_alarm(ev, buf, buf_len);
 	case EVENT_SDO_ABORT:
 		return snprintf(buf, buf_len,
 				"slave %u: SDO 0x%04" PRIx32 ":%02" PRIx32 " abort 0x%08" PRIx64,

@@ -60,6 +60,13 @@ enum event_id {
 	/* Of ecdaqd again. */
 	EVENT_EMERGENCY, /* slave; value: 5 data bytes, the first lowest; arg: error code, register
 			  */
+	EVENT_STRANGER,  /* slave: whose address it had, or none; arg: position, station
+			    address; value: vendor << 32 | product */
+	EVENT_STRANGER_GONE,    /* the same */
+	EVENT_SLAVE_WRONG,      /* slave in whose place it is; the same */
+	EVENT_SLAVE_UNREADABLE, /* slave in whose place it is, or none; the same, value 0 */
+	EVENT_SLAVE_ALARM, /* slave that is not tried again; arg: AL status, attempts; value: AL
+			      status code, 0: it was late */
 	EVENT_COUNT,
 };
 

@@ -33,8 +33,14 @@ struct config_slave {
 	int64_t sync0_shift_ns;
 	char sync0_line[96];      /* GPIO line its SYNC0 is wired to; "" = none */
 	uint32_t assign_activate; /* 0 = from what the slave is: DC slaves 0x0300 */
-	int line;                 /* in the file, for messages */
+	int64_t preop_timeout_ns;
+	int64_t op_timeout_ns; /* 0: bus_op_timeout_ns */
+	int line;              /* in the file, for messages */
 };
+
+/* slaves[].preop_timeout of a slave that is not listed */
+#define CONFIG_PREOP_TIMEOUT "3s"
+#define CONFIG_PREOP_TIMEOUT_NS INT64_C(3000000000)
 
 /* slaves[].sdo[]: written in PRE-OP, in order. */
 struct config_sdo {
@@ -68,6 +74,7 @@ struct config {
 	int64_t bus_frame_timeout_ns;
 	int64_t bus_watchdog_ns; /* SM watchdog of the slaves; 0 = leave */
 	uint32_t bus_wkc_miss_limit_cycles;
+	uint32_t bus_recovery_attempts;
 	uint32_t bus_monitor; /* 1: BRD of AL status and 0x092C in every cycle */
 	enum config_presence bus_presence;
 	enum config_datagrams bus_datagrams;

@@ -111,6 +111,17 @@ const struct option option_table[] = {
 	  .prose = "Number of cycles with a low WKC of the process data, consecutive or not, after "
 		   "which the service thread checks all slaves at once instead of at its next "
 		   "regular check (every 100 ms)." },
+	{ .name = "bus.recovery_attempts",
+	  .type = OPTION_UINT,
+	  FIELD(bus_recovery_attempts),
+	  .default_value = "10",
+	  .min = "1",
+	  .max = "1000000",
+	  .unit = "",
+	  .prose = "How often a slave that refuses a state, is late or falls back at once is "
+		   "brought to OP again, with pauses of 1, 2, 4 to 30 s. After that it is left "
+		   "alone until `ecdaq clear` or a power cycle. AL status codes 0x0030, 0x0035, "
+		   "0x0050 and 0x0051 are not tried again at all." },
 	{ .name = "bus.monitor",
 	  .type = OPTION_SWITCH,
 	  FIELD(bus_monitor),
@@ -686,6 +697,24 @@ const struct option option_table[] = {
 	  .unit = "",
 	  .prose = "AssignActivate word of the vendor's ESI (0x0980, 0x0981). 0: 0x0300 for "
 		   "slaves with DC, SYNC0 on." },
+	{ .name = "slaves[].preop_timeout",
+	  .type = OPTION_DURATION,
+	  SLAVE(preop_timeout_ns),
+	  .default_value = CONFIG_PREOP_TIMEOUT,
+	  .min = "100ms",
+	  .max = "5min",
+	  .unit = "s",
+	  .prose = "Time this slave has in recovery to reach INIT or PRE-OP (ESI: "
+		   "PreopTimeout)." },
+	{ .name = "slaves[].op_timeout",
+	  .type = OPTION_DURATION,
+	  SLAVE(op_timeout_ns),
+	  .default_value = "0s",
+	  .min = "0s",
+	  .max = "5min",
+	  .unit = "s",
+	  .prose = "Time this slave has in recovery to reach SAFE-OP, and OP (ESI: "
+		   "SafeopOpTimeout). 0s: bus.op_timeout." },
 	/* slaves[].sdo[] */
 	{ .name = "slaves[].sdo[].index",
 	  .type = OPTION_HEX,

@@ -25,7 +25,7 @@
 #include "link/line.h"
 #include "wire/al.h"
 
-enum { BUS_ERROR_BYTES = 256 };
+enum { BUS_ERROR_BYTES = 256, BUS_TROUBLE_BYTES = 208 };
 
 struct bus;
 
@@ -69,13 +69,17 @@ struct bus_watch_report {
 	unsigned slaves_op;
 	unsigned slaves_lost;
 	struct slave_set in_op;
+	unsigned strangers;  /* devices on the wire that are none of the slaves */
 	int is_reference_op; /* or there is none */
 	int is_all_op;
+	char trouble[BUS_TROUBLE_BYTES]; /* the first thing that is wrong, in one line; "": nothing
+					  */
 };
 
 /**
  * Read AL state, error counters, DC difference of every slave into @page (its slave[] entries),
- * emit events through @emit, and fill @ret_report. It changes nothing on the bus.
+ * emit events through @emit, and fill @ret_report. It writes to devices that are none of the
+ * slaves, and to those that have come back, only (bus/places.h): their addresses.
  */
 int bus_watch(struct bus *bus, struct status_page *page,
 	      void (*emit)(void *ctx, const struct event *ev), void *emit_ctx,
@@ -88,6 +92,9 @@ int bus_watch(struct bus *bus, struct status_page *page,
  */
 void bus_lead_back(struct bus *bus, void (*emit)(void *ctx, const struct event *ev),
 		   void *emit_ctx);
+
+/** An operator has seen the alarms: slaves that were given up are tried again. */
+void bus_clear_alarms(struct bus *bus);
 
 /* --- what was found; valid after bus_map() (slaves: after bus_scan()) --- */
 

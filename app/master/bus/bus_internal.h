@@ -19,6 +19,7 @@
 #include "bus/dc_topology.h"
 #include "bus/error_counters.h"
 #include "bus/pdo.h"
+#include "bus/places.h"
 #include "wire/sii.h"
 
 enum {
@@ -35,9 +36,7 @@ enum {
 /* Way of a slave back to the bus (bus/recover.c); one step a call. */
 enum recovery_step {
 	RECOVERY_NONE,
-	RECOVERY_BACK,     /* answers again: see what it has become */
-	RECOVERY_FIND,     /* not answering: look whether its place is taken again */
-	RECOVERY_IDENTIFY, /* something answers there: is it the same slave? */
+	RECOVERY_BACK, /* it is lost, or answers and is not in OP: see what it has become */
 	RECOVERY_INIT,
 	RECOVERY_PREOP,
 	RECOVERY_SETUP,  /* start-up SDOs, SM, FMMU, watchdog */
@@ -70,14 +69,24 @@ struct bus_slave {
 	size_t sii_len;
 	/* bus/watch.c */
 	uint16_t al_status; /* as last seen */
-	unsigned misses;    /* looks in a row without an answer */
+	uint16_t al_code;
+	unsigned misses; /* looks in a row without an answer */
 	int is_lost;
-	int is_clock_set;    /* offset and delay are in place since its last power-up */
-	unsigned good_looks; /* at 0x092C, in a row */
+	uint8_t closed_ports;    /* towards strangers (bus/places.c) */
+	int is_clock_set;        /* offset and delay are in place since its last power-up */
+	int64_t clock_offset_ns; /* as written to 0x0920 */
+	unsigned good_looks;     /* at 0x092C, in a row */
 	struct error_counters errors;
 	enum recovery_step step;
+	enum al_state accepted; /* request that it has taken in this step */
 	mono_t step_deadline;
 	mono_t retry_at;
+	unsigned attempts; /* that failed */
+	int is_unstable;   /* fell back with an error, and has not been in OP for long since */
+	int is_latched;    /* left alone until an operator clears it */
+	enum recovery_step trouble_step;
+	uint16_t trouble_code; /* AL status code of the newest failure; 0: it was late */
+	mono_t op_since;
 };
 
 struct bus_emit {
@@ -109,6 +118,8 @@ struct bus {
 	int64_t sync0_start_ns; /* common grid; 0: SYNC0 was not started */
 	enum al_state target;   /* state requested last */
 	size_t next_recovery;   /* position served first */
+	size_t next_detailed;   /* position whose counters are read first */
+	struct bus_guest guest[GUESTS_MAX];
 	/* SOEM */
 	ecx_contextt context;
 	ecx_portt port;
@@ -134,6 +145,12 @@ struct bus {
 static inline uint16_t soem_index(size_t pos)
 {
 	return (uint16_t)(pos + 1);
+}
+
+/** What the configuration says of the slave at @pos; NULL: nothing. */
+static inline const struct config_slave *bus_config_slave(const struct bus *bus, size_t pos)
+{
+	return pos < bus->cfg->slave_count ? &bus->cfg->slave[pos] : NULL;
 }
 
 static inline int is_piccolo(const struct slave_info *info)
@@ -181,6 +198,9 @@ int bus_sdo_value(struct bus *bus, size_t pos, uint16_t index, uint8_t subindex,
 		  uint64_t *ret_value, uint32_t *ret_abort);
 /** Mode and configured start-up SDOs of one slave, in PRE-OP. */
 int bus_startup_sdos(struct bus *bus, size_t pos);
+/** The same, begun and polled: 1 under way, 0 done, -errno. */
+void bus_startup_begin(struct bus *bus, size_t pos);
+int bus_startup_poll(struct bus *bus, size_t pos);
 /** Read unsolicited messages from a slave's mailbox: emergencies. */
 void bus_read_mail(struct bus *bus, size_t pos);
 
@@ -230,9 +250,25 @@ int bus_sync0_restore(struct bus *bus, size_t pos);
 int bus_sync0_is_running(struct bus *bus, size_t pos);
 void bus_sync0_stop(struct bus *bus);
 
+/* --- states.c --- */
+
+/** "refuses SAFE-OP and is in PRE-OP: AL status code 0x0018, no valid inputs available" */
+void bus_describe_refusal(uint16_t al_status, uint16_t code, enum al_state wanted, char *ret_text,
+			  size_t text_bytes);
+/** The state in words, also of a number that is no AL state. */
+const char *bus_al_name(uint16_t al_status);
+
 /* --- recover.c --- */
 
 /** One step towards OP for a slave that is not there. */
 void bus_recover(struct bus *bus, size_t pos, const struct bus_emit *emit);
+/** The slave is in OP: after a while its failures are forgotten. */
+void bus_recover_settled(struct bus *bus, size_t pos);
+/** Forget them now: an operator says so. */
+void bus_recover_forget(struct bus_slave *sl);
+/** It was power-cycled: all of its way, without the failures of before. */
+void bus_recover_restart(struct bus *bus, size_t pos);
+/** What is wrong with a slave that is not in OP, in one line with its name. */
+void bus_recover_describe(const struct bus *bus, size_t pos, char *ret_text, size_t text_bytes);
 
 #endif

@@ -30,6 +30,7 @@ int bus_clock_write(struct bus *bus, size_t pos, int64_t offset_ns)
 		r = register_write(bus, pos, ESC_REG_DC_SPEED_COUNTER_START, start, sizeof(start));
 	}
 	sl->is_clock_set = r >= 0;
+	sl->clock_offset_ns = offset_ns;
 	return r;
 }
 
@@ -90,7 +91,7 @@ static int read_pair(struct bus *bus, size_t guide, size_t pos, int64_t *ret_gui
 					     .len = sl->is_clock_64bit ? 8 : 4,
 					     .data = time[i] };
 	}
-	if (registers_run(bus, access, 2) < 0 || access[0].wkc == 0 || access[1].wkc == 0) {
+	if (registers_run(bus, access, 2) < 0 || access[0].wkc != 1 || access[1].wkc != 1) {
 		return -EIO;
 	}
 	*ret_guide_ns = (int64_t)get_le64(time[0]) - bus->slave[guide].clock.delay_ns;

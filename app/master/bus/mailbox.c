@@ -246,3 +246,14 @@ int bus_startup_sdos(struct bus *bus, size_t pos)
 	}
 	return r;
 }
+
+void bus_startup_begin(struct bus *bus, size_t pos)
+{
+	(void)bus;
+	(void)pos;
+}
+
+int bus_startup_poll(struct bus *bus, size_t pos)
+{
+	return bus_startup_sdos(bus, pos);
+}

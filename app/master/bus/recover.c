@@ -1,34 +1,101 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The way of one slave back to OP, a step a call: found again, identified, INIT, PRE-OP, set up,
- * its clock set by those that run, SYNC0 into the common grid, SAFE-OP, OP (T18). Others are not
- * disturbed: every access goes to this slave's address.
+ * The way of one slave back to OP, as far as it comes in a call: INIT, PRE-OP, set up, its clock
+ * set by those that run, SYNC0 into the common grid, SAFE-OP, OP (T18). Others are not disturbed:
+ * every access goes to this slave's address. The table below has the order, the state each step
+ * asks for and its time-out.
+ *
+ * A slave that refuses, does not arrive in time or falls back at once is tried again after 1, 2, 4
+ * ... 30 s, as often as bus.recovery_attempts says; then, and at once for what no repetition can
+ * cure, it is left alone until an operator clears the alarm or the slave is power-cycled.
  */
 #include <errno.h>
+#include <stdio.h>
 
 #include "base/bytes.h"
 #include "bus/bus_internal.h"
 #include "bus/registers.h"
 
-enum { SII_WORD_VENDOR = 0x08, SII_WORD_PRODUCT = 0x0a, EEPROM_TIMEOUT_US = 20000, GOOD_LOOKS = 4 };
+enum { GOOD_LOOKS = 4, PAUSE_MAX_S = 30 };
 
-#define STEP_TIMEOUT_NS (2 * NS_PER_S)
-#define PAUSE_NS NS_PER_S
+#define SETUP_NS (5 * NS_PER_S)
+#define SYNC0_NS (2 * NS_PER_S)
+/* In OP for so long, its troubles are over. */
+#define STABLE_NS (10 * NS_PER_S)
+
+enum step_timeout {
+	TIMEOUT_NONE,
+	TIMEOUT_PREOP,
+	TIMEOUT_OP,
+	TIMEOUT_SETUP,
+	TIMEOUT_LOCK,
+	TIMEOUT_SYNC0
+};
+
+/* What an act of a step says. */
+enum progress { WAIT, DONE, FAILED };
+
+static enum progress to_init(struct bus *bus, size_t pos);
+static enum progress to_state(struct bus *bus, size_t pos);
+static enum progress set_up(struct bus *bus, size_t pos);
+static enum progress set_clock(struct bus *bus, size_t pos);
+static enum progress settle(struct bus *bus, size_t pos);
+static enum progress wait_sync0(struct bus *bus, size_t pos);
+
+static const struct {
+	enum progress (*act)(struct bus *bus, size_t pos);
+	enum al_state state; /* it asks for */
+	enum step_timeout timeout;
+	enum recovery_step next; /* when it is done */
+} steps[] = {
+	[RECOVERY_INIT] = { to_init, AL_INIT, TIMEOUT_PREOP, RECOVERY_PREOP },
+	[RECOVERY_PREOP] = { to_state, AL_PREOP, TIMEOUT_PREOP, RECOVERY_SETUP },
+	[RECOVERY_SETUP] = { set_up, AL_PREOP, TIMEOUT_SETUP, RECOVERY_CLOCK },
+	[RECOVERY_CLOCK] = { set_clock, AL_NONE, TIMEOUT_LOCK, RECOVERY_SETTLE },
+	[RECOVERY_SETTLE] = { settle, AL_NONE, TIMEOUT_LOCK, RECOVERY_SYNC0 },
+	[RECOVERY_SYNC0] = { wait_sync0, AL_NONE, TIMEOUT_SYNC0, RECOVERY_SAFEOP },
+	[RECOVERY_SAFEOP] = { to_state, AL_SAFEOP, TIMEOUT_OP, RECOVERY_OP },
+	[RECOVERY_OP] = { to_state, AL_OP, TIMEOUT_OP, RECOVERY_NONE },
+};
+
+static int64_t timeout_ns(const struct bus *bus, size_t pos, enum step_timeout timeout)
+{
+	const struct config_slave *want = bus_config_slave(bus, pos);
+
+	switch (timeout) {
+	case TIMEOUT_PREOP:
+		return want != NULL ? want->preop_timeout_ns : CONFIG_PREOP_TIMEOUT_NS;
+	case TIMEOUT_OP:
+		return want != NULL && want->op_timeout_ns != 0 ? want->op_timeout_ns
+								: bus->cfg->bus_op_timeout_ns;
+	case TIMEOUT_SETUP:
+		return SETUP_NS;
+	case TIMEOUT_LOCK:
+		return bus->cfg->dc_lock_timeout_ns;
+	case TIMEOUT_SYNC0:
+		return SYNC0_NS;
+	case TIMEOUT_NONE:
+		break;
+	}
+	return INT64_MAX / 2;
+}
+
+static void enter_at(struct bus *bus, size_t pos, enum recovery_step step, mono_t at)
+{
+	struct bus_slave *sl = &bus->slave[pos];
+	int64_t span_ns = step > RECOVERY_BACK ? timeout_ns(bus, pos, steps[step].timeout) : 0;
+
+	sl->step = step;
+	sl->accepted = AL_NONE;
+	sl->step_deadline = mono_add(at, (span_t){ span_ns });
+	if (step == RECOVERY_SETUP) {
+		bus_startup_begin(bus, pos);
+	}
+}
 
 static void enter(struct bus *bus, size_t pos, enum recovery_step step)
 {
-	struct bus_slave *sl = &bus->slave[pos];
-	int64_t timeout_ns =
-		step == RECOVERY_SETTLE ? bus->cfg->dc_lock_timeout_ns : STEP_TIMEOUT_NS;
-
-	sl->step = step;
-	sl->step_deadline = mono_add(bus_now(bus), (span_t){ timeout_ns });
-}
-
-static void start_over(struct bus *bus, size_t pos)
-{
-	bus->slave[pos].retry_at = mono_add(bus_now(bus), (span_t){ PAUSE_NS });
-	enter(bus, pos, RECOVERY_INIT);
+	enter_at(bus, pos, step, bus_now(bus));
 }
 
 static enum al_state state_of(const struct bus_slave *sl)
@@ -41,97 +108,53 @@ static int has_error(const struct bus_slave *sl)
 	return (sl->al_status & AL_ERROR) != 0;
 }
 
+/* The slave takes a request when it has read the one before; else WKC is 0. */
 static void ask(struct bus *bus, size_t pos, unsigned control)
 {
 	uint8_t word[2];
 
 	put_le16(word, (uint16_t)control);
-	register_write(bus, pos, ESC_REG_AL_CONTROL, word, sizeof(word));
-}
-
-/* --- finding --- */
-
-/* Present position of the slave: lost ones before it do not count. */
-static uint16_t auto_increment_address(const struct bus *bus, size_t pos)
-{
-	uint16_t before = 0;
-
-	for (size_t i = 0; i < pos; i++) {
-		before = (uint16_t)(before + (bus->slave[i].is_lost ? 0 : 1));
-	}
-	return (uint16_t)-before;
-}
-
-/* Behind a lost slave nothing can be identified; of two lost ones of a kind the first is restored
- * first. */
-static int is_place_certain(const struct bus *bus, size_t pos)
-{
-	const struct slave_info *info = &bus->slave[pos].info;
-
-	for (size_t i = 0; i < pos; i++) {
-		const struct bus_slave *other = &bus->slave[i];
-
-		if (other->is_lost && ((int)i == bus->slave[pos].clock.parent ||
-				       (other->info.vendor == info->vendor &&
-					other->info.product == info->product))) {
-			return 0;
-		}
-	}
-	return 1;
-}
-
-static void find(struct bus *bus, size_t pos)
-{
-	uint8_t address[2] = { 0 };
-	struct access access = { .cmd = ECAT_CMD_APRD,
-				 .adp = auto_increment_address(bus, pos),
-				 .reg = ESC_REG_STATION_ADDRESS,
-				 .len = sizeof(address),
-				 .data = address };
-
-	if (!is_place_certain(bus, pos) || registers_run(bus, &access, 1) < 0 || access.wkc == 0 ||
-	    get_le16(address) != 0) {
-		return;
-	}
-	/* It lost its address: power was off. */
-	put_le16(address, bus->slave[pos].info.station_addr);
-	access.cmd = ECAT_CMD_APWR;
-	if (registers_run(bus, &access, 1) >= 0 && access.wkc > 0) {
-		bus->soem_slave[soem_index(pos)].eep_pdi = 0;
-		error_counters_restart(&bus->slave[pos].errors);
-		enter(bus, pos, RECOVERY_IDENTIFY);
+	if (register_write(bus, pos, ESC_REG_AL_CONTROL, word, sizeof(word)) == 0) {
+		bus->slave[pos].accepted = (enum al_state)(control & AL_STATE_MASK);
 	}
 }
 
-static uint32_t read_sii_word(struct bus *bus, size_t pos, uint16_t word)
+/* --- failures --- */
+
+/* No repetition cures these: configuration or EEPROM. */
+static int needs_a_person(uint16_t code)
 {
-	return (uint32_t)ecx_readeepromFP(&bus->context, bus->slave[pos].info.station_addr, word,
-					  EEPROM_TIMEOUT_US);
+	return code == AL_CODE_INVALID_DC_SYNC_CONFIG || code == AL_CODE_DC_INVALID_SYNC_CYCLE ||
+	       code == AL_CODE_EEPROM_NO_ACCESS || code == AL_CODE_EEPROM_ERROR;
 }
 
-static void identify(struct bus *bus, size_t pos, const struct bus_emit *emit)
+static void emit_alarm(struct bus *bus, size_t pos, const struct bus_emit *emit)
+{
+	const struct bus_slave *sl = &bus->slave[pos];
+
+	bus_emit_event(bus, emit,
+		       (struct event){ .id = EVENT_SLAVE_ALARM,
+				       .slave_pos = (uint16_t)pos,
+				       .arg = { sl->al_status, (int32_t)sl->attempts },
+				       .value = sl->trouble_code });
+}
+
+/* One attempt has failed, with AL status @code or 0: pause, or give up. */
+static void fail(struct bus *bus, size_t pos, enum recovery_step resume, uint16_t code,
+		 const struct bus_emit *emit)
 {
 	struct bus_slave *sl = &bus->slave[pos];
-	uint32_t vendor = read_sii_word(bus, pos, SII_WORD_VENDOR);
-	uint32_t product = read_sii_word(bus, pos, SII_WORD_PRODUCT);
-	const uint8_t none[2] = { 0, 0 };
+	int64_t pause_s = sl->attempts < 5 ? INT64_C(1) << sl->attempts : PAUSE_MAX_S;
 
-	if (vendor == sl->info.vendor && product == sl->info.product) {
-		sl->is_lost = 0;
-		sl->misses = 0;
-		sl->is_clock_set = 0;
-		bus_emit_event(
-			bus, emit,
-			(struct event){ .id = EVENT_SLAVE_BACK, .slave_pos = (uint16_t)pos });
-		enter(bus, pos, RECOVERY_INIT);
-		return;
+	sl->trouble_step = sl->step;
+	sl->trouble_code = code;
+	sl->attempts++;
+	sl->retry_at = mono_add(bus_now(bus), (span_t){ pause_s * NS_PER_S });
+	sl->is_latched = needs_a_person(code) || sl->attempts >= bus->cfg->bus_recovery_attempts;
+	if (sl->is_latched) {
+		emit_alarm(bus, pos, emit);
 	}
-	/* Its EEPROM may still be loading; at the deadline a slave that is not identified loses the
-	 * address again. */
-	if (bus_now(bus).ns >= sl->step_deadline.ns) {
-		register_write(bus, pos, ESC_REG_STATION_ADDRESS, none, sizeof(none));
-		enter(bus, pos, RECOVERY_FIND);
-	}
+	enter_at(bus, pos, resume, sl->retry_at);
 }
 
 /* --- states --- */
@@ -146,29 +169,33 @@ static void program_mailbox(struct bus *bus, size_t pos)
 	ecx_eeprom2pdi(&bus->context, soem_index(pos));
 }
 
-static void to_init(struct bus *bus, size_t pos)
+static enum progress to_init(struct bus *bus, size_t pos)
 {
 	if (state_of(&bus->slave[pos]) != AL_INIT || has_error(&bus->slave[pos])) {
 		ask(bus, pos, AL_INIT | AL_ERROR);
-		return;
+		return WAIT;
 	}
 	program_mailbox(bus, pos);
-	ask(bus, pos, AL_PREOP);
-	enter(bus, pos, RECOVERY_PREOP);
+	return DONE;
 }
 
-/* Request @state until the slave is in it, then continue with @next. */
-static void to_state(struct bus *bus, size_t pos, enum al_state state, enum recovery_step next)
+/* An accepted request is not repeated: a slave may need seconds for it. */
+static enum progress to_state(struct bus *bus, size_t pos)
 {
 	const struct bus_slave *sl = &bus->slave[pos];
+	enum al_state state = steps[sl->step].state;
 
 	if (has_error(sl)) {
+		if (sl->accepted == state) {
+			return FAILED;
+		}
 		ask(bus, pos, (unsigned)state_of(sl) | AL_ERROR);
 	} else if (state_of(sl) == state) {
-		enter(bus, pos, next);
-	} else {
+		return DONE;
+	} else if (sl->accepted != state) {
 		ask(bus, pos, state);
 	}
+	return WAIT;
 }
 
 static int has_clock(const struct bus *bus, size_t pos)
@@ -181,13 +208,17 @@ static int needs_clock(const struct bus *bus, size_t pos)
 	return has_clock(bus, pos) && !bus->slave[pos].is_clock_set;
 }
 
-static void set_up(struct bus *bus, size_t pos)
+static enum progress set_up(struct bus *bus, size_t pos)
 {
-	if (bus_startup_sdos(bus, pos) < 0 || bus_restore_mapping(bus, pos) < 0) {
-		start_over(bus, pos);
-		return;
+	int r = bus_startup_poll(bus, pos);
+
+	if (r == 0) {
+		r = bus_restore_mapping(bus, pos);
 	}
-	enter(bus, pos, needs_clock(bus, pos) ? RECOVERY_CLOCK : RECOVERY_SAFEOP);
+	if (r < 0) {
+		return FAILED;
+	}
+	return r > 0 ? WAIT : DONE;
 }
 
 /* --- clock --- */
@@ -216,28 +247,51 @@ static int is_clock_near(struct bus *bus, size_t pos)
 	return diff_ns >= 0 && diff_ns <= bus->cfg->dc_diff_limit_ns;
 }
 
+static enum progress set_clock(struct bus *bus, size_t pos)
+{
+	if (is_follower(bus, pos) && !is_reference_set(bus)) {
+		/* Not this slave's fault: its time begins when the reference is there. */
+		enter(bus, pos, RECOVERY_CLOCK);
+		return WAIT;
+	}
+	bus->slave[pos].good_looks = 0;
+	return bus_clock_restore(bus, pos) >= 0 ? DONE : WAIT;
+}
+
 /* Near once may be in passing: clocks that settle swing. */
-static void settle(struct bus *bus, size_t pos)
+static enum progress settle(struct bus *bus, size_t pos)
 {
 	struct bus_slave *sl = &bus->slave[pos];
 
 	sl->good_looks = is_clock_near(bus, pos) ? sl->good_looks + 1 : 0;
 	if (sl->good_looks < GOOD_LOOKS && is_follower(bus, pos)) {
+		return WAIT;
+	}
+	return bus_sync0_restore(bus, pos) >= 0 ? DONE : WAIT;
+}
+
+static enum progress wait_sync0(struct bus *bus, size_t pos)
+{
+	return !bus_sync0_is_wanted(bus, pos) || bus_sync0_is_running(bus, pos) == 1 ? DONE : WAIT;
+}
+
+/* --- where the way begins --- */
+
+static void choose_with_clock(struct bus *bus, size_t pos)
+{
+	if (is_follower(bus, pos) && !is_reference_set(bus)) {
 		return;
 	}
-	if (bus_sync0_restore(bus, pos) >= 0) {
-		enter(bus, pos, RECOVERY_SYNC0);
+	if (needs_clock(bus, pos) || !is_clock_near(bus, pos)) {
+		enter(bus, pos, RECOVERY_CLOCK);
+	} else if (bus_sync0_is_wanted(bus, pos) && bus_sync0_is_running(bus, pos) == 0) {
+		enter(bus, pos, RECOVERY_SETTLE);
+	} else {
+		enter(bus, pos, state_of(&bus->slave[pos]) == AL_OP ? RECOVERY_NONE : RECOVERY_OP);
 	}
 }
 
-static void wait_sync0(struct bus *bus, size_t pos)
-{
-	if (!bus_sync0_is_wanted(bus, pos) || bus_sync0_is_running(bus, pos) == 1) {
-		enter(bus, pos, RECOVERY_SAFEOP);
-	}
-}
-
-/* A slave that answers but is not in OP: where does its way begin? */
+/* A slave that answers but is not in OP. */
 static void choose_way(struct bus *bus, size_t pos)
 {
 	struct bus_slave *sl = &bus->slave[pos];
@@ -249,16 +303,7 @@ static void choose_way(struct bus *bus, size_t pos)
 	switch (state_of(sl)) {
 	case AL_OP:
 	case AL_SAFEOP:
-		if (is_follower(bus, pos) && !is_reference_set(bus)) {
-			return;
-		}
-		if (needs_clock(bus, pos) || !is_clock_near(bus, pos)) {
-			enter(bus, pos, RECOVERY_CLOCK);
-		} else if (bus_sync0_is_wanted(bus, pos) && bus_sync0_is_running(bus, pos) == 0) {
-			enter(bus, pos, RECOVERY_SETTLE);
-		} else {
-			enter(bus, pos, state_of(sl) == AL_OP ? RECOVERY_NONE : RECOVERY_OP);
-		}
+		choose_with_clock(bus, pos);
 		return;
 	case AL_PREOP:
 		enter(bus, pos, RECOVERY_SETUP);
@@ -266,74 +311,152 @@ static void choose_way(struct bus *bus, size_t pos)
 	case AL_NONE:
 	case AL_INIT:
 	case AL_BOOT:
-		enter(bus, pos, RECOVERY_INIT);
+		break;
+	}
+	enter(bus, pos, RECOVERY_INIT); /* also from a number that is no state */
+}
+
+/* The first fall is followed at once; another one before it was stable has the same cause. */
+static void note_fall(struct bus *bus, size_t pos, const struct bus_emit *emit)
+{
+	struct bus_slave *sl = &bus->slave[pos];
+
+	if (has_error(sl) && (needs_a_person(sl->al_code) || sl->is_unstable)) {
+		fail(bus, pos, RECOVERY_BACK, sl->al_code, emit);
 		return;
+	}
+	sl->is_unstable |= has_error(sl);
+	sl->trouble_step = RECOVERY_NONE;
+	sl->trouble_code = has_error(sl) ? sl->al_code : 0;
+	sl->step = RECOVERY_BACK;
+}
+
+/* --- public --- */
+
+void bus_recover_settled(struct bus *bus, size_t pos)
+{
+	struct bus_slave *sl = &bus->slave[pos];
+
+	if (!sl->is_unstable && sl->attempts == 0) {
+		return;
+	}
+	if (sl->op_since.ns == 0) {
+		sl->op_since = bus_now(bus);
+	} else if (mono_sub(bus_now(bus), sl->op_since).ns > STABLE_NS) {
+		bus_recover_forget(sl);
 	}
 }
 
-static void set_clock(struct bus *bus, size_t pos)
+void bus_recover_forget(struct bus_slave *sl)
 {
-	if (is_follower(bus, pos) && !is_reference_set(bus)) {
-		return;
-	}
-	if (bus_clock_restore(bus, pos) >= 0) {
-		bus->slave[pos].good_looks = 0;
-		enter(bus, pos, RECOVERY_SETTLE);
+	sl->attempts = 0;
+	sl->is_unstable = 0;
+	sl->is_latched = 0;
+	sl->trouble_code = 0;
+	sl->retry_at = (mono_t){ 0 };
+}
+
+void bus_recover_restart(struct bus *bus, size_t pos)
+{
+	bus_recover_forget(&bus->slave[pos]);
+	enter(bus, pos, RECOVERY_INIT);
+}
+
+void bus_clear_alarms(struct bus *bus)
+{
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		bus_recover_forget(&bus->slave[i]);
 	}
 }
 
-static int is_overdue(const struct bus *bus, const struct bus_slave *sl)
+static enum recovery_step next_step(const struct bus *bus, size_t pos)
 {
-	return sl->step != RECOVERY_NONE && sl->step != RECOVERY_BACK &&
-	       sl->step != RECOVERY_FIND && sl->step != RECOVERY_IDENTIFY &&
-	       bus_now(bus).ns >= sl->step_deadline.ns;
+	enum recovery_step step = bus->slave[pos].step;
+
+	return step == RECOVERY_SETUP && !needs_clock(bus, pos) ? RECOVERY_SAFEOP
+								: steps[step].next;
 }
 
 void bus_recover(struct bus *bus, size_t pos, const struct bus_emit *emit)
 {
 	struct bus_slave *sl = &bus->slave[pos];
 
-	if (bus_now(bus).ns < sl->retry_at.ns) {
+	sl->op_since = (mono_t){ 0 };
+	if (sl->is_lost || sl->is_latched || bus_now(bus).ns < sl->retry_at.ns) {
 		return;
 	}
-	if (is_overdue(bus, sl)) {
-		start_over(bus, pos);
-		return;
+	if (sl->step == RECOVERY_NONE) {
+		note_fall(bus, pos, emit);
+		if (sl->is_latched || bus_now(bus).ns < sl->retry_at.ns) {
+			return;
+		}
 	}
-	switch (sl->step) {
-	case RECOVERY_NONE:
-	case RECOVERY_BACK:
+	if (sl->step == RECOVERY_BACK) {
 		choose_way(bus, pos);
 		return;
-	case RECOVERY_FIND:
-		find(bus, pos);
-		return;
-	case RECOVERY_IDENTIFY:
-		identify(bus, pos, emit);
-		return;
-	case RECOVERY_INIT:
-		to_init(bus, pos);
-		return;
-	case RECOVERY_PREOP:
-		to_state(bus, pos, AL_PREOP, RECOVERY_SETUP);
-		return;
-	case RECOVERY_SETUP:
-		set_up(bus, pos);
-		return;
-	case RECOVERY_CLOCK:
-		set_clock(bus, pos);
-		return;
-	case RECOVERY_SETTLE:
-		settle(bus, pos);
-		return;
-	case RECOVERY_SYNC0:
-		wait_sync0(bus, pos);
-		return;
-	case RECOVERY_SAFEOP:
-		to_state(bus, pos, AL_SAFEOP, RECOVERY_OP);
-		return;
-	case RECOVERY_OP:
-		to_state(bus, pos, AL_OP, RECOVERY_NONE);
+	}
+	while (sl->step > RECOVERY_BACK) {
+		enum progress progress = steps[sl->step].act(bus, pos);
+
+		if (progress == FAILED) {
+			fail(bus, pos, RECOVERY_BACK, has_error(sl) ? sl->al_code : 0, emit);
+			return;
+		}
+		if (progress == WAIT) {
+			if (bus_now(bus).ns >= sl->step_deadline.ns) {
+				fail(bus, pos, RECOVERY_INIT, 0, emit);
+			}
+			return;
+		}
+		enter(bus, pos, next_step(bus, pos));
+	}
+}
+
+/* --- in words --- */
+
+static void describe_attempts(const struct bus *bus, const struct bus_slave *sl, char *text,
+			      size_t text_bytes)
+{
+	int64_t wait_ns = mono_sub(sl->retry_at, bus_now(bus)).ns;
+
+	text[0] = '\0';
+	if (sl->is_latched) {
+		snprintf(text, text_bytes, "; not tried again: clear the alarm (ecdaq clear)");
+	} else if (wait_ns > 0) {
+		snprintf(text, text_bytes, "; attempt %u of %u in %lld s", sl->attempts + 1,
+			 bus->cfg->bus_recovery_attempts,
+			 (long long)((wait_ns + NS_PER_S - 1) / NS_PER_S));
+	}
+}
+
+static enum al_state wanted_state(const struct bus_slave *sl)
+{
+	enum recovery_step step = sl->trouble_step > RECOVERY_BACK ? sl->trouble_step : sl->step;
+
+	return step > RECOVERY_BACK && steps[step].state != AL_NONE ? steps[step].state : AL_OP;
+}
+
+void bus_recover_describe(const struct bus *bus, size_t pos, char *ret_text, size_t text_bytes)
+{
+	const struct bus_slave *sl = &bus->slave[pos];
+	char why[128];
+	char attempts[64];
+
+	ret_text[0] = '\0';
+	if (sl->is_lost) {
+		snprintf(ret_text, text_bytes, "slave %zu (%s): does not answer", pos,
+			 sl->info.name);
 		return;
 	}
+	if (sl->trouble_code != 0) {
+		bus_describe_refusal(sl->al_status, sl->trouble_code, wanted_state(sl), why,
+				     sizeof(why));
+	} else {
+		snprintf(why, sizeof(why), "is in %s%s", bus_al_name(sl->al_status),
+			 sl->attempts > 0 && sl->trouble_step != RECOVERY_NONE
+				 ? " and did not arrive in time"
+				 : "");
+	}
+	describe_attempts(bus, sl, attempts, sizeof(attempts));
+	snprintf(ret_text, text_bytes, "slave %zu (%s): %s%s", pos, sl->info.name, why, attempts);
 }

@@ -16,6 +16,12 @@ static int is_reading(enum ecat_cmd cmd)
 	       cmd != ECAT_CMD_LWR && cmd != ECAT_CMD_NOP;
 }
 
+/* One slave answers to an address; what several OR together is no data. */
+static int is_single(enum ecat_cmd cmd)
+{
+	return cmd == ECAT_CMD_APRD || cmd == ECAT_CMD_FPRD;
+}
+
 /* As many of @access as fit into one frame. Returns how many. */
 static size_t pack(struct ecat_frame_builder *fb, uint8_t *buf, const struct access *access,
 		   size_t count, uint8_t idx)
@@ -44,7 +50,8 @@ static void unpack(uint8_t *frame, size_t len, struct access *access, size_t cou
 
 	for (size_t n = 0; n < count && ecat_frame_next(frame, len, &pos, &dg) == 1; n++) {
 		access[n].wkc = get_le16(dg.wkc);
-		if (access[n].wkc > 0 && access[n].data != NULL && is_reading(access[n].cmd)) {
+		if (access[n].wkc > 0 && (access[n].wkc == 1 || !is_single(access[n].cmd)) &&
+		    access[n].data != NULL && is_reading(access[n].cmd)) {
 			memcpy(access[n].data, dg.data, access[n].len);
 		}
 	}
@@ -86,7 +93,10 @@ static int run_one(struct bus *bus, struct access *access)
 	if (r < 0) {
 		return -EIO;
 	}
-	return access->wkc > 0 ? 0 : -ENXIO;
+	if (access->wkc > 1) {
+		return -EBADMSG;
+	}
+	return access->wkc == 1 ? 0 : -ENXIO;
 }
 
 int register_read(struct bus *bus, size_t pos, uint16_t reg, void *ret_data, uint16_t len)

@@ -19,14 +19,16 @@ struct access {
 	uint16_t adp;
 	uint16_t reg;
 	uint16_t len;
-	void *data; /* written from and, for reading commands with a WKC, read into; NULL: zeros */
-	uint16_t wkc; /* out */
+	void *data;   /* written from and, where it was read, read into; NULL: zeros */
+	uint16_t wkc; /* out; APRD and FPRD with another than 1 have read nothing: 0 nobody answers,
+			 2 it is ambiguous */
 };
 
 /** Do all accesses in order. 0, or -errno if a frame did not come back at all. */
 int registers_run(struct bus *bus, struct access *access, size_t count);
 
-/** One register of one slave. 0; -EIO no frame; -ENXIO the slave or the register does not answer.
+/** One register of one slave. 0; -EIO no frame; -ENXIO the slave or the register does not answer;
+ * -EBADMSG more than one device has this address.
  */
 int register_read(struct bus *bus, size_t pos, uint16_t reg, void *ret_data, uint16_t len);
 int register_write(struct bus *bus, size_t pos, uint16_t reg, const void *data, uint16_t len);

@@ -4,6 +4,7 @@
  * States are never compared by what a broadcast ORs together.
  */
 #include <errno.h>
+#include <stdio.h>
 
 #include "base/bytes.h"
 #include "bus/bus_internal.h"
@@ -52,7 +53,7 @@ static int write_control(struct bus *bus, enum al_state state, uint8_t *taken)
 	}
 	r = registers_run(bus, access, count);
 	for (size_t i = 0; i < count && r >= 0; i++) {
-		taken[pos[i]] = access[i].wkc > 0;
+		taken[pos[i]] = access[i].wkc == 1;
 	}
 	return r;
 }
@@ -72,7 +73,7 @@ static int read_states(struct bus *bus, struct al_reading *al)
 	r = registers_run(bus, access, bus->slave_count);
 	for (size_t i = 0; i < bus->slave_count; i++) {
 		al[i].wkc = r < 0 ? 0 : access[i].wkc;
-		if (al[i].wkc > 0) {
+		if (al[i].wkc == 1) {
 			bus->slave[i].al_status = status_of(&al[i]);
 		}
 	}
@@ -81,12 +82,12 @@ static int read_states(struct bus *bus, struct al_reading *al)
 
 static int is_in(const struct al_reading *al, enum al_state state)
 {
-	return al->wkc > 0 && (status_of(al) & (AL_STATE_MASK | AL_ERROR)) == (uint16_t)state;
+	return al->wkc == 1 && (status_of(al) & (AL_STATE_MASK | AL_ERROR)) == (uint16_t)state;
 }
 
 static int has_error(const struct al_reading *al)
 {
-	return al->wkc > 0 && (status_of(al) & AL_ERROR) != 0;
+	return al->wkc == 1 && (status_of(al) & AL_ERROR) != 0;
 }
 
 /* The first slave that refuses, else the first that is not there yet. -1: all are in @state. */
@@ -105,21 +106,48 @@ static int find_culprit(const struct bus *bus, const struct al_reading *al, enum
 	return behind;
 }
 
+const char *bus_al_name(uint16_t al_status)
+{
+	switch (al_status & AL_STATE_MASK) {
+	case AL_INIT:
+	case AL_PREOP:
+	case AL_BOOT:
+	case AL_SAFEOP:
+	case AL_OP:
+		return al_state_to_str(al_status);
+	default:
+		return "an AL state that does not exist";
+	}
+}
+
+void bus_describe_refusal(uint16_t al_status, uint16_t code, enum al_state wanted, char *ret_text,
+			  size_t text_bytes)
+{
+	snprintf(ret_text, text_bytes, "refuses %s and is in %s: AL status code 0x%04x, %s",
+		 al_state_to_str((uint16_t)wanted), bus_al_name(al_status), code,
+		 al_status_code_to_str(code));
+}
+
 static int say_why(struct bus *bus, size_t pos, const struct al_reading *al, enum al_state state)
 {
+	char why[128];
+
 	const char *wanted = al_state_to_str((uint16_t)state);
 
 	if (al->wkc == 0) {
 		return bus_fail_slave(bus, pos, -EIO, "does not answer on the way to %s", wanted);
 	}
+	if (al->wkc > 1) {
+		return bus_fail_slave(bus, pos, -EIO,
+				      "%u devices have its station address 0x%04x on the way to %s",
+				      al->wkc, bus->slave[pos].info.station_addr, wanted);
+	}
 	if (has_error(al)) {
-		return bus_fail_slave(bus, pos, -ETIME,
-				      "refuses %s and is in %s: AL status code 0x%04x, %s", wanted,
-				      al_state_to_str(status_of(al)), code_of(al),
-				      al_status_code_to_str(code_of(al)));
+		bus_describe_refusal(status_of(al), code_of(al), state, why, sizeof(why));
+		return bus_fail_slave(bus, pos, -ETIME, "%s", why);
 	}
 	return bus_fail_slave(bus, pos, -ETIME, "did not reach %s in time and is in %s", wanted,
-			      al_state_to_str(status_of(al)));
+			      bus_al_name(status_of(al)));
 }
 
 static void poll_pause(struct bus *bus)

@@ -12,59 +12,108 @@ enum {
 	MISSES_LOST = 2,
 	RECOVERIES_PER_CALL = 8,
 	DIFF_MAGNITUDE = 0x7fffffff,
-	LOOKS = 5, /* registers read of one slave */
+	DETAILS = 4,            /* registers read of one slave beside its AL status */
+	DETAILED_PER_CALL = 12, /* slaves, about one frame: the others have their turn later */
 	SM_MAILBOX_IN = ESC_REG_SM + ESC_SM_BYTES,
 	SM_STATUS = 5,
 	SM_STATUS_FULL = 0x08,
 };
 
+enum { LOOK_ERRORS, LOOK_LOST_LINKS, LOOK_DIFF, LOOK_MAILBOX };
+
 struct look {
 	uint8_t al[6];
+	uint16_t al_wkc;
 	uint8_t errors[ERROR_PORT_BYTES];
 	uint8_t lost_links[ERROR_LINK_BYTES];
 	uint8_t diff[4];
 	uint8_t mailbox;
-	uint16_t wkc[LOOKS];
+	uint8_t is_detailed;
+	uint16_t wkc[DETAILS];
 };
 
-enum { LOOK_AL, LOOK_ERRORS, LOOK_LOST_LINKS, LOOK_DIFF, LOOK_MAILBOX };
-
-static int look_at_all(struct bus *bus, struct look *look)
+/* AL status of each slave, and how many devices there are at all. */
+static int read_states(struct bus *bus, struct look *look, unsigned *ret_answering)
 {
-	struct access access[LIMIT_SLAVES * LOOKS];
-	size_t n = 0;
+	struct access access[LIMIT_SLAVES + 1];
+	uint8_t any[2];
 	int r;
 
+	access[0] = (struct access){
+		.cmd = ECAT_CMD_BRD, .reg = ESC_REG_AL_STATUS, .len = sizeof(any), .data = any
+	};
 	for (size_t i = 0; i < bus->slave_count; i++) {
-		const struct {
-			uint16_t reg;
-			uint16_t len;
-			void *data;
-		} part[LOOKS] = {
-			[LOOK_AL] = { ESC_REG_AL_STATUS, sizeof(look->al), look[i].al },
-			[LOOK_ERRORS] = { ESC_REG_RX_ERROR_COUNTER, sizeof(look->errors),
-					  look[i].errors },
-			[LOOK_LOST_LINKS] = { ESC_REG_LOST_LINK_COUNTER, sizeof(look->lost_links),
-					      look[i].lost_links },
-			[LOOK_DIFF] = { ESC_REG_DC_SYSTEM_TIME_DIFF, sizeof(look->diff),
-					look[i].diff },
-			[LOOK_MAILBOX] = { SM_MAILBOX_IN + SM_STATUS, sizeof(look->mailbox),
-					   &look[i].mailbox },
-		};
-
-		for (int k = 0; k < LOOKS; k++) {
-			access[n++] = (struct access){ .cmd = ECAT_CMD_FPRD,
-						       .adp = bus->slave[i].info.station_addr,
-						       .reg = part[k].reg,
-						       .len = part[k].len,
-						       .data = part[k].data };
-		}
+		access[i + 1] = (struct access){ .cmd = ECAT_CMD_FPRD,
+						 .adp = bus->slave[i].info.station_addr,
+						 .reg = ESC_REG_AL_STATUS,
+						 .len = sizeof(look[i].al),
+						 .data = look[i].al };
 	}
-	r = registers_run(bus, access, n);
-	for (size_t i = 0; i < n; i++) {
-		look[i / LOOKS].wkc[i % LOOKS] = access[i].wkc;
+	r = registers_run(bus, access, bus->slave_count + 1);
+	for (size_t i = 0; i < bus->slave_count && r >= 0; i++) {
+		look[i].al_wkc = access[i + 1].wkc;
 	}
+	*ret_answering = r < 0 ? 0 : access[0].wkc;
 	return r;
+}
+
+static size_t add_details(struct bus *bus, size_t pos, struct look *look, struct access *access)
+{
+	const struct {
+		uint16_t reg;
+		uint16_t len;
+		void *data;
+	} part[DETAILS] = {
+		[LOOK_ERRORS] = { ESC_REG_RX_ERROR_COUNTER, sizeof(look->errors), look->errors },
+		[LOOK_LOST_LINKS] = { ESC_REG_LOST_LINK_COUNTER, sizeof(look->lost_links),
+				      look->lost_links },
+		[LOOK_DIFF] = { ESC_REG_DC_SYSTEM_TIME_DIFF, sizeof(look->diff), look->diff },
+		[LOOK_MAILBOX] = { SM_MAILBOX_IN + SM_STATUS, sizeof(look->mailbox),
+				   &look->mailbox },
+	};
+
+	for (int k = 0; k < DETAILS; k++) {
+		access[k] = (struct access){ .cmd = ECAT_CMD_FPRD,
+					     .adp = bus->slave[pos].info.station_addr,
+					     .reg = part[k].reg,
+					     .len = part[k].len,
+					     .data = part[k].data };
+	}
+	return DETAILS;
+}
+
+/* Error counters, clock and mailbox of the slaves whose turn it is. */
+static void read_details(struct bus *bus, struct look *look)
+{
+	struct access access[DETAILED_PER_CALL * DETAILS];
+	size_t first = bus->next_detailed;
+	size_t slaves = bus->slave_count < DETAILED_PER_CALL ? bus->slave_count : DETAILED_PER_CALL;
+	size_t n = 0;
+
+	for (size_t i = 0; i < slaves; i++) {
+		size_t pos = (first + i) % bus->slave_count;
+
+		n += add_details(bus, pos, &look[pos], access + n);
+	}
+	if (n == 0 || registers_run(bus, access, n) < 0) {
+		return;
+	}
+	for (size_t i = 0; i < n; i++) {
+		size_t pos = (first + i / DETAILS) % bus->slave_count;
+
+		look[pos].wkc[i % DETAILS] = access[i].wkc;
+		look[pos].is_detailed = 1;
+	}
+	bus->next_detailed = (first + slaves) % bus->slave_count;
+}
+
+/* While a slave that failed before is tried again, only what is new about it is an event. */
+static int is_worth_an_event(const struct bus_slave *sl, uint16_t status, uint16_t code)
+{
+	if ((sl->attempts == 0 && !sl->is_unstable) || (status & AL_STATE_MASK) == AL_OP) {
+		return status != sl->al_status;
+	}
+	return (status & AL_ERROR) != 0 && code != sl->trouble_code && code != sl->al_code;
 }
 
 static void note_state(struct bus *bus, size_t pos, const struct look *look,
@@ -72,38 +121,29 @@ static void note_state(struct bus *bus, size_t pos, const struct look *look,
 {
 	struct bus_slave *sl = &bus->slave[pos];
 	uint16_t status = get_le16(look->al);
+	uint16_t code = get_le16(look->al + 4);
 
-	if (status != sl->al_status) {
+	if (is_worth_an_event(sl, status, code)) {
 		bus_emit_event(bus, emit,
 			       (struct event){ .id = EVENT_SLAVE_STATE,
 					       .slave_pos = (uint16_t)pos,
 					       .arg = { sl->al_status, status },
-					       .value = get_le16(look->al + 4) });
+					       .value = code });
 	}
 	sl->al_status = status;
+	sl->al_code = code;
 }
 
-static void note_presence(struct bus *bus, size_t pos, int is_here, const struct bus_emit *emit)
+/* A slave that was lost is back when its place is known (bus/places.c), not when something answers
+ * to its address. */
+static void note_absence(struct bus *bus, size_t pos, const struct bus_emit *emit)
 {
 	struct bus_slave *sl = &bus->slave[pos];
 
-	if (is_here) {
-		sl->misses = 0;
-		/* A slave that has just got its address again does not count as back until it is
-		 * identified. */
-		if (sl->is_lost && sl->step != RECOVERY_IDENTIFY) {
-			sl->is_lost = 0;
-			sl->step = RECOVERY_BACK;
-			bus_emit_event(bus, emit,
-				       (struct event){ .id = EVENT_SLAVE_BACK,
-						       .slave_pos = (uint16_t)pos });
-		}
-		return;
-	}
 	sl->misses++;
 	if (!sl->is_lost && sl->misses >= MISSES_LOST) {
 		sl->is_lost = 1;
-		sl->step = RECOVERY_FIND;
+		sl->step = RECOVERY_BACK;
 		bus_emit_event(
 			bus, emit,
 			(struct event){ .id = EVENT_SLAVE_LOST, .slave_pos = (uint16_t)pos });
@@ -133,11 +173,11 @@ static void clear_errors(struct bus *bus, size_t pos)
 	if (registers_run(bus, access, sizeof(access) / sizeof(access[0])) < 0) {
 		return; /* the next look sees what has become of them */
 	}
-	if (access[0].wkc > 0 && second[0].wkc > 0) {
+	if (access[0].wkc == 1 && second[0].wkc == 1) {
 		error_counters_take(ec, 0, read[0], ERROR_PORT_BYTES);
 		error_counters_take(ec, 0, read[1], ERROR_PORT_BYTES);
 	}
-	if (access[1].wkc > 0 && second[1].wkc > 0) {
+	if (access[1].wkc == 1 && second[1].wkc == 1) {
 		error_counters_take(ec, ERROR_LINKS, read[0] + ERROR_LINKS, ERROR_LINK_BYTES);
 		error_counters_take(ec, ERROR_LINKS, read[1] + ERROR_LINKS, ERROR_LINK_BYTES);
 	}
@@ -148,13 +188,10 @@ static void count_errors(struct bus *bus, size_t pos, const struct look *look)
 	struct bus_slave *sl = &bus->slave[pos];
 	int wants_clear = 0;
 
-	if (sl->step == RECOVERY_IDENTIFY) {
-		return; /* it may be another's */
-	}
-	if (look->wkc[LOOK_ERRORS] > 0) {
+	if (look->wkc[LOOK_ERRORS] == 1) {
 		wants_clear = error_counters_take(&sl->errors, 0, look->errors, ERROR_PORT_BYTES);
 	}
-	if (look->wkc[LOOK_LOST_LINKS] > 0) {
+	if (look->wkc[LOOK_LOST_LINKS] == 1) {
 		wants_clear |= error_counters_take(&sl->errors, ERROR_LINKS, look->lost_links,
 						   ERROR_LINK_BYTES);
 	}
@@ -168,7 +205,7 @@ static int has_mail(const struct bus *bus, size_t pos, const struct look *look)
 {
 	const struct bus_slave *sl = &bus->slave[pos];
 
-	return look->wkc[LOOK_MAILBOX] > 0 && (look->mailbox & SM_STATUS_FULL) != 0 &&
+	return look->wkc[LOOK_MAILBOX] == 1 && (look->mailbox & SM_STATUS_FULL) != 0 &&
 	       !sl->is_lost && sl->step == RECOVERY_NONE && bus_has_coe(bus, pos);
 }
 
@@ -186,7 +223,7 @@ static void show_sync(const struct bus_slave *sl, struct slave_status *page)
 static void show(const struct bus_slave *sl, const struct look *look, struct slave_status *page)
 {
 	atomic_store_explicit(&page->is_lost, (uint32_t)sl->is_lost, memory_order_relaxed);
-	if (look->wkc[LOOK_AL] > 0) {
+	if (look->al_wkc == 1 && !sl->is_lost) {
 		atomic_store_explicit(&page->al_state,
 				      get_le16(look->al) & (AL_STATE_MASK | AL_ERROR),
 				      memory_order_relaxed);
@@ -197,10 +234,13 @@ static void show(const struct bus_slave *sl, const struct look *look, struct sla
 	}
 	error_counters_show(&sl->errors, page);
 	show_sync(sl, page);
-	atomic_store_explicit(
-		&page->dc_diff_ns,
-		look->wkc[LOOK_DIFF] > 0 ? (int32_t)(get_le32(look->diff) & DIFF_MAGNITUDE) : -1,
-		memory_order_relaxed);
+	if (look->is_detailed) {
+		atomic_store_explicit(&page->dc_diff_ns,
+				      look->wkc[LOOK_DIFF] == 1
+					      ? (int32_t)(get_le32(look->diff) & DIFF_MAGNITUDE)
+					      : -1,
+				      memory_order_relaxed);
+	}
 }
 
 /* A slave about to be restarted through INIT does not count as in OP, though its AL status shows
@@ -229,7 +269,9 @@ void bus_lead_back(struct bus *bus, void (*emit)(void *ctx, const struct event *
 		size_t pos = (bus->next_recovery + n) % bus->slave_count;
 		struct bus_slave *sl = &bus->slave[pos];
 
-		if ((!is_in_op(sl) && sl->misses == 0) || sl->step != RECOVERY_NONE) {
+		if (is_in_op(sl) && sl->step == RECOVERY_NONE) {
+			bus_recover_settled(bus, pos);
+		} else if (!sl->is_lost && (sl->misses == 0 || sl->step != RECOVERY_NONE)) {
 			bus_recover(bus, pos, &out);
 			steps++;
 		}
@@ -238,29 +280,67 @@ void bus_lead_back(struct bus *bus, void (*emit)(void *ctx, const struct event *
 	bus->is_looking = 0;
 }
 
+/* What was read of one slave. If its address answers twice, nothing is known of it in this poll. */
+static void take_look(struct bus *bus, size_t pos, const struct look *look,
+		      const struct bus_emit *emit)
+{
+	if (look->al_wkc == 0) {
+		note_absence(bus, pos, emit);
+	}
+	if (look->al_wkc == 1 && !bus->slave[pos].is_lost) {
+		bus->slave[pos].misses = 0;
+		note_state(bus, pos, look, emit);
+		count_errors(bus, pos, look);
+	}
+	if (has_mail(bus, pos, look)) {
+		bus_read_mail(bus, pos);
+	}
+}
+
+static void make_report(const struct bus *bus, struct bus_watch_report *ret_report)
+{
+	*ret_report = (struct bus_watch_report){ .strangers = bus_guests_known(bus) };
+	bus_guests_describe(bus, ret_report->trouble, sizeof(ret_report->trouble));
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		const struct bus_slave *sl = &bus->slave[i];
+
+		ret_report->slaves_lost += sl->is_lost ? 1 : 0;
+		if (is_in_op(sl)) {
+			ret_report->slaves_op++;
+			slave_set_add(&ret_report->in_op, (unsigned)i);
+		} else if (ret_report->trouble[0] == '\0') {
+			bus_recover_describe(bus, i, ret_report->trouble,
+					     sizeof(ret_report->trouble));
+		}
+	}
+	ret_report->is_reference_op =
+		bus->plan.dc_reference == 0 || is_in_op(&bus->slave[bus->reference]);
+	ret_report->is_all_op = ret_report->slaves_op == bus->slave_count;
+}
+
 int bus_watch(struct bus *bus, struct status_page *page,
 	      void (*emit)(void *ctx, const struct event *ev), void *emit_ctx,
 	      struct bus_watch_report *ret_report)
 {
 	const struct bus_emit out = { .call = emit, .ctx = emit_ctx };
 	struct look look[LIMIT_SLAVES] = { 0 };
+	unsigned answering;
+	int is_doubtful = 0;
 	int64_t time_ns;
 	int r;
 
 	bus->error = NULL;
 	bus->is_looking = 1;
-	r = look_at_all(bus, look);
+	r = read_states(bus, look, &answering);
 	for (size_t i = 0; i < bus->slave_count; i++) {
-		int is_here = look[i].wkc[LOOK_AL] > 0;
-
-		note_presence(bus, i, is_here, &out);
-		if (is_here) {
-			note_state(bus, i, &look[i], &out);
-			count_errors(bus, i, &look[i]);
-		}
-		if (has_mail(bus, i, &look[i])) {
-			bus_read_mail(bus, i);
-		}
+		is_doubtful |= look[i].al_wkc > 1;
+	}
+	if (r >= 0) {
+		bus_places_follow(bus, answering, is_doubtful, &out);
+		read_details(bus, look);
+	}
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		take_look(bus, i, &look[i], &out);
 		if (page != NULL) {
 			show(&bus->slave[i], &look[i], &page->slave[i]);
 		}
@@ -270,16 +350,6 @@ int bus_watch(struct bus *bus, struct status_page *page,
 		bus_reference_time(bus, &time_ns);
 	}
 	bus->is_looking = 0;
-	*ret_report = (struct bus_watch_report){ 0 };
-	for (size_t i = 0; i < bus->slave_count; i++) {
-		if (is_in_op(&bus->slave[i])) {
-			ret_report->slaves_op++;
-			slave_set_add(&ret_report->in_op, (unsigned)i);
-		}
-		ret_report->slaves_lost += bus->slave[i].is_lost ? 1 : 0;
-	}
-	ret_report->is_reference_op =
-		bus->plan.dc_reference == 0 || is_in_op(&bus->slave[bus->reference]);
-	ret_report->is_all_op = ret_report->slaves_op == bus->slave_count;
+	make_report(bus, ret_report);
 	return r < 0 ? r : 0;
 }

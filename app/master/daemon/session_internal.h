@@ -44,6 +44,7 @@ struct session {
 	uint64_t doubled_seen;  /* with doubled_since: where the window began */
 	uint64_t doubled_since; /* cycles */
 	int has_reported_doubled;
+	int had_strangers;
 };
 
 /** @ev goes to the event ring, stamped with the time now. */

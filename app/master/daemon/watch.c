@@ -69,6 +69,7 @@ static void admin_clear(void *ctx)
 
 	if (s->is_riding) {
 		atomic_store_explicit(&s->clear_asked, 1, memory_order_relaxed);
+		bus_clear_alarms(s->bus);
 	}
 }
 
@@ -130,6 +131,17 @@ static void go_on_with(struct session *s, const struct slave_set *slaves)
 	cycle_phase_set(s->cycle, is_none ? CYCLE_SYNCED : CYCLE_OP);
 }
 
+/* What is wrong though all slaves are in OP: devices that are none of them. */
+static void follow_strangers(struct session *s, const struct bus_watch_report *report)
+{
+	if (report->strangers > 0) {
+		session_set_message(s, report->trouble);
+	} else if (s->had_strangers) {
+		session_set_message(s, "");
+	}
+	s->had_strangers = report->strangers > 0;
+}
+
 static void follow_bus(struct session *s, const struct bus_watch_report *report)
 {
 	uint32_t count = atomic_load_explicit(&s->run.page->slave_count, memory_order_relaxed);
@@ -151,9 +163,13 @@ static void follow_bus(struct session *s, const struct bus_watch_report *report)
 		if (s->state == BUS_OP) {
 			session_state_set(s, BUS_RECOVERING);
 		}
-		snprintf(text, sizeof(text), "bus: %u of %u slaves in OP, %u lost",
-			 report->slaves_op, count, report->slaves_lost);
+		snprintf(text, sizeof(text), "bus: %u of %u slaves in OP, %u lost%s%s",
+			 report->slaves_op, count, report->slaves_lost,
+			 report->trouble[0] != '\0' ? ": " : "", report->trouble);
 		session_set_message(s, text);
+	}
+	if (report->is_all_op && s->state == BUS_OP) {
+		follow_strangers(s, report);
 	}
 	if (report->slaves_lost < count) {
 		s->lost_since = (mono_t){ 0 };

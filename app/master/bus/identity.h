@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: MIT */
+/* What a device is by its EEPROM. Context: service thread. */
+#ifndef BUS_IDENTITY_H
+#define BUS_IDENTITY_H
+
+#include <stdint.h>
+
+struct bus;
+
+struct bus_identity {
+	uint32_t vendor; /* never 0 once read */
+	uint32_t product;
+	uint32_t revision;
+	uint32_t serial;
+	uint16_t alias;
+};
+
+/**
+ * Read it from the EEPROM of the device with station address @station. 0; -EAGAIN: busy, loading,
+ * or no single answer: try again; -EBADMSG: its checksum is wrong; -ENODATA: it is blank;
+ * -EREMOTEIO: it does not acknowledge. @ret is untouched on failure. Takes a few frames for each of
+ * three to five reads.
+ */
+int bus_identity_read(struct bus *bus, uint16_t station, struct bus_identity *ret);
+
+#endif

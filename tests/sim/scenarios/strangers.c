@@ -1,0 +1,141 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * Devices of other masters that join a bus in OP (T32): with an address that one of ours has, with
+ * the reference clock's, with none. They are isolated, named, neither configured nor believed, and
+ * when they leave, all is as before.
+ */
+#include "base/bytes.h"
+#include "harness/test.h"
+#include "sim/harness/virtual_master.h"
+#include "wire/al.h"
+#include "wire/esc_reg.h"
+
+enum { SLAVES = 3, FMMU_ACTIVE = 12 };
+
+static struct virtual_bench b;
+static struct virtual_master vm;
+static unsigned stranger;
+
+static const struct status_page *page(void)
+{
+	return session_page(vm.session);
+}
+
+static uint32_t state(void)
+{
+	return atomic_load(&page()->bus_state);
+}
+
+static struct esc *stranger_esc(void)
+{
+	return segment_esc(b.segment, stranger);
+}
+
+/* Two of three boards in OP; the one at @position is not plugged in yet. */
+static void open_without(unsigned position)
+{
+	static const char *const settings[] = { "slaves[0].name=a", "slaves[1].name=b", NULL };
+
+	stranger = position;
+	virtual_bench_init(
+		&b, &(struct virtual_spec){ .slaves = SLAVES, .seed = 5, .ppm = { 30, -40, 15 } });
+	CHECK_EQ(segment_unplug(b.segment, position, virtual_bench_now_ns(&b)), 0);
+	virtual_master_init(&vm, &b, settings);
+	virtual_master_settle(&vm);
+}
+
+static void close_all(void)
+{
+	virtual_master_kill(&vm);
+	virtual_bench_done(&b);
+}
+
+/* Its clock's offset is of another master. */
+static void plug_in(uint16_t address)
+{
+	struct esc *esc = stranger_esc();
+
+	put_le16(esc->reg + ESC_REG_STATION_ADDRESS, address);
+	put_le64(esc->reg + ESC_REG_DC_SYSTEM_TIME_OFFSET, UINT64_C(0x123456789abc));
+	CHECK_EQ(segment_plug(b.segment, stranger, virtual_bench_now_ns(&b)), 0);
+}
+
+static int was_fail_safe;
+
+static void note_fail_safe(struct virtual_master *master)
+{
+	was_fail_safe += (int)atomic_load(&session_page(master->session)->cycle.is_fail_safe);
+}
+
+static void check_isolated(uint16_t address)
+{
+	const struct esc *esc = stranger_esc();
+
+	CHECK(get_le16(esc->reg + ESC_REG_STATION_ADDRESS) != address || address == 0);
+	CHECK_EQ(esc->reg[ESC_REG_AL_STATUS] & AL_STATE_MASK, AL_INIT);
+	for (unsigned i = 0; i < 8; i++) {
+		CHECK_EQ(esc->reg[ESC_REG_FMMU + i * ESC_FMMU_BYTES + FMMU_ACTIVE] & 1, 0);
+	}
+}
+
+static void check_stranger(unsigned position, uint16_t address, const char *owner)
+{
+	int64_t offset_ns;
+
+	open_without(position);
+	virtual_master_forget(&vm);
+	was_fail_safe = 0;
+	vm.each_cycle = note_fail_safe;
+	plug_in(address);
+	CHECK_EQ(virtual_master_run(&vm, 3000), SESSION_GOES_ON);
+	printf("position %u, address 0x%04x: %d cycles fail-safe, %llu bad samples: %s\n", position,
+	       address, was_fail_safe, (unsigned long long)vm.result.bad, page()->message);
+	check_isolated(address);
+	CHECK_EQ(state(), BUS_OP);
+	CHECK(strstr(page()->message, "not configured") != NULL);
+	CHECK(strstr(page()->message, "vendor 0x00000002 product 0x04570862") != NULL);
+	if (owner != NULL) {
+		CHECK(strstr(page()->message, owner) != NULL);
+	}
+	CHECK(was_fail_safe <= 2);
+	CHECK_EQ(atomic_load(&page()->cycle.dc_unlocks), 0);
+	offset_ns = virtual_master_sample(&vm)->frame_dc_ns;
+	virtual_master_run(&vm, 6000);
+	/* Its clock was never taken for the reference. */
+	CHECK(virtual_master_sample(&vm)->frame_dc_ns - offset_ns < 6100 * NS_PER_MS);
+	CHECK(virtual_master_sample(&vm)->frame_dc_ns - offset_ns > 5900 * NS_PER_MS);
+	CHECK_EQ(segment_unplug(b.segment, position, virtual_bench_now_ns(&b)), 0);
+	virtual_master_run(&vm, 1000);
+	CHECK_STR(page()->message, "");
+	CHECK_EQ(state(), BUS_OP);
+	virtual_master_forget(&vm);
+	virtual_master_run(&vm, 1000);
+	CHECK_EQ(vm.result.op, vm.result.samples);
+	CHECK_EQ(vm.result.bad, 0);
+	close_all();
+}
+
+TEST(sim_strangers, a_fresh_device_behind_the_last_slave)
+{
+	check_stranger(2, 0, NULL);
+}
+
+TEST(sim_strangers, a_device_with_the_address_of_the_reference_clock)
+{
+	check_stranger(2, 0x1001, "slave 0 (a)");
+}
+
+TEST(sim_strangers, a_device_with_the_address_of_another_slave)
+{
+	check_stranger(2, 0x1002, "slave 1 (b)");
+}
+
+TEST(sim_strangers, a_device_with_a_used_address_in_front_of_its_owner)
+{
+	check_stranger(0, 0x1001, "slave 0 (a)");
+}
+
+TEST(sim_strangers, a_device_with_a_used_address_between_the_slaves)
+{
+	check_stranger(1, 0x1002, "slave 1 (b)");
+}
