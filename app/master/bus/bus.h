@@ -93,6 +93,13 @@ int bus_watch(struct bus *bus, struct status_page *page,
 void bus_lead_back(struct bus *bus, void (*emit)(void *ctx, const struct event *ev),
 		   void *emit_ctx);
 
+/**
+ * Is the one device that answers to the reference clock's address the reference clock: by its
+ * clock's offset and its identity? 1; 0; -EAGAIN: it does not answer, or two do. The frames of the
+ * cycle go on. For exchange_doubts_reference().
+ */
+int bus_reference_is_itself(struct bus *bus);
+
 /** An operator has seen the alarms: slaves that were given up are tried again. */
 void bus_clear_alarms(struct bus *bus);
 

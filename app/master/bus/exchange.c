@@ -3,6 +3,7 @@
 
 #include <assert.h>
 #include <errno.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -30,6 +31,8 @@ struct exchange {
 	unsigned missing;         /* bit per frame of this exchange that is not back */
 	uint8_t history[HISTORY]; /* by sequence: bit per frame that came back */
 	struct dc_track dc;
+	_Atomic int is_reference_doubted;   /* [cycle] */
+	_Atomic int is_reference_confirmed; /* [service] sets, [cycle] takes */
 	struct exchange_result result; /* result being built; keeps the counts of a ride for the
 					  next one */
 	struct exchange_frame frame[LIMIT_FRAMES];
@@ -183,6 +186,29 @@ static void keep_monitor(struct exchange *ex, const struct exchange_frame *ef)
 	}
 }
 
+int exchange_doubts_reference(const struct exchange *ex)
+{
+	return atomic_load_explicit(&ex->is_reference_doubted, memory_order_acquire);
+}
+
+void exchange_confirm_reference(struct exchange *ex)
+{
+	atomic_store_explicit(&ex->is_reference_confirmed, 1, memory_order_release);
+}
+
+static void keep_dc_time(struct exchange *ex, const struct exchange_frame *ef)
+{
+	if (dc_track_is_doubted(&ex->dc)) {
+		ex->dc.is_confirmed = atomic_exchange_explicit(&ex->is_reference_confirmed, 0,
+							       memory_order_acquire);
+	}
+	ex->result.dc_time_ns = dc_track_answer(
+		&ex->dc, ef->bytes[ef->dc], exchange_wkc(ex->received, ef->dc),
+		(int64_t)get_le64(exchange_data(ex->received, ef->dc)), ex->result.sent);
+	atomic_store_explicit(&ex->is_reference_doubted, dc_track_is_doubted(&ex->dc),
+			      memory_order_release);
+}
+
 static void keep_frame(struct exchange *ex, unsigned number)
 {
 	const struct exchange_frame *ef = &ex->frame[number];
@@ -191,9 +217,7 @@ static void keep_frame(struct exchange *ex, unsigned number)
 		keep_inputs(ex, &ef->part[i]);
 	}
 	if (ef->dc != 0) {
-		ex->result.dc_time_ns = dc_track_answer(
-			&ex->dc, ef->bytes[ef->dc], exchange_wkc(ex->received, ef->dc),
-			(int64_t)get_le64(exchange_data(ex->received, ef->dc)), ex->result.sent);
+		keep_dc_time(ex, ef);
 	}
 	if (ef->al != 0) {
 		keep_monitor(ex, ef);

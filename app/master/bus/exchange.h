@@ -46,6 +46,14 @@ struct exchange_result {
 
 struct exchange;
 
+/**
+ * 1 while the times of the reference clock are implausible for long: the host's clock was stopped,
+ * or another device answers. They are not used until exchange_confirm_reference(). Context: any.
+ */
+int exchange_doubts_reference(const struct exchange *ex);
+/** The reference has been identified: the next time it gives is right. Context: service thread. */
+void exchange_confirm_reference(struct exchange *ex);
+
 /** Everything is allocated here. Free with exchange_destroy(). */
 int exchange_create(const struct exchange_plan *plan, struct line *line,
 		    struct exchange **ret_exchange);

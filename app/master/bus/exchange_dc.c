@@ -5,8 +5,8 @@
 
 /* Host and reference drift apart by 200 ppm at most: 50 s of silence. */
 #define PLAUSIBLE_NS (10 * NS_PER_MS)
-/* So many odd but steady times in a row: the host's clock was stopped, not the reference's. */
-enum { REJECT_LIMIT = 5000 };
+/* So many odd times in a row: the host's clock was stopped, or somebody else answers. */
+enum { REJECT_LIMIT = 1000 };
 
 static int64_t predict(const struct dc_track *track, mono_t at)
 {
@@ -34,18 +34,24 @@ static int is_unsure(const struct dc_track *track, uint8_t cmd, uint16_t wkc, in
 	return cmd == ECAT_CMD_FRMW && wkc < track->wkc_full && time_ns == track->sent_ns;
 }
 
+int dc_track_is_doubted(const struct dc_track *track)
+{
+	return track->rejected >= REJECT_LIMIT;
+}
+
 int64_t dc_track_answer(struct dc_track *track, uint8_t cmd, uint16_t wkc, int64_t time_ns,
 			mono_t sent)
 {
 	int64_t off_ns = time_ns - predict(track, sent);
 
-	if (wkc == 0 || time_ns == 0) {
+	/* A read that two answer is none. */
+	if (wkc == 0 || time_ns == 0 || (cmd == ECAT_CMD_FPRD && wkc != 1)) {
 		track->is_following = 0;
 		return 0;
 	}
 	if (track->is_known && (off_ns > PLAUSIBLE_NS || off_ns < -PLAUSIBLE_NS) &&
-	    track->rejected < REJECT_LIMIT) {
-		track->rejected++;
+	    !track->is_confirmed) {
+		track->rejected += track->rejected < REJECT_LIMIT;
 		track->is_following = 0;
 		return 0;
 	}
@@ -53,6 +59,7 @@ int64_t dc_track_answer(struct dc_track *track, uint8_t cmd, uint16_t wkc, int64
 		track->wkc_full = wkc;
 	}
 	track->rejected = 0;
+	track->is_confirmed = 0;
 	track->is_known = 1;
 	/* Either way the time is right; the next frame only reads, and its WKC is the reference's.
 	 */

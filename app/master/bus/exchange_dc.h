@@ -21,10 +21,14 @@ struct dc_track {
 	int64_t sent_ns;   /* what the FRMW on the wire carries: where the reference should be */
 	uint16_t wkc_full; /* most slaves that ever answered an FRMW */
 	unsigned rejected; /* implausible times in a row */
+	int is_confirmed;  /* the reference was identified: its next time is right, whatever it is */
 };
 
 /** The command for the next frame (enum ecat_cmd), and its payload in *ret_payload_ns. */
 uint8_t dc_track_command(struct dc_track *track, mono_t at, int64_t *ret_payload_ns);
+
+/** 1: implausible times have come for so long that somebody has to ask who it is that answers. */
+int dc_track_is_doubted(const struct dc_track *track);
 
 /** The answer to that: DC time of the reference at the frame, 0 if it is missing or implausible. */
 int64_t dc_track_answer(struct dc_track *track, uint8_t cmd, uint16_t wkc, int64_t time_ns,

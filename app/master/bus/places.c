@@ -696,3 +696,30 @@ void bus_guests_describe(const struct bus *bus, char *ret_text, size_t text_byte
 		return;
 	}
 }
+
+int bus_reference_is_itself(struct bus *bus)
+{
+	const uint8_t to_pdi = 1;
+	struct bus_identity identity;
+	const struct bus_slave *sl;
+	uint8_t offset[8] = { 0 };
+	size_t pos;
+	int r;
+
+	if (bus->plan.dc_reference == 0) {
+		return 0;
+	}
+	pos = (size_t)bus->reference;
+	sl = &bus->slave[pos];
+	bus->error = NULL;
+	r = register_read(bus, pos, ESC_REG_DC_SYSTEM_TIME_OFFSET, offset, sizeof(offset));
+	if (r < 0) {
+		return -EAGAIN;
+	}
+	if (!sl->is_clock_set || get_le64(offset) != (uint64_t)sl->clock_offset_ns) {
+		return 0;
+	}
+	r = bus_identity_read(bus, sl->info.station_addr, &identity);
+	register_write(bus, pos, ESC_REG_EEPROM_CONFIG, &to_pdi, sizeof(to_pdi));
+	return r < 0 ? -EAGAIN : is_same_device(sl, &identity);
+}

@@ -217,6 +217,14 @@ void session_listen(struct session *s)
 	}
 }
 
+/* Its times have been rejected for long: only if it is still itself, the host's clock was wrong. */
+static void follow_reference(struct session *s)
+{
+	if (exchange_doubts_reference(s->exchange) && bus_reference_is_itself(s->bus) == 1) {
+		exchange_confirm_reference(s->exchange);
+	}
+}
+
 enum session_result session_watch(struct session *s)
 {
 	struct bus_watch_report report = { 0 };
@@ -227,6 +235,7 @@ enum session_result session_watch(struct session *s)
 	} else if (bus_watch(s->bus, s->run.page, emit_event, s, &report) == 0) {
 		follow_bus(s, &report);
 		bus_lead_back(s->bus, emit_event, s);
+		follow_reference(s);
 	}
 	if (s->lost_since.ns != 0 && mono_sub(session_now(s), s->lost_since).ns > LOST_LIMIT_NS) {
 		return SESSION_LOST;

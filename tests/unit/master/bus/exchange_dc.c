@@ -58,6 +58,56 @@ TEST(exchange, reference_that_returns_with_another_time_is_not_passed_on)
 	bench_destroy(b);
 }
 
+/* D1: after a while another device's clock was followed. */
+TEST(exchange, a_rejected_time_is_never_used_until_the_reference_was_identified)
+{
+	struct exchange_plan plan = small_plan();
+	struct bench *b = bench_create(&plan);
+
+	run(b);
+	run(b);
+	b->dc_offset_ns += NS_PER_S;
+	CHECK_EQ(exchange_doubts_reference(b->ex), 0);
+	for (int i = 0; i < 20000; i++) {
+		CHECK_EQ(run(b).dc_time_ns, 0);
+	}
+	CHECK_EQ(exchange_doubts_reference(b->ex), 1);
+	exchange_confirm_reference(b->ex);
+	CHECK(run(b).dc_time_ns > 0);
+	CHECK_EQ(exchange_doubts_reference(b->ex), 0);
+	/* It is confirmed once. */
+	b->dc_offset_ns += NS_PER_S;
+	for (int i = 0; i < 2000; i++) {
+		CHECK_EQ(run(b).dc_time_ns, 0);
+	}
+	bench_destroy(b);
+}
+
+static void answer_by_two(struct fake_wire *wire, uint8_t *frame, size_t len)
+{
+	struct ecat_datagram dg;
+	size_t pos = 0;
+
+	play_slaves(wire, frame, len);
+	while (ecat_frame_next(frame, len, &pos, &dg) == 1) {
+		if (dg.cmd == ECAT_CMD_FPRD) {
+			put_le16(dg.wkc, 2);
+		}
+	}
+}
+
+TEST(exchange, a_time_that_two_devices_answered_is_none)
+{
+	struct exchange_plan plan = small_plan();
+	struct bench *b = bench_create(&plan);
+
+	b->wire.answer = answer_by_two;
+	CHECK_EQ(run(b).dc_time_ns, 0);
+	b->wire.answer = play_slaves;
+	CHECK(run(b).dc_time_ns > 0);
+	bench_destroy(b);
+}
+
 /* Slaves behind the reference still count when it is lost: the payload comes back unchanged. */
 static void answer_without_reference(struct fake_wire *wire, uint8_t *frame, size_t len)
 {
