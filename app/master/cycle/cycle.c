@@ -111,7 +111,6 @@ static mono_t wake(struct cycle *cy)
 	pf->sleep_until(pf->ctx, cy->deadline);
 	now = pf->now(pf->ctx);
 	change_phase(cy);
-	cy->has_overrun = 0;
 	cy->sample = (struct sample_header){
 		.cycle = cy->numbering.next,
 		.wake_mono_ns = now.ns,
@@ -128,7 +127,7 @@ static mono_t wake(struct cycle *cy)
 	/* Woken after the next SYNC0: the edges in between are lost to this master. */
 	skipped =
 		numbering_skipped(cy->period.ns, cy->set_point_ns, mono_sub(now, cy->deadline).ns);
-	cycle_skip(cy, skipped);
+	cycle_pass_edges(cy, skipped);
 	move_deadline(cy, skipped, 0);
 	return now;
 }
@@ -207,7 +206,9 @@ void cycle_step(struct cycle *cy)
 	cycle_count_frames(cy, &res);
 	correction_ns = cycle_follow(cy, &res);
 	place = cycle_place(cy, &res);
+	cycle_pass_edges(cy, place.passed_edges);
 	move_deadline(cy, place.late_periods, 0);
+	cycle_report_skipped(cy);
 	if (!place.is_in_window && cycle_has_inputs(cy, &res)) {
 		ADD(st->frames_late, 1);
 		cy->sample.flags |= SAMPLE_LATE;

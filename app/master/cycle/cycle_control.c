@@ -8,8 +8,11 @@
 /* Number of frames with fail-safe values of all outputs before the cycle ends. */
 enum { LAST_CYCLES = 4 };
 
-static void end_safely(struct cycle *cy, int result)
+void cycle_end_safely(struct cycle *cy, int result)
 {
+	if (cy->last_steps > 0) {
+		return; /* it ends already: another reason must not put that off */
+	}
 	cy->is_latched_safe = 1;
 	cy->result = result;
 	cy->last_steps = LAST_CYCLES + 1;
@@ -36,10 +39,10 @@ static void run(struct cycle *cy)
 		break;
 	case CONTROL_CRASH:
 		note_crash(cy);
-		end_safely(cy, -EFAULT);
+		cycle_end_safely(cy, -EFAULT);
 		break;
 	case CONTROL_STOP:
-		end_safely(cy, -ETIMEDOUT);
+		cycle_end_safely(cy, -ETIMEDOUT);
 		/* fall through */
 	case CONTROL_PARK:
 	case CONTROL_OVERRAN:

@@ -54,7 +54,6 @@ struct cycle {
 	struct slave_set slaves; /* in OP */
 	int has_started;
 	int was_fail_safe;
-	int has_overrun;     /* this step has passed edges */
 	int is_latched_safe; /* overrun policy fail_safe, or the cycle is about to end */
 	unsigned last_steps; /* steps left until it stops; 0: no limit */
 	unsigned lost_in_row;
@@ -97,27 +96,38 @@ int64_t cycle_follow(struct cycle *cy, const struct exchange_result *res);
 void cycle_control(struct cycle *cy);
 /** 1 if it is there and its outputs are to be fail-safe. */
 int cycle_is_control_safe(const struct cycle *cy);
+/** All outputs fail-safe from the next frame on; after some of those frames the cycle ends with
+ * @result. */
+void cycle_end_safely(struct cycle *cy, int result);
 /** At the end of a step: stop, if this was the last one. */
 void cycle_count_down(struct cycle *cy);
+
+/* --- cycle_skip.c: edges that passed while the master was late --- */
+
+/** The number of this step's sample goes on by @count: that many edges have passed. */
+void cycle_pass_edges(struct cycle *cy, uint64_t count);
+/**
+ * The edges passed in this step: counters, event, a sample each, and the reaction of cycle.overrun.
+ * After the exchange: writing many samples must not make a late frame later.
+ */
+void cycle_report_skipped(struct cycle *cy);
 
 /* --- cycle_judge.c: one sample for every SYNC0 edge --- */
 
 void cycle_push_sample(struct cycle *cy);
-/**
- * The next @count edges passed while the master was late: each gets a sample with the last known
- * inputs. The deadline stays: the caller decides.
- */
-void cycle_skip(struct cycle *cy, uint64_t count);
-
 struct cycle_place {
 	/* 1: the frame passed in its edge's window. 0: while the slaves were still updating their
 	 * inputs, or it carries no plausible DC time. */
 	int is_in_window;
+	/* Edges between the sample's own and the one that the inputs belong to: its number is to
+	 * go on by them. */
+	uint64_t passed_edges;
 	/* Periods by which the master itself was late: the deadline is to move by them. */
 	uint64_t late_periods;
 };
 
-/** Which SYNC0 edge the frame's inputs belong to, by the DC time at which it passed. */
+/** Which SYNC0 edge the frame's inputs belong to, by the DC time at which it passed. It moves
+ * neither number nor deadline. */
 struct cycle_place cycle_place(struct cycle *cy, const struct exchange_result *res);
 /** 1 if the exchange brought inputs of at least one slave: all answered, or some with per_slave. */
 int cycle_has_inputs(const struct cycle *cy, const struct exchange_result *res);

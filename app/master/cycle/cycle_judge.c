@@ -16,52 +16,6 @@ void cycle_push_sample(struct cycle *cy)
 		  cy->image, cy->spec.plan->image_bytes);
 }
 
-void cycle_skip(struct cycle *cy, uint64_t count)
-{
-	struct sample_header kept = cy->sample;
-
-	if (count == 0) {
-		return;
-	}
-	/* Found at the wake and again by the frame's own time, it is one overrun still. */
-	ADD(cy->spec.stats->overruns, !cy->has_overrun);
-	cy->has_overrun = 1;
-	ADD(cy->spec.stats->cycles_skipped, count);
-	cycle_note(cy, EVENT_OVERRUN, (int64_t)kept.cycle, (int64_t)count, kept.wake_latency_ns);
-	if (count > NUMBERING_SKIP_LIMIT) {
-		cycle_note(cy, EVENT_NUMBERING_JUMP, (int64_t)(kept.cycle + count), (int64_t)count,
-			   0);
-	} else {
-		for (uint64_t i = 0; i < count; i++) {
-			cy->sample.cycle = kept.cycle + i;
-			cy->sample.dc_time_ns = numbering_dc_time(&cy->numbering, kept.cycle + i);
-			cy->sample.frame_dc_ns = 0;
-			cy->sample.round_trip_ns = -1;
-			cy->sample.wkc = 0;
-			cy->sample.slaves_bad = all_slaves(cy);
-			cy->sample.flags |= SAMPLE_SKIPPED;
-			cycle_push_sample(cy);
-		}
-	}
-	if (cy->phase == CYCLE_OP) {
-		ADD(cy->spec.stats->samples_bad, count * cy->spec.slave_count);
-		for (size_t i = 0; i < cy->spec.slave_count; i++) {
-			ADD(cy->spec.stats->slave_bad[i], count);
-		}
-	}
-	cy->sample = kept;
-	cy->sample.cycle += count;
-	if (cy->phase != CYCLE_OP) {
-		return; /* nothing is controlled yet */
-	}
-	if (cy->spec.cfg->cycle_overrun == CONFIG_OVERRUN_FAIL_SAFE) {
-		cy->is_latched_safe = 1;
-	} else if (cy->spec.cfg->cycle_overrun == CONFIG_OVERRUN_STOP) {
-		cy->result = -ETIME;
-		cycle_stop(cy);
-	}
-}
-
 static uint64_t whole_periods(const struct cycle *cy, int64_t ns)
 {
 	return ns > 0 ? (uint64_t)(ns / cy->period.ns) : 0;
@@ -92,7 +46,7 @@ static uint64_t passed_before_sending(const struct cycle *cy, const struct excha
 
 struct cycle_place cycle_place(struct cycle *cy, const struct exchange_result *res)
 {
-	struct cycle_place ret = { .is_in_window = 1, .late_periods = 0 };
+	struct cycle_place ret = { .is_in_window = 1 };
 	struct numbering_place place;
 
 	if (cy->phase == CYCLE_CLOCKS || cy->servo.state == DC_OFF) {
@@ -110,8 +64,8 @@ struct cycle_place cycle_place(struct cycle *cy, const struct exchange_result *r
 	if (place.passed_edges > 0) {
 		uint64_t behind = passed_before_sending(cy, res);
 
+		ret.passed_edges = place.passed_edges;
 		ret.late_periods = place.passed_edges > behind ? place.passed_edges - behind : 0;
-		cycle_skip(cy, place.passed_edges);
 	}
 	ret.is_in_window = place.is_in_window;
 	return ret;

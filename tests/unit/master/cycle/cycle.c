@@ -2,6 +2,7 @@
 /* The whole cycle against a scripted exchange: its reaction to what the bus returns. */
 #include "cycle/cycle.h"
 
+#include <errno.h>
 #include <pthread.h>
 #include <sched.h>
 #include <stdatomic.h>
@@ -29,12 +30,14 @@ static struct {
 	unsigned late;
 	unsigned doubled;
 	uint8_t seen_output;
+	uint64_t written;             /* samples in the ring when the last frame was sent */
 	uint64_t conversions_from_dc; /* 1: counters follow the DC time as real slaves do */
 } world;
 
 static struct cycle_stats stats;
 static struct config cfg;
 static struct board board;
+static struct ring_reader *reader;
 
 struct exchange_result exchange_run(struct exchange *ex, uint8_t *image, mono_t deadline)
 {
@@ -53,6 +56,7 @@ struct exchange_result exchange_run(struct exchange *ex, uint8_t *image, mono_t 
 
 	(void)ex;
 	world.seen_output = image[0];
+	world.written = ring_newest(reader);
 	if (world.status == EXCHANGE_NO_FRAME) {
 		world.now = deadline;
 		return res;
@@ -124,7 +128,6 @@ static const struct slave_info slaves[] = {
 static struct exchange_plan plan;
 static struct ring *samples;
 static struct ring *events;
-static struct ring_reader *reader;
 static struct ring_reader *event_reader;
 static struct cycle *cy;
 
@@ -589,6 +592,49 @@ TEST(cycle, the_overrun_policy_counts_in_op_only)
 	steps(2);
 	CHECK_EQ(world.seen_output & 1, 0);
 	CHECK_EQ(count_events(EVENT_OUTPUT_FAIL_SAFE), 1);
+	cfg.cycle_overrun = CONFIG_OVERRUN_COUNT;
+}
+
+TEST(cycle, a_late_frame_goes_out_before_the_skipped_samples_are_written)
+{
+	uint64_t newest;
+
+	start_in_op();
+	newest = ring_newest(reader);
+	world.late_ns = 500 * (int64_t)PERIOD_NS;
+	steps(1);
+	CHECK_EQ(world.written, newest);
+	CHECK_EQ(ring_newest(reader), newest + 501);
+	for (unsigned i = 0; i < 501; i++) {
+		struct got s = next_sample();
+
+		CHECK_EQ(s.h.flags & SAMPLE_SKIPPED, i < 500 ? SAMPLE_SKIPPED : 0);
+		CHECK_EQ(s.h.round_trip_ns, i < 500 ? -1 : world.transit_ns);
+	}
+}
+
+TEST(cycle, an_overrun_with_policy_stop_sends_fail_safe_values_before_the_end)
+{
+	unsigned safe = 0;
+	int r;
+
+	cfg.cycle_overrun = CONFIG_OVERRUN_STOP;
+	start_in_op();
+	board_begin(&board);
+	board_put(&board, 0, 1);
+	board_commit(&board);
+	steps(3);
+	CHECK_EQ(world.seen_output & 1, 1);
+	world.late_ns = 3 * PERIOD_NS;
+	steps(1);
+	while (!cycle_has_stopped(cy, &r)) {
+		world.late_ns = 2 * PERIOD_NS; /* and it goes on being late */
+		steps(1);
+		CHECK_EQ(world.seen_output & 1, 0);
+		CHECK(++safe < 100);
+	}
+	CHECK_EQ(safe, 4);
+	CHECK_EQ(r, -ETIME);
 	cfg.cycle_overrun = CONFIG_OVERRUN_COUNT;
 }
 
