@@ -47,6 +47,8 @@ static const struct {
 	[EVENT_SLAVE_WRONG] = { "slave_wrong", EVENT_ERROR },
 	[EVENT_SLAVE_UNREADABLE] = { "slave_unreadable", EVENT_ERROR },
 	[EVENT_SLAVE_ALARM] = { "slave_alarm", EVENT_ERROR },
+	[EVENT_OP_LOST] = { "op_lost", EVENT_WARNING },
+	[EVENT_SLAVE_COUNT] = { "slave_count", EVENT_WARNING },
 	[EVENT_CONTROL_OVERRUN] = { "control_overrun", EVENT_WARNING },
 	[EVENT_CONTROL_CRASHED] = { "control_crashed", EVENT_ERROR },
 	[EVENT_SYNC0_LOST] = { "sync0_lost", EVENT_ERROR },
@@ -412,6 +414,17 @@ int event_format(const struct event *ev, char *buf, size_t buf_len)
 	case EVENT_RT_DEGRADED:
 		return snprintf(buf, buf_len, "degraded: no %s: %s", rt_to_str((uint32_t)a[0]),
 				reason(a[1]));
+	case EVENT_OP_LOST:
+		return snprintf(buf, buf_len,
+				"cycle %" PRId64
+				": a slave has left OP: AL status of all ORed 0x%02" PRIx32
+				", %" PRId32 " answered",
+				ev->value, (uint32_t)a[0], a[1]);
+	case EVENT_SLAVE_COUNT:
+		return snprintf(buf, buf_len,
+				"cycle %" PRId64 ": %" PRId32
+				" slaves on the wire, expected %" PRId32,
+				ev->value, a[0], a[1]);
 	case EVENT_EMERGENCY:
 		return format_emergency(ev, buf, buf_len);
 	case EVENT_STRANGER:

@@ -47,15 +47,19 @@ struct cycle_stats {
 	_Atomic uint64_t samples_good;   /* slave samples in OP: fresh and counter right */
 	_Atomic uint64_t samples_bad;    /* slave samples in OP that are not */
 	_Atomic uint64_t samples_bad_unexplained; /* of those: the cycle had a fresh frame */
-	_Atomic uint64_t page_faults;             /* of the cycle thread since its start */
-	_Atomic uint64_t rides;                   /* service frames that rode along */
-	_Atomic int64_t dc_time_ns;               /* of the newest cycle */
-	_Atomic int64_t correction_ppb;           /* what the servo does to the host's period */
+	_Atomic uint64_t op_lost;              /* times a frame showed that a slave had left OP */
+	_Atomic uint64_t cycles_with_stranger; /* more slaves answered than belong to the bus */
+	_Atomic uint64_t page_faults;          /* of the cycle thread since its start */
+	_Atomic uint64_t rides;                /* service frames that rode along */
+	_Atomic int64_t dc_time_ns;            /* of the newest cycle */
+	_Atomic int64_t correction_ppb;        /* what the servo does to the host's period */
 	_Atomic int64_t dc_lock_ns;  /* time from the servo's start to its first lock; 0: not yet */
 	_Atomic uint64_t dc_unlocks; /* times that lock was lost */
 	_Atomic int64_t dc_diff_max_ns; /* largest |0x092C| since lock */
 	_Atomic uint32_t dc_state;      /* enum dc_state */
 	_Atomic uint32_t is_fail_safe;
+	_Atomic uint32_t al_status;    /* of all slaves ORed, in the newest frame; 0: not read */
+	_Atomic uint32_t slaves_found; /* how many answered it */
 	_Atomic uint64_t slave_good[LIMIT_SLAVES];
 	_Atomic uint64_t slave_bad[LIMIT_SLAVES];
 	struct histogram wake_latency;

@@ -55,7 +55,7 @@ int cycle_create(const struct cycle_spec *spec, struct cycle **ret_cycle, char *
 	outputs_choose(&cy->outputs, cy->image, &(struct slave_set){ 0 }, 0);
 	cy->was_fail_safe = 1;
 	cycle_slaves_init(cy);
-	cy->slaves = *cycle_slaves_take(cy);
+	cy->slaves_found = spec->plan->slave_count;
 	*ret_cycle = cy;
 	return 0;
 }
@@ -71,12 +71,7 @@ static void change_phase(struct cycle *cy)
 {
 	enum cycle_phase wanted =
 		(enum cycle_phase)atomic_load_explicit(&cy->wanted_phase, memory_order_acquire);
-	const struct slave_set *slaves = cycle_slaves_take(cy);
-	struct slave_set returned = *slaves;
 
-	slave_set_and_not(&returned, &cy->slaves);
-	check_restart_some(&cy->check, &returned);
-	cy->slaves = *slaves;
 	if (wanted == cy->phase) {
 		return;
 	}
@@ -111,6 +106,7 @@ static mono_t wake(struct cycle *cy)
 	pf->sleep_until(pf->ctx, cy->deadline);
 	now = pf->now(pf->ctx);
 	change_phase(cy);
+	cycle_update_live(cy);
 	cy->sample = (struct sample_header){
 		.cycle = cy->numbering.next,
 		.wake_mono_ns = now.ns,
@@ -150,8 +146,8 @@ static mono_t receive_deadline(const struct cycle *cy, mono_t now)
 
 static void choose_outputs(struct cycle *cy, uint8_t *image)
 {
-	int is_live = cy->phase == CYCLE_OP && !cy->is_latched_safe;
-	struct slave_set live = is_live ? cy->slaves : slave_set_empty();
+	struct slave_set live = cy->is_latched_safe ? slave_set_empty() : cy->live;
+	int is_live = !slave_set_is_empty(&live);
 	unsigned timed_out = outputs_choose(&cy->outputs, image, &live, cy->sample.cycle);
 	int is_fail_safe = !is_live || timed_out > 0 || cycle_is_control_safe(cy);
 
@@ -204,6 +200,7 @@ void cycle_step(struct cycle *cy)
 	}
 	res = exchange_run(cy->spec.exchange, cy->image, receive_deadline(cy, now));
 	cycle_count_frames(cy, &res);
+	cycle_watch_slaves(cy, &res);
 	correction_ns = cycle_follow(cy, &res);
 	place = cycle_place(cy, &res);
 	cycle_pass_edges(cy, place.passed_edges);

@@ -37,17 +37,23 @@ void cycle_stop(struct cycle *cycle);
 enum cycle_phase {
 	CYCLE_CLOCKS, /* exchange and servo only */
 	CYCLE_SYNCED, /* SYNC0 runs */
-	CYCLE_OP,     /* all slaves are in OP */
+	CYCLE_OP,     /* all slaves are in OP, but for those that frames show to have left */
 	CYCLE_SAFE,   /* on the way down: outputs at fail-safe */
 };
 /** Context: service thread; takes effect at the next cycle boundary. */
 void cycle_phase_set(struct cycle *cycle, enum cycle_phase phase);
 /**
- * In CYCLE_OP, the slaves that are in OP; all at first. The others' outputs are at
- * fail-safe, and their samples are bad and not counted. With a plan that is split only. Context:
- * service thread; takes effect at the next cycle boundary.
+ * Grows whenever a frame shows what the service thread has to look at: a slave has left OP, or
+ * another number of slaves answers. 0 at first. Context: any.
  */
-void cycle_slaves_set(struct cycle *cycle, const struct slave_set *slaves);
+uint64_t cycle_alerts(const struct cycle *cycle);
+/**
+ * In CYCLE_OP, the slaves that are in OP; all at first. The others' outputs are at fail-safe, and
+ * their samples are bad and not counted. Not all: with a plan that is split only. @alerts:
+ * cycle_alerts() before the slaves' states were read; what frames have shown since stays in force.
+ * Context: service thread; takes effect at the next cycle boundary.
+ */
+void cycle_slaves_set(struct cycle *cycle, const struct slave_set *slaves, uint64_t alerts);
 
 /** The newest frame's DC time and the host time at which it was sent. 0 or -EAGAIN. Context: any.
  */

@@ -2,6 +2,7 @@
 /* The control program in the cycle: after the inputs were judged, before the outputs are chosen. */
 #include <errno.h>
 
+#include "base/slave_set.h"
 #include "control/program.h"
 #include "cycle/cycle_internal.h"
 
@@ -57,7 +58,7 @@ void cycle_control(struct cycle *cy)
 	if (cy->spec.control == NULL) {
 		return;
 	}
-	if (cy->phase != CYCLE_OP || cy->is_latched_safe) {
+	if (slave_set_is_empty(&cy->live) || cy->is_latched_safe) {
 		control_pause(cy->spec.control);
 	} else {
 		run(cy);

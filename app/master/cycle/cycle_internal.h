@@ -31,8 +31,13 @@ struct event_gate {
  */
 #define CYCLE_SLAVES_NEW 4u /* added to the spare's index: not taken yet */
 
+struct cycle_named {
+	struct slave_set slaves;
+	uint64_t alerts; /* known to whoever named them */
+};
+
 struct cycle_slaves {
-	struct slave_set set[3];
+	struct cycle_named named[3];
 	unsigned filled;        /* [service] index of the one to be filled next */
 	unsigned taken;         /* [cycle] index of the one in force */
 	_Atomic unsigned spare; /* [any] */
@@ -51,7 +56,12 @@ struct cycle {
 	struct sample_header sample; /* of the cycle being made */
 	uint8_t image[LIMIT_IMAGE_BYTES];
 	enum cycle_phase phase;
-	struct slave_set slaves; /* in OP */
+	struct slave_set live; /* in OP: real outputs, judged samples; none unless in CYCLE_OP */
+	struct slave_set gone; /* as frames have shown since the service thread named the live */
+	uint16_t al_status;    /* of all slaves ORed, newest frame */
+	uint16_t strangers_al; /* bits of it that are not of our slaves */
+	uint16_t slaves_found; /* how many answered, newest frame */
+	uint64_t alerts;
 	int has_started;
 	int was_fail_safe;
 	int is_latched_safe; /* overrun policy fail_safe, or the cycle is about to end */
@@ -62,8 +72,9 @@ struct cycle {
 	long faults_at_start;
 	struct event_gate gate[EVENT_COUNT];
 	int result;
-	_Atomic int stop;         /* [any] */
-	_Atomic int wanted_phase; /* [service] */
+	_Atomic int stop;              /* [any] */
+	_Atomic int wanted_phase;      /* [service] */
+	_Atomic uint64_t alerts_shown; /* [cycle] */
 	struct cycle_slaves wanted_slaves;
 	_Atomic uint64_t dc_sequence; /* [cycle] odd: the pair below is being written */
 	_Atomic int64_t dc_ns;        /* [cycle] */
@@ -73,8 +84,15 @@ struct cycle {
 /* --- cycle_request.c --- */
 
 void cycle_slaves_init(struct cycle *cy);
-/** The slaves that are in OP as the service thread said last; valid until the next call. */
-const struct slave_set *cycle_slaves_take(struct cycle *cy);
+/** What the service thread named last; valid until the next call. */
+const struct cycle_named *cycle_named_take(struct cycle *cy);
+
+/* --- cycle_slaves.c: which slaves are live --- */
+
+/** At the start of a step, after the phase. */
+void cycle_update_live(struct cycle *cy);
+/** After the exchange: what the frame shows of the slaves' states and number. */
+void cycle_watch_slaves(struct cycle *cy, const struct exchange_result *res);
 
 /* --- cycle_event.c --- */
 

@@ -79,7 +79,7 @@ static void count_bad(struct cycle *cy, int is_explained)
 	uint64_t good_count = 0;
 
 	for (unsigned i = 0; i < cy->spec.slave_count; i++) {
-		if (!slave_set_has(&cy->slaves, i)) {
+		if (!slave_set_has(&cy->live, i)) {
 			continue;
 		}
 		if (slave_set_has(&cy->sample.slaves_bad, i)) {
@@ -110,7 +110,7 @@ void cycle_judge(struct cycle *cy, const struct exchange_result *res, int is_in_
 	struct slave_set wrong;
 	struct check_fault fault;
 
-	if (cy->phase != CYCLE_OP) {
+	if (slave_set_is_empty(&cy->live)) {
 		cy->sample.flags |= SAMPLE_NOT_OP;
 		cy->sample.slaves_bad = all_slaves(cy);
 		return;
@@ -120,7 +120,7 @@ void cycle_judge(struct cycle *cy, const struct exchange_result *res, int is_in_
 		count_bad(cy, is_fresh || res->status != EXCHANGE_WKC_LOW);
 		return;
 	}
-	slave_set_and_not(&stale, &cy->slaves);
+	slave_set_and_not(&stale, &cy->live);
 	slave_set_or(&stale, &res->slaves_low);
 	wrong = check_image(&cy->check, cy->image, cy->sample.cycle, &stale, &fault);
 	cy->sample.slaves_bad = stale;

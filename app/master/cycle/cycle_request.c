@@ -16,11 +16,11 @@ void cycle_stop(struct cycle *cycle)
 	atomic_store_explicit(&cycle->stop, 1, memory_order_release);
 }
 
-void cycle_slaves_set(struct cycle *cycle, const struct slave_set *slaves)
+void cycle_slaves_set(struct cycle *cycle, const struct slave_set *slaves, uint64_t alerts)
 {
 	struct cycle_slaves *ws = &cycle->wanted_slaves;
 
-	ws->set[ws->filled] = *slaves;
+	ws->named[ws->filled] = (struct cycle_named){ .slaves = *slaves, .alerts = alerts };
 	ws->filled = atomic_exchange_explicit(&ws->spare, ws->filled | CYCLE_SLAVES_NEW,
 					      memory_order_acq_rel) &
 		     ~CYCLE_SLAVES_NEW;
@@ -32,11 +32,11 @@ void cycle_slaves_init(struct cycle *cy)
 
 	ws->filled = 0;
 	ws->taken = 1;
-	ws->set[ws->taken] = slave_set_all(LIMIT_SLAVES);
+	ws->named[ws->taken].slaves = slave_set_all(LIMIT_SLAVES);
 	atomic_init(&ws->spare, 2);
 }
 
-const struct slave_set *cycle_slaves_take(struct cycle *cy)
+const struct cycle_named *cycle_named_take(struct cycle *cy)
 {
 	struct cycle_slaves *ws = &cy->wanted_slaves;
 
@@ -44,7 +44,7 @@ const struct slave_set *cycle_slaves_take(struct cycle *cy)
 		ws->taken = atomic_exchange_explicit(&ws->spare, ws->taken, memory_order_acq_rel) &
 			    ~CYCLE_SLAVES_NEW;
 	}
-	return &ws->set[ws->taken];
+	return &ws->named[ws->taken];
 }
 
 void cycle_phase_set(struct cycle *cycle, enum cycle_phase phase)

@@ -43,11 +43,10 @@ static void count_skipped(struct cycle *cy, uint64_t count)
 
 	ADD(st->overruns, 1);
 	ADD(st->cycles_skipped, count);
-	if (cy->phase == CYCLE_OP) {
-		ADD(st->samples_bad, count * cy->spec.slave_count);
-		for (size_t i = 0; i < cy->spec.slave_count; i++) {
-			ADD(st->slave_bad[i], count);
-		}
+	ADD(st->samples_bad, count * slave_set_count(&cy->live));
+	for (unsigned i = slave_set_next(&cy->live, 0); i < cy->spec.slave_count;
+	     i = slave_set_next(&cy->live, i + 1)) {
+		ADD(st->slave_bad[i], count);
 	}
 }
 

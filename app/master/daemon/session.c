@@ -54,6 +54,8 @@ static void clear_stats(struct cycle_stats *st)
 	ZERO(st->samples_good);
 	ZERO(st->samples_bad);
 	ZERO(st->samples_bad_unexplained);
+	ZERO(st->op_lost);
+	ZERO(st->cycles_with_stranger);
 	ZERO(st->rides);
 	ZERO(st->dc_unlocks);
 	ZERO(st->dc_diff_max_ns);

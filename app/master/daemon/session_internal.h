@@ -41,6 +41,7 @@ struct session {
 	uint64_t lost_seen;
 	mono_t lost_since; /* all slaves, from then on; 0: not so */
 	uint64_t wkc_low_seen;
+	uint64_t alerts_seen;   /* cycle_alerts() when the last look began */
 	uint64_t doubled_seen;  /* with doubled_since: where the window began */
 	uint64_t doubled_since; /* cycles */
 	int has_reported_doubled;

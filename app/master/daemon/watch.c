@@ -120,13 +120,15 @@ static int can_go_on(const struct session *s, const struct bus_watch_report *rep
 	       report->is_reference_op && (s->state == BUS_OP || s->state == BUS_RECOVERING);
 }
 
-/* The cycle continues with @slaves; none: outputs safe, no sample is judged. */
+/* The cycle continues with @slaves, but for those that frames have shown to have left OP since this
+ * look began; none: outputs safe, no sample is judged. */
 static void go_on_with(struct session *s, const struct slave_set *slaves)
 {
 	int is_none = slave_set_is_empty(slaves);
 
 	if (!is_none) {
-		cycle_slaves_set(s->cycle, slaves); /* before the phase, which it is for */
+		/* Before the phase, which it is for. */
+		cycle_slaves_set(s->cycle, slaves, s->alerts_seen);
 	}
 	cycle_phase_set(s->cycle, is_none ? CYCLE_SYNCED : CYCLE_OP);
 }
@@ -148,12 +150,14 @@ static void follow_bus(struct session *s, const struct bus_watch_report *report)
 	struct slave_set live = slave_set_empty();
 	char text[BUS_ERROR_BYTES];
 
-	if (report->is_all_op && s->state == BUS_RECOVERING) {
+	if (report->is_all_op && (s->state == BUS_RECOVERING || s->state == BUS_OP)) {
 		live = slave_set_all(LIMIT_SLAVES);
 		s->is_partial = 0;
 		go_on_with(s, &live);
-		session_state_set(s, BUS_OP);
-		session_set_message(s, "");
+		if (s->state == BUS_RECOVERING) {
+			session_state_set(s, BUS_OP);
+			session_set_message(s, "");
+		}
 	} else if (!report->is_all_op) {
 		if (can_go_on(s, report)) {
 			live = report->in_op;
@@ -229,6 +233,7 @@ enum session_result session_watch(struct session *s)
 {
 	struct bus_watch_report report = { 0 };
 
+	s->alerts_seen = cycle_alerts(s->cycle);
 	if (s->silent_cycles >= silence_limit(s)) {
 		/* No slave answers; each request would cost its timeout. */
 		follow_silence(s);
@@ -330,7 +335,8 @@ int session_service(struct session *session, struct failure *failure)
 	if (s->is_riding) {
 		session_listen(s);
 	}
-	if (now.ns >= s->next_watch.ns || is_wkc_alarming(s)) {
+	if (now.ns >= s->next_watch.ns || is_wkc_alarming(s) ||
+	    (s->is_riding && cycle_alerts(s->cycle) != s->alerts_seen)) {
 		s->wkc_low_seen =
 			atomic_load_explicit(&s->run.page->cycle.wkc_low, memory_order_relaxed);
 		atomic_fetch_add_explicit(&s->run.page->heartbeat, 1, memory_order_relaxed);
