@@ -250,6 +250,13 @@ int bus_sync0_restore(struct bus *bus, size_t pos);
 int bus_sync0_is_running(struct bus *bus, size_t pos);
 void bus_sync0_stop(struct bus *bus);
 
+/* --- places.c --- */
+
+/** A lost slave is there again. */
+void bus_note_back(struct bus *bus, size_t pos, const struct bus_emit *emit);
+/** Vendor, product, revision, alias, and the serial number where the slave has one. */
+int bus_is_same_device(const struct bus_slave *sl, const struct bus_identity *found);
+
 /* --- states.c --- */
 
 /** "refuses SAFE-OP and is in PRE-OP: AL status code 0x0018, no valid inputs available" */

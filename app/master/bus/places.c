@@ -2,112 +2,12 @@
 #include "bus/places.h"
 
 #include <errno.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "base/bytes.h"
-#include "bus/bus_internal.h"
-#include "bus/identity.h"
-#include "bus/registers.h"
-
-enum {
-	PARKING_FIRST = 0x7e00, /* station addresses of guests, one a guest */
-	FMMUS_CLEARED = 8,
-	IDENTIFIED_PER_CALL = 4,
-	DL_LINK = 4, /* DL status: bit of port 0 */
-	DL_COMMUNICATION = 9,
-	LOOP_CLOSED = 3,
-	POSITIONS_MAX = LIMIT_SLAVES + GUESTS_MAX,
-};
-
-/* An EEPROM may still be loading; after that it is unreadable, and tried again in this interval. */
-#define LOADING_NS (2 * NS_PER_S)
-
-struct position {
-	uint8_t address[2];
-	uint8_t dl_status[2];
-	int slave; /* that is bound to it; -1 */
-};
-
-struct walk {
-	size_t count;
-	struct position at[POSITIONS_MAX];
-};
-
-/* --- walking --- */
-
-static uint16_t position_address(size_t position)
-{
-	return (uint16_t)-position;
-}
-
-static struct access read_at(size_t position, uint16_t reg, void *data, uint16_t len)
-{
-	return (struct access){ .cmd = ECAT_CMD_APRD,
-				.adp = position_address(position),
-				.reg = reg,
-				.len = len,
-				.data = data };
-}
-
-static struct access write_at(size_t position, uint16_t reg, void *data, uint16_t len)
-{
-	return (struct access){ .cmd = ECAT_CMD_APWR,
-				.adp = position_address(position),
-				.reg = reg,
-				.len = len,
-				.data = data };
-}
-
-/* Each position answers once, and the one behind the last does not. */
-static int walk_positions(struct bus *bus, struct walk *walk)
-{
-	struct access access[2 * POSITIONS_MAX + 1];
-	uint8_t beyond[2];
-	size_t n = 0;
-	int r;
-
-	for (size_t i = 0; i < walk->count; i++) {
-		walk->at[i] = (struct position){ .slave = -1 };
-		access[n++] = read_at(i, ESC_REG_STATION_ADDRESS, walk->at[i].address, 2);
-		access[n++] = read_at(i, ESC_REG_DL_STATUS, walk->at[i].dl_status, 2);
-	}
-	access[n] = read_at(walk->count, ESC_REG_STATION_ADDRESS, beyond, 2);
-	r = registers_run(bus, access, n + 1);
-	if (r < 0) {
-		return r;
-	}
-	for (size_t i = 0; i < n; i++) {
-		if (access[i].wkc != 1) {
-			return -EAGAIN;
-		}
-	}
-	return access[n].wkc == 0 ? 0 : -EAGAIN;
-}
-
-/* Bit @bit + @step * port of DL status, for each port. */
-static uint8_t ports_of(const struct position *at, unsigned bit, unsigned step)
-{
-	uint16_t status = get_le16(at->dl_status);
-	uint8_t ports = 0;
-
-	for (unsigned port = 0; port < ESC_PORTS; port++) {
-		ports |= (uint8_t)((status >> (bit + step * port) & 1) << port);
-	}
-	return ports;
-}
+#include "bus/guests.h"
 
 /* --- binding by what was written --- */
-
-static int find_owner(const struct bus *bus, uint16_t address)
-{
-	for (size_t i = 0; i < bus->slave_count; i++) {
-		if (address != 0 && bus->slave[i].info.station_addr == address) {
-			return (int)i;
-		}
-	}
-	return -1;
-}
 
 /*
  * Does the device at @position hold what this session wrote to slave @pos: the offset of its clock,
@@ -124,14 +24,14 @@ static int has_marks_of(struct bus *bus, size_t position, size_t pos)
 	int r;
 
 	if (sl->is_clock_set) {
-		access[n++] = read_at(position, ESC_REG_DC_SYSTEM_TIME_OFFSET, offset,
-				      sl->is_clock_64bit ? 8 : 4);
+		access[n++] = walk_access(ECAT_CMD_APRD, position, ESC_REG_DC_SYSTEM_TIME_OFFSET,
+					  offset, sl->is_clock_64bit ? 8 : 4);
 	}
 	for (unsigned i = 0; i < EC_MAXFMMU; i++) {
 		if (soem->FMMU[i].FMMUactive) {
-			access[n++] =
-				read_at(position, (uint16_t)(ESC_REG_FMMU + i * ESC_FMMU_BYTES),
-					fmmu[i], ESC_FMMU_BYTES);
+			access[n++] = walk_access(ECAT_CMD_APRD, position,
+						  (uint16_t)(ESC_REG_FMMU + i * ESC_FMMU_BYTES),
+						  fmmu[i], ESC_FMMU_BYTES);
 		}
 	}
 	r = n == 0 ? 0 : registers_run(bus, access, n);
@@ -149,22 +49,12 @@ static int has_marks_of(struct bus *bus, size_t position, size_t pos)
 				   : get_le32(offset) == (uint32_t)(uint64_t)sl->clock_offset_ns);
 }
 
-static unsigned count_claims(const struct walk *walk, uint16_t address)
-{
-	unsigned claims = 0;
-
-	for (size_t i = 0; i < walk->count; i++) {
-		claims += get_le16(walk->at[i].address) == address;
-	}
-	return claims;
-}
-
 /* A slave that was there and whose address answers once is itself. Returned from a loss, or with a
  * second one beside it, it must show the marks; if two do, none is believed. */
 static int bind_slave(struct bus *bus, size_t pos, struct walk *walk)
 {
 	const struct bus_slave *sl = &bus->slave[pos];
-	int is_sure = !sl->is_lost && count_claims(walk, sl->info.station_addr) == 1;
+	int is_sure = !sl->is_lost && walk_claims(walk, sl->info.station_addr) == 1;
 	int bound = -1;
 
 	for (size_t i = 0; i < walk->count; i++) {
@@ -191,7 +81,7 @@ static int bind_slave(struct bus *bus, size_t pos, struct walk *walk)
 	return 0;
 }
 
-static void note_back(struct bus *bus, size_t pos, const struct bus_emit *emit)
+void bus_note_back(struct bus *bus, size_t pos, const struct bus_emit *emit)
 {
 	struct bus_slave *sl = &bus->slave[pos];
 
@@ -203,357 +93,6 @@ static void note_back(struct bus *bus, size_t pos, const struct bus_emit *emit)
 			bus, emit,
 			(struct event){ .id = EVENT_SLAVE_BACK, .slave_pos = (uint16_t)pos });
 	}
-}
-
-/* --- guests --- */
-
-static uint16_t parking_of(const struct bus *bus, const struct bus_guest *guest)
-{
-	return (uint16_t)(PARKING_FIRST + (guest - bus->guest));
-}
-
-static struct bus_guest *guest_of(struct bus *bus, uint16_t address)
-{
-	size_t n = (size_t)address - PARKING_FIRST;
-
-	return address >= PARKING_FIRST && n < GUESTS_MAX && bus->guest[n].kind != GUEST_NONE
-		       ? &bus->guest[n]
-		       : NULL;
-}
-
-static struct bus_guest *new_guest(struct bus *bus)
-{
-	for (size_t i = 0; i < GUESTS_MAX; i++) {
-		if (bus->guest[i].kind == GUEST_NONE) {
-			return &bus->guest[i];
-		}
-	}
-	return NULL;
-}
-
-static void emit_guest(struct bus *bus, const struct bus_guest *guest, uint16_t id,
-		       const struct bus_emit *emit)
-{
-	int pos = guest->expected >= 0 ? guest->expected : guest->owner;
-
-	bus_emit_event(bus, emit,
-		       (struct event){ .id = id,
-				       .slave_pos = pos >= 0 ? (uint16_t)pos : EVENT_NO_SLAVE,
-				       .arg = { guest->position, guest->came_with },
-				       .value = (int64_t)((uint64_t)guest->identity.vendor << 32 |
-							  guest->identity.product) });
-}
-
-/*
- * One frame: first the address, so that nothing that is meant for a slave of ours reaches it any
- * more; then its FMMUs, so that it neither takes nor gives process data; then INIT.
- */
-static int isolate(struct bus *bus, struct bus_guest *guest)
-{
-	uint8_t address[2];
-	uint8_t control[2];
-	uint8_t fmmus[FMMUS_CLEARED * ESC_FMMU_BYTES] = { 0 };
-	struct access access[] = {
-		write_at(guest->position, ESC_REG_STATION_ADDRESS, address, sizeof(address)),
-		write_at(guest->position, ESC_REG_FMMU, fmmus, sizeof(fmmus)),
-		write_at(guest->position, ESC_REG_AL_CONTROL, control, sizeof(control)),
-	};
-
-	put_le16(address, parking_of(bus, guest));
-	put_le16(control, AL_INIT | AL_ERROR);
-	return registers_run(bus, access, sizeof(access) / sizeof(access[0]));
-}
-
-/* More guests than there is room for lose an address of ours, too. */
-static void take_address(struct bus *bus, size_t position)
-{
-	uint8_t none[2] = { 0, 0 };
-	struct access access = write_at(position, ESC_REG_STATION_ADDRESS, none, sizeof(none));
-
-	registers_run(bus, &access, 1);
-}
-
-/* The guest at position @i, isolated if it is new. NULL: not now. */
-static struct bus_guest *take_guest(struct bus *bus, struct walk *walk, size_t i)
-{
-	uint16_t address = get_le16(walk->at[i].address);
-	struct bus_guest *guest = guest_of(bus, address);
-
-	if (guest != NULL) {
-		guest->position = (uint16_t)i;
-		guest->shut_by = -1;
-		return guest;
-	}
-	guest = new_guest(bus);
-	if (guest == NULL) {
-		if (find_owner(bus, address) >= 0) {
-			take_address(bus, i);
-		}
-		return NULL;
-	}
-	*guest =
-		(struct bus_guest){ .kind = GUEST_NEW,
-				    .position = (uint16_t)i,
-				    .came_with = address,
-				    .owner = find_owner(bus, address),
-				    .expected = -1,
-				    .shut_by = -1,
-				    .readable_by = mono_add(bus_now(bus), (span_t){ LOADING_NS }) };
-	if (isolate(bus, guest) < 0) {
-		guest->kind = GUEST_NONE; /* the next walk meets it again */
-		return NULL;
-	}
-	put_le16(walk->at[i].address, parking_of(bus, guest));
-	return guest;
-}
-
-/* Those that the walk did not meet and that no closed port hides are gone. */
-static void drop_guests(struct bus *bus, const struct walk *walk, const struct bus_emit *emit)
-{
-	for (size_t g = 0; g < GUESTS_MAX; g++) {
-		struct bus_guest *guest = &bus->guest[g];
-
-		if (guest->kind != GUEST_NONE && guest->shut_by < 0 &&
-		    count_claims(walk, parking_of(bus, guest)) == 0) {
-			if (guest->kind != GUEST_NEW && guest->kind != GUEST_WAITING) {
-				emit_guest(bus, guest, EVENT_STRANGER_GONE, emit);
-			}
-			guest->kind = GUEST_NONE;
-		}
-	}
-}
-
-/* --- a guest is one of ours, or not --- */
-
-/* Slaves before and behind @position that are bound: the lost ones between them may return there.
- */
-static void find_gap(const struct walk *walk, size_t position, int *ret_before, int *ret_behind,
-		     size_t slave_count)
-{
-	*ret_before = -1;
-	*ret_behind = (int)slave_count;
-	for (size_t i = 0; i < walk->count; i++) {
-		int pos = walk->at[i].slave;
-
-		if (pos >= 0 && i < position && pos > *ret_before) {
-			*ret_before = pos;
-		}
-		if (pos >= 0 && i > position && pos < *ret_behind) {
-			*ret_behind = pos;
-		}
-	}
-}
-
-static int is_same_device(const struct bus_slave *sl, const struct bus_identity *found)
-{
-	return sl->info.vendor == found->vendor && sl->info.product == found->product &&
-	       sl->info.revision == found->revision &&
-	       (sl->info.serial == 0 || sl->info.serial == found->serial) &&
-	       sl->info.alias == found->alias;
-}
-
-/* Behind a slave that is lost, or behind a port without communication, nothing can be. */
-static int is_reachable(const struct bus *bus, const struct walk *walk, size_t pos)
-{
-	const struct dc_node *node = &bus->slave[pos].clock;
-
-	if (bus->plan.dc_reference == 0 || node->parent < 0) {
-		return 1; /* the tree is not known, or it is at the master */
-	}
-	for (size_t i = 0; i < walk->count; i++) {
-		if (walk->at[i].slave == node->parent) {
-			return ports_of(&walk->at[i], DL_COMMUNICATION, 2) >> node->parent_port & 1;
-		}
-	}
-	return 0;
-}
-
-/*
- * The lost slave that @guest is: the first in its gap of this identity. -1: none; -EAGAIN: one that
- * cannot be told from another of its kind yet, the first of them is not certain to be here.
- */
-static int find_returned(const struct bus *bus, const struct walk *walk,
-			 const struct bus_guest *guest, int *ret_expected)
-{
-	int before;
-	int behind;
-
-	*ret_expected = -1;
-	find_gap(walk, guest->position, &before, &behind, bus->slave_count);
-	for (int pos = before + 1; pos < behind; pos++) {
-		const struct bus_slave *sl = &bus->slave[pos];
-
-		if (!sl->is_lost) {
-			continue;
-		}
-		if (*ret_expected < 0) {
-			*ret_expected = pos;
-		}
-		if (is_same_device(sl, &guest->identity)) {
-			return is_reachable(bus, walk, (size_t)pos) ? pos : -EAGAIN;
-		}
-	}
-	return -1;
-}
-
-static int give_address(struct bus *bus, struct bus_guest *guest, size_t pos)
-{
-	uint8_t address[2];
-	struct access access = { .cmd = ECAT_CMD_FPWR,
-				 .adp = parking_of(bus, guest),
-				 .reg = ESC_REG_STATION_ADDRESS,
-				 .len = sizeof(address),
-				 .data = address };
-
-	put_le16(address, bus->slave[pos].info.station_addr);
-	if (registers_run(bus, &access, 1) < 0 || access.wkc != 1) {
-		return -EAGAIN;
-	}
-	return 0;
-}
-
-static void return_slave(struct bus *bus, struct bus_guest *guest, size_t pos,
-			 const struct bus_emit *emit)
-{
-	struct bus_slave *sl = &bus->slave[pos];
-
-	if (give_address(bus, guest, pos) < 0) {
-		return;
-	}
-	guest->kind = GUEST_NONE;
-	bus->soem_slave[soem_index(pos)].eep_pdi = 0;
-	error_counters_restart(&sl->errors);
-	sl->is_clock_set = 0;
-	note_back(bus, pos, emit);
-	bus_recover_restart(bus, pos);
-}
-
-static void set_kind(struct bus *bus, struct bus_guest *guest, enum guest_kind kind,
-		     const struct bus_emit *emit)
-{
-	static const uint16_t id[] = { [GUEST_STRANGER] = EVENT_STRANGER,
-				       [GUEST_WRONG] = EVENT_SLAVE_WRONG,
-				       [GUEST_UNREADABLE] = EVENT_SLAVE_UNREADABLE,
-				       [GUEST_WAITING] = 0 };
-
-	if (guest->kind != kind && id[kind] != 0) {
-		emit_guest(bus, guest, id[kind], emit);
-	}
-	guest->kind = kind;
-}
-
-static int is_identified(const struct bus_guest *guest)
-{
-	return guest->identity.vendor != 0;
-}
-
-/* 1 if what it is was read, now or before. */
-static int read_identity(struct bus *bus, const struct walk *walk, struct bus_guest *guest,
-			 const struct bus_emit *emit)
-{
-	if (is_identified(guest)) {
-		return 1;
-	}
-	if (guest->kind == GUEST_UNREADABLE && bus_now(bus).ns < guest->readable_by.ns) {
-		return 0;
-	}
-	if (bus_identity_read(bus, parking_of(bus, guest), &guest->identity) == 0) {
-		return 1;
-	}
-	if (bus_now(bus).ns >= guest->readable_by.ns) {
-		find_returned(bus, walk, guest, &guest->expected);
-		set_kind(bus, guest, GUEST_UNREADABLE, emit);
-		guest->readable_by = mono_add(bus_now(bus), (span_t){ LOADING_NS });
-	}
-	return 0;
-}
-
-static void judge(struct bus *bus, struct walk *walk, struct bus_guest *guest,
-		  const struct bus_emit *emit)
-{
-	int r;
-
-	if (!read_identity(bus, walk, guest, emit)) {
-		return;
-	}
-	r = find_returned(bus, walk, guest, &guest->expected);
-	if (r >= 0) {
-		walk->at[guest->position].slave = r;
-		return_slave(bus, guest, (size_t)r, emit);
-	} else if (r == -EAGAIN) {
-		set_kind(bus, guest, GUEST_WAITING, emit);
-	} else {
-		set_kind(bus, guest, guest->expected >= 0 ? GUEST_WRONG : GUEST_STRANGER, emit);
-	}
-}
-
-/* --- the port towards a stranger --- */
-
-static int write_loop_control(struct bus *bus, size_t pos, uint8_t closed_ports)
-{
-	uint8_t control = 0;
-
-	for (unsigned port = 0; port < ESC_PORTS; port++) {
-		if ((closed_ports >> port & 1) != 0) {
-			control |= (uint8_t)(LOOP_CLOSED << (2 * port));
-		}
-	}
-	return register_write(bus, pos, ESC_REG_DL_CONTROL + 1, &control, sizeof(control));
-}
-
-/* The slave right before a stranger has a port open that it did not have at the scan: only
- * strangers are behind it, so it can be closed. In the middle of the line there is no such port. */
-static void shut_out(struct bus *bus, const struct walk *walk, size_t i)
-{
-	struct bus_slave *sl = &bus->slave[walk->at[i].slave];
-	uint8_t news = ports_of(&walk->at[i], DL_COMMUNICATION, 2) & (uint8_t)~sl->clock.ports;
-	unsigned port = 0;
-
-	if (news == 0 || (news & (news - 1)) != 0) {
-		return;
-	}
-	while ((news >> port & 1) == 0) {
-		port++;
-	}
-	for (size_t k = i + 1; k < walk->count && walk->at[k].slave < 0; k++) {
-		struct bus_guest *guest = guest_of(bus, get_le16(walk->at[k].address));
-
-		if (guest == NULL || guest->kind != GUEST_STRANGER) {
-			return; /* not all of them are known yet */
-		}
-	}
-	if (write_loop_control(bus, (size_t)walk->at[i].slave, sl->closed_ports | news) < 0) {
-		return;
-	}
-	sl->closed_ports |= news;
-	for (size_t k = i + 1; k < walk->count && walk->at[k].slave < 0; k++) {
-		struct bus_guest *guest = guest_of(bus, get_le16(walk->at[k].address));
-
-		guest->shut_by = walk->at[i].slave;
-		guest->shut_port = (uint8_t)port;
-	}
-}
-
-/* A closed port whose cable was pulled is opened again, and those behind it are gone. */
-static void reopen(struct bus *bus, const struct walk *walk, size_t i, const struct bus_emit *emit)
-{
-	int pos = walk->at[i].slave;
-	struct bus_slave *sl = &bus->slave[pos];
-	uint8_t kept = sl->closed_ports & ports_of(&walk->at[i], DL_LINK, 1);
-
-	if (kept == sl->closed_ports || write_loop_control(bus, (size_t)pos, kept) < 0) {
-		return;
-	}
-	for (size_t g = 0; g < GUESTS_MAX; g++) {
-		struct bus_guest *guest = &bus->guest[g];
-
-		if (guest->kind != GUEST_NONE && guest->shut_by == pos &&
-		    (kept >> guest->shut_port & 1) == 0) {
-			emit_guest(bus, guest, EVENT_STRANGER_GONE, emit);
-			guest->kind = GUEST_NONE;
-		}
-	}
-	sl->closed_ports = kept;
 }
 
 /* --- all of it --- */
@@ -576,53 +115,6 @@ static int is_unsettled(const struct bus *bus)
 	return 0;
 }
 
-static void follow_guests(struct bus *bus, struct walk *walk, const struct bus_emit *emit)
-{
-	unsigned identified = 0;
-
-	/* All of them first: what is addressed to a slave of ours must not reach them. */
-	for (size_t i = 0; i < walk->count; i++) {
-		if (walk->at[i].slave < 0) {
-			take_guest(bus, walk, i);
-		}
-	}
-	for (size_t i = 0; i < walk->count && identified < IDENTIFIED_PER_CALL; i++) {
-		struct bus_guest *guest = guest_of(bus, get_le16(walk->at[i].address));
-
-		if (walk->at[i].slave < 0 && guest != NULL) {
-			identified += is_identified(guest) ? 0 : 1;
-			judge(bus, walk, guest, emit);
-		}
-	}
-	for (size_t i = 0; i < walk->count; i++) {
-		if (walk->at[i].slave >= 0) {
-			reopen(bus, walk, i, emit);
-			shut_out(bus, walk, i);
-		}
-	}
-}
-
-unsigned bus_guests_answering(const struct bus *bus)
-{
-	unsigned count = 0;
-
-	for (size_t g = 0; g < GUESTS_MAX; g++) {
-		count += bus->guest[g].kind != GUEST_NONE && bus->guest[g].shut_by < 0;
-	}
-	return count;
-}
-
-unsigned bus_guests_known(const struct bus *bus)
-{
-	unsigned count = 0;
-
-	for (size_t g = 0; g < GUESTS_MAX; g++) {
-		count += bus->guest[g].kind >= GUEST_STRANGER &&
-			 bus->guest[g].kind <= GUEST_UNREADABLE;
-	}
-	return count;
-}
-
 static unsigned count_expected(const struct bus *bus)
 {
 	unsigned count = bus_guests_answering(bus);
@@ -642,8 +134,8 @@ int bus_places_follow(struct bus *bus, unsigned answering, int is_doubtful,
 	if (!is_doubtful && answering == count_expected(bus) && !is_unsettled(bus)) {
 		return 0;
 	}
-	if (answering > POSITIONS_MAX) {
-		walk.count = POSITIONS_MAX;
+	if (answering > WALK_POSITIONS) {
+		walk.count = WALK_POSITIONS;
 	}
 	r = walk_positions(bus, &walk);
 	for (size_t i = 0; i < bus->slave_count && r >= 0; i++) {
@@ -654,47 +146,20 @@ int bus_places_follow(struct bus *bus, unsigned answering, int is_doubtful,
 	}
 	for (size_t i = 0; i < walk.count; i++) {
 		if (walk.at[i].slave >= 0) {
-			note_back(bus, (size_t)walk.at[i].slave, emit);
+			bus_note_back(bus, (size_t)walk.at[i].slave, emit);
 		}
 	}
-	drop_guests(bus, &walk, emit);
-	follow_guests(bus, &walk, emit);
+	guests_drop(bus, &walk, emit);
+	guests_follow(bus, &walk, emit);
 	return 0;
 }
 
-void bus_guests_describe(const struct bus *bus, char *ret_text, size_t text_bytes)
+int bus_is_same_device(const struct bus_slave *sl, const struct bus_identity *found)
 {
-	static const char *const kind[] = { [GUEST_STRANGER] = "a device that is not configured",
-					    [GUEST_WRONG] = "wrong device",
-					    [GUEST_UNREADABLE] = "EEPROM blank or unreadable" };
-
-	ret_text[0] = '\0';
-	for (size_t g = 0; g < GUESTS_MAX; g++) {
-		const struct bus_guest *guest = &bus->guest[g];
-		int pos = guest->expected >= 0 ? guest->expected : guest->owner;
-		char what[96] = "";
-		char whose[96] = "";
-
-		if (guest->kind < GUEST_STRANGER || guest->kind > GUEST_UNREADABLE) {
-			continue;
-		}
-		if (is_identified(guest)) {
-			snprintf(what, sizeof(what),
-				 ": vendor 0x%08x product 0x%08x revision 0x%08x serial %u",
-				 guest->identity.vendor, guest->identity.product,
-				 guest->identity.revision, guest->identity.serial);
-		}
-		if (pos >= 0) {
-			snprintf(whose, sizeof(whose),
-				 guest->expected >= 0 ? " in the place of slave %d (%s)"
-						      : ", had the address of slave %d (%s)",
-				 pos, bus->slave[pos].info.name);
-		}
-		snprintf(ret_text, text_bytes, "position %u: %s%s%s%s", guest->position,
-			 kind[guest->kind], what, whose,
-			 guest->shut_by >= 0 ? "; the port towards it is closed" : "");
-		return;
-	}
+	return sl->info.vendor == found->vendor && sl->info.product == found->product &&
+	       sl->info.revision == found->revision &&
+	       (sl->info.serial == 0 || sl->info.serial == found->serial) &&
+	       sl->info.alias == found->alias;
 }
 
 int bus_reference_is_itself(struct bus *bus)
@@ -721,5 +186,5 @@ int bus_reference_is_itself(struct bus *bus)
 	}
 	r = bus_identity_read(bus, sl->info.station_addr, &identity);
 	register_write(bus, pos, ESC_REG_EEPROM_CONFIG, &to_pdi, sizeof(to_pdi));
-	return r < 0 ? -EAGAIN : is_same_device(sl, &identity);
+	return r < 0 ? -EAGAIN : bus_is_same_device(sl, &identity);
 }
