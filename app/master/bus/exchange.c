@@ -14,11 +14,24 @@
 #include "wire/datagram.h"
 
 enum {
+	PATH_WINDOW = 64, /* exchanges over which the shortest path is taken */
 	HISTORY = 256, /* exchanges whose frames are kept, to tell a late frame from a duplicate */
 	DC_DIFF_MAGNITUDE = 0x7fffffff,
 };
 
 static_assert(LIMIT_FRAMES <= 8, "a bit per frame in history[]");
+
+/*
+ * How long a frame's end is behind its start, but for its own length: wires, slaves, NIC. The
+ * shortest of a window is not shorter than the way itself, and what the host adds to the others
+ * does not keep the wire busy.
+ */
+struct path_time {
+	int64_t ns; /* of the last window; of the first one so far, before it is full */
+	int64_t shortest_ns;
+	unsigned count;
+	int has_window;
+};
 
 struct exchange {
 	struct exchange_plan plan;
@@ -33,6 +46,8 @@ struct exchange {
 	struct dc_track dc;
 	_Atomic int is_reference_doubted;   /* [cycle] */
 	_Atomic int is_reference_confirmed; /* [service] sets, [cycle] takes */
+	struct path_time path;
+	int64_t wire_ns;               /* of its frames */
 	struct exchange_result result; /* result being built; keeps the counts of a ride for the
 					  next one */
 	struct exchange_frame frame[LIMIT_FRAMES];
@@ -85,6 +100,7 @@ int exchange_create(const struct exchange_plan *plan, struct line *line,
 			free(ex);
 			return r;
 		}
+		ex->wire_ns += ecat_wire_time_ns(ex->frame[i].len);
 	}
 	*ret_exchange = ex;
 	return 0;
@@ -224,6 +240,22 @@ static void keep_frame(struct exchange *ex, unsigned number)
 	}
 }
 
+static void measure_path(struct path_time *path, int64_t ns)
+{
+	ns = ns > 0 ? ns : 0;
+	if (path->count == 0 || ns < path->shortest_ns) {
+		path->shortest_ns = ns;
+	}
+	path->count++;
+	if (path->count == PATH_WINDOW || !path->has_window) {
+		path->ns = path->shortest_ns;
+	}
+	if (path->count == PATH_WINDOW) {
+		path->count = 0;
+		path->has_window = 1;
+	}
+}
+
 /* A frame of this exchange or an earlier one, by its sequence. 1 if it was waited for. */
 static int sort_frame(struct exchange *ex, unsigned number, uint16_t sequence, mono_t at)
 {
@@ -249,6 +281,7 @@ static int sort_frame(struct exchange *ex, unsigned number, uint16_t sequence, m
 		keep_frame(ex, number);
 		if (ex->missing == 0) {
 			ex->result.round_trip = mono_sub(at, ex->result.sent);
+			measure_path(&ex->path, ex->result.round_trip.ns - ex->wire_ns);
 		}
 		return 1;
 	}
@@ -352,18 +385,18 @@ struct exchange_result exchange_run(struct exchange *ex, uint8_t *image, mono_t 
 static unsigned send_service_frames(struct exchange *ex, const struct exchange_window *window)
 {
 	unsigned count = 0;
-	mono_t free_at = now(ex);
+	mono_t back_at = mono_add(now(ex), (span_t){ ex->path.ns });
 	const uint8_t *frame;
 	size_t len;
 
-	while ((frame = line_ride_take(ex->line, mono_sub(window->wire_needed, free_at), &len)) !=
+	while ((frame = line_ride_take(ex->line, mono_sub(window->wire_needed, back_at), &len)) !=
 	       NULL) {
 		int r = ex->transport.send(ex->transport.ctx, frame, len);
 
 		if (r < 0) {
 			line_ride_refused(ex->line, r);
 		}
-		free_at = mono_add(free_at, (span_t){ ecat_wire_time_ns(len) });
+		back_at = mono_add(back_at, (span_t){ ecat_wire_time_ns(len) });
 		count++;
 	}
 	return count;

@@ -337,3 +337,71 @@ TEST(exchange, service_frame_rides_along_and_is_not_foreign)
 	CHECK_EQ(run(b).foreign, 0);
 	bench_destroy(b);
 }
+
+enum { SERVICE_BYTES = 1400, SERVICE_FRAME_BYTES = SERVICE_BYTES + 28 };
+
+static void submit_service_frame(struct bench *b)
+{
+	static const uint8_t source[6] = { 0x10, 0x10, 0x10, 0x10, 0x10, 0x10 };
+	struct ecat_frame_builder fb;
+	uint8_t frame[LIMIT_FRAME_BYTES];
+
+	ecat_frame_begin(&fb, frame, source);
+	ecat_frame_add(&fb, ECAT_CMD_FPRD, 7, 0x1001, 0x1000, SERVICE_BYTES);
+	CHECK_EQ(line_submit(b->line, LINE_MAILBOX, frame, ecat_frame_end(&fb)), 0);
+}
+
+/* How many service frames a cycle sends that has @left_ns until its wire is needed. */
+static unsigned ride(struct bench *b, int64_t left_ns)
+{
+	return exchange_ride(b->ex, &(struct exchange_window){
+					    .period = { NS_PER_MS },
+					    .wire_needed = { b->wire.now_ns + left_ns },
+					    .listen_until = { b->wire.now_ns },
+				    });
+}
+
+TEST(exchange, a_service_frame_that_does_not_fit_any_more_is_kept)
+{
+	struct exchange_plan plan = small_plan();
+	struct bench *b = bench_create(&plan);
+	int64_t frame_ns = ecat_wire_time_ns(SERVICE_FRAME_BYTES);
+	int64_t own_ns;
+
+	b->wire.travel_ns = 50000;
+	line_ride_begin(b->line, (struct line_waiter){ cycle_once, b });
+	run(b);
+	own_ns = ecat_wire_time_ns(b->wire.last_sent.len);
+	submit_service_frame(b);
+	CHECK_EQ(ride(b, -100000), 0);
+	CHECK_EQ(ride(b, frame_ns + 50000 - own_ns - 1), 0);
+	CHECK_EQ(ride(b, frame_ns + 50000 - own_ns), 1);
+	bench_destroy(b);
+}
+
+TEST(exchange, the_path_is_the_shortest_of_a_window_and_not_a_stall_of_the_host)
+{
+	struct exchange_plan plan = small_plan();
+	struct bench *b = bench_create(&plan);
+	int64_t frame_ns = ecat_wire_time_ns(SERVICE_FRAME_BYTES);
+
+	line_ride_begin(b->line, (struct line_waiter){ cycle_once, b });
+	for (unsigned i = 0; i < 1000; i++) {
+		b->wire.travel_ns = i % 10 == 3 ? 30000 : 300000;
+		run(b);
+	}
+	submit_service_frame(b);
+	CHECK_EQ(ride(b, frame_ns + 30000), 1);
+	line_ride_end(b->line);
+	line_ride_begin(b->line, (struct line_waiter){ cycle_once, b });
+	for (unsigned i = 0; i < 150; i++) { /* slaves have come */
+		b->wire.travel_ns = 60000;
+		run(b);
+	}
+	while (line_collect(b->line, LINE_MAILBOX, b->image, sizeof(b->image)) == -EAGAIN) {
+	}
+	submit_service_frame(b);
+	CHECK_EQ(ride(b, frame_ns + 30000), 0);
+	CHECK_EQ(ride(b, frame_ns + 60000), 1);
+	bench_destroy(b);
+}
