@@ -10,26 +10,38 @@
 enum { EXIT_OF_SIGNAL = 128 };
 
 static volatile sig_atomic_t is_requested;
-static enum stop_repeat on_repeat;
+static int64_t requested_at_ns; /* of the handler alone, which does not interrupt itself */
+static int64_t grace_of_first_ns;
 static void (*on_first)(void);
 static sigset_t outside; /* the mask while waiting */
 
+static int64_t now_ns(void)
+{
+	struct timespec now;
+
+	clock_gettime(CLOCK_MONOTONIC, &now);
+	return now.tv_sec * NS_PER_S + now.tv_nsec;
+}
+
 static void on_signal(int number)
 {
-	if (is_requested && on_repeat == STOP_REPEAT_EXITS) {
+	if (is_requested && now_ns() - requested_at_ns >= grace_of_first_ns) {
 		_exit(EXIT_OF_SIGNAL + number);
 	}
-	if (!is_requested && on_first != NULL) {
-		on_first();
+	if (!is_requested) {
+		requested_at_ns = now_ns();
+		if (on_first != NULL) {
+			on_first();
+		}
 	}
 	is_requested = 1;
 }
 
-void stop_catch(enum stop_repeat repeat, void (*notify)(void))
+void stop_catch(int64_t grace_ns, void (*notify)(void))
 {
 	struct sigaction action = { .sa_handler = on_signal };
 
-	on_repeat = repeat;
+	grace_of_first_ns = grace_ns;
 	on_first = notify;
 	sigprocmask(SIG_SETMASK, NULL, &outside);
 	sigaddset(&action.sa_mask, SIGTERM);

@@ -6,14 +6,15 @@
 #include <signal.h>
 #include <stdint.h>
 
-/* What a second signal does. */
-enum stop_repeat { STOP_REPEAT_IGNORED, STOP_REPEAT_EXITS };
+/* Another signal, however late, is ignored. */
+#define STOP_REPEAT_IGNORED INT64_MAX
 
 /**
- * Catch both from now on; the first calls @notify (NULL: none), in the signal handler. Context:
- * main thread, before others are started.
+ * Catch both from now on; the first calls @notify (NULL: none), in the signal handler. Another one
+ * @grace_ns later or after that ends the process, in case the stop is stuck; before, it is ignored.
+ * Context: main thread, before others are started.
  */
-void stop_catch(enum stop_repeat repeat, void (*notify)(void));
+void stop_catch(int64_t grace_ns, void (*notify)(void));
 /** Block them, but in stop_wait(): none is missed between the question and the wait. */
 void stop_block(void);
 /** 1 after one came. Context: any. */

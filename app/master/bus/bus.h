@@ -7,8 +7,9 @@
  *
  * Every call that fails writes one line, what and why, with position, vendor, product, register or
  * AL status text, to @error (BUS_ERROR_BYTES) and returns -errno:
- *   -ENODEV no slave, -ENXIO a slave too few or too many or the wrong one, -EPROTO mapping does not
- * fit, -ETIME a state or lock was not reached in time, -EIO the wire, -ENOTSUP, -E2BIG a limit.
+ *   -ECANCELED by line_set_cancel(), -ENODEV no slave, -ENXIO a slave too few or too many or the
+ * wrong one, -EPROTO mapping does not fit, -ETIME a state or lock was not reached in time, -EIO the
+ * wire, -ENOTSUP, -E2BIG a limit.
  */
 #ifndef BUS_BUS_H
 #define BUS_BUS_H
@@ -59,8 +60,13 @@ int bus_sync0_start(struct bus *bus, int64_t dc_now_ns, char *error);
 /** All slaves to @state (SAFE-OP, OP, PRE-OP, INIT), with AL errors named by slave, code and text.
  */
 int bus_request_state(struct bus *bus, enum al_state state, span_t timeout, char *error);
-/** SYNC0 off, all to INIT; continues after errors. The cycle must have set the outputs to
- * fail-safe. */
+/** The first step of an ordered stop, while the cycle runs: all that answer to SAFE-OP, in 150 ms.
+ */
+int bus_stop_outputs(struct bus *bus, char *error);
+/**
+ * SYNC0 off, all that answer to INIT; continues after errors, and takes 150 ms per state at most.
+ * Also after a scan that was cancelled. The cycle must have set the outputs to fail-safe.
+ */
 int bus_stop(struct bus *bus, char *error);
 
 /* --- in OP, a few times a second --- */

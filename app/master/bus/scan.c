@@ -58,7 +58,9 @@ static int find_slaves(struct bus *bus)
 		if (found > 0 || found == EC_SLAVECOUNTEXCEEDED || bus_now(bus).ns >= give_up.ns) {
 			break;
 		}
-		line_sleep(bus->line, (span_t){ 100 * NS_PER_MS });
+		if (line_sleep(bus->line, (span_t){ 100 * NS_PER_MS }) < 0) {
+			return bus_fail(bus, -ECANCELED, "cancelled during the scan");
+		}
 	}
 	if (found == EC_SLAVECOUNTEXCEEDED) {
 		return bus_fail(bus, -E2BIG, "more slaves on the bus than LIMIT_SLAVES (%d)",

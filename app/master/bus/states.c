@@ -11,6 +11,10 @@
 #include "bus/registers.h"
 
 enum { AL_BYTES = 6, POLL_MS = 2, ACKNOWLEDGE_NS = 500000000 };
+/* Polls without an answer after which a slave is left behind on the way down. */
+enum { ABSENT_POLLS = 3 };
+/* Each step of the way down: three of them and the cycle's last frames take less than a second. */
+#define STOP_STEP_NS (150 * NS_PER_MS)
 
 struct al_reading {
 	uint8_t bytes[AL_BYTES]; /* 0x0130 to 0x0135: status, reserved, code */
@@ -150,9 +154,9 @@ static int say_why(struct bus *bus, size_t pos, const struct al_reading *al, enu
 			      bus_al_name(status_of(al)));
 }
 
-static void poll_pause(struct bus *bus)
+static int poll_pause(struct bus *bus)
 {
-	line_sleep(bus->line, (span_t){ POLL_MS * NS_PER_MS });
+	return line_sleep(bus->line, (span_t){ POLL_MS * NS_PER_MS });
 }
 
 /* An error of the past must not be taken for a refusal: acknowledge it, in the state it left. */
@@ -173,59 +177,91 @@ static int acknowledge_errors(struct bus *bus, mono_t give_up)
 				register_write(bus, i, ESC_REG_AL_CONTROL, word, sizeof(word));
 			}
 		}
-		if (errors == 0 || bus_now(bus).ns >= give_up.ns) {
+		if (errors == 0 || bus_now(bus).ns >= give_up.ns || poll_pause(bus) < 0) {
 			return r;
 		}
-		poll_pause(bus);
 	}
 }
 
-static int wait_for(struct bus *bus, enum al_state state, mono_t give_up)
+/* How slaves are led to a state. */
+enum lead {
+	LEAD_ALL,     /* each has to get there */
+	LEAD_PRESENT, /* the way down: a slave that does not answer is not waited for */
+};
+
+/* 1 if nobody who answers is missing in @state. */
+static int are_present_in(const struct bus *bus, const struct al_reading *al, enum al_state state)
+{
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		if (al[i].wkc > 0 && !is_in(&al[i], state)) {
+			return 0;
+		}
+	}
+	return 1;
+}
+
+static int wait_for(struct bus *bus, enum al_state state, enum lead lead, mono_t give_up)
 {
 	struct al_reading al[LIMIT_SLAVES] = { 0 };
 	uint8_t taken[LIMIT_SLAVES] = { 0 };
 
-	for (;;) {
+	for (unsigned polls = 0;; polls++) {
 		int r = write_control(bus, state, taken);
 		int culprit = -1;
+		int is_over;
 
 		if (r >= 0) {
 			r = read_states(bus, al);
 		}
+		is_over = bus_now(bus).ns >= give_up.ns;
 		if (r >= 0) {
 			culprit = find_culprit(bus, al, state);
 			if (culprit < 0) {
 				return 0;
 			}
-			if (has_error(&al[culprit]) && taken[culprit]) {
-				return say_why(bus, (size_t)culprit, &al[culprit], state);
-			}
+			is_over |= has_error(&al[culprit]) && taken[culprit];
+			is_over |= lead == LEAD_PRESENT && polls >= ABSENT_POLLS &&
+				   are_present_in(bus, al, state);
 		}
-		if (bus_now(bus).ns >= give_up.ns) {
+		if (!is_over && r != -ECANCELED) {
+			r = poll_pause(bus) < 0 ? -ECANCELED : r;
+		}
+		if (r == -ECANCELED) {
+			return bus_fail(bus, r, "cancelled on the way to %s",
+					al_state_to_str((uint16_t)state));
+		}
+		if (is_over) {
 			return r < 0 ? bus_fail(bus, -EIO, "no frame returns on the way to %s",
 						al_state_to_str((uint16_t)state))
 				     : say_why(bus, (size_t)culprit, &al[culprit], state);
 		}
-		poll_pause(bus);
 	}
+}
+
+static int lead_to(struct bus *bus, enum al_state state, enum lead lead, span_t timeout)
+{
+	mono_t start = bus_now(bus);
+	int64_t acknowledge_ns = timeout.ns / 2 < ACKNOWLEDGE_NS ? timeout.ns / 2 : ACKNOWLEDGE_NS;
+
+	bus->target = state;
+	acknowledge_errors(bus, mono_add(start, (span_t){ acknowledge_ns }));
+	return wait_for(bus, state, lead, mono_add(start, timeout));
 }
 
 int bus_request_state(struct bus *bus, enum al_state state, span_t timeout, char *error)
 {
-	mono_t give_up = mono_add(bus_now(bus), timeout);
-
 	bus->error = error;
-	bus->target = state;
-	acknowledge_errors(bus, mono_add(bus_now(bus), (span_t){ ACKNOWLEDGE_NS }));
-	return wait_for(bus, state, give_up);
+	return lead_to(bus, state, LEAD_ALL, timeout);
 }
 
 /* A step down that continues after errors and keeps the first one. */
 static int step_down(struct bus *bus, enum al_state state, int before, char *error)
 {
 	char later[BUS_ERROR_BYTES];
-	int r = bus_request_state(bus, state, (span_t){ NS_PER_S }, before < 0 ? later : error);
+	int r;
 
+	bus->error = before < 0 ? later : error;
+	r = lead_to(bus, state, LEAD_PRESENT, (span_t){ STOP_STEP_NS });
 	return before < 0 ? before : r;
 }
 
@@ -236,12 +272,27 @@ static int is_line_dead(struct bus *bus)
 	return registers_run(bus, &access, 1) < 0;
 }
 
+int bus_stop_outputs(struct bus *bus, char *error)
+{
+	return step_down(bus, AL_SAFEOP, 0, error);
+}
+
+/* A scan that was interrupted may have left slaves in PRE-OP. */
+static void broadcast_init(struct bus *bus)
+{
+	uint8_t word[2];
+
+	put_le16(word, AL_INIT | AL_ERROR);
+	register_broadcast(bus, ESC_REG_AL_CONTROL, word, sizeof(word));
+}
+
 int bus_stop(struct bus *bus, char *error)
 {
 	int r = 0;
 
 	bus->error = error;
 	if (bus->slave_count == 0) {
+		broadcast_init(bus);
 		return 0;
 	}
 	if (is_line_dead(bus)) {

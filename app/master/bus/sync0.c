@@ -187,7 +187,9 @@ static int wait_past(struct bus *bus, int64_t start_ns)
 		if (now_ns > start_ns + 2 * period_ns(bus)) {
 			return 0;
 		}
-		line_sleep(bus->line, (span_t){ start_ns + 3 * period_ns(bus) - now_ns });
+		if (line_sleep(bus->line, (span_t){ start_ns + 3 * period_ns(bus) - now_ns }) < 0) {
+			return bus_fail(bus, -ECANCELED, "cancelled while SYNC0 started");
+		}
 	}
 }
 

@@ -72,6 +72,8 @@ static int open_line(struct session *s, struct failure *failure)
 	line_bind(s->line);
 	line_timeout_set(s->line, (span_t){ s->spec.cfg->bus_frame_timeout_ns });
 	line_set_keepalive(s->line, s->spec.hooks.alive, s->spec.hooks.ctx);
+	s->stop_by = (mono_t){ 0 };
+	line_set_cancel(s->line, session_is_cancelled, s);
 	r = bus_create(s->spec.cfg, s->line, &s->bus);
 	if (r < 0) {
 		return failure_set(failure, EXIT_CODE_RESOURCES, r, "bus: %s", strerror(-r));

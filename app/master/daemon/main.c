@@ -17,6 +17,9 @@
 #define BACK_OFF_MIN_NS (250 * NS_PER_MS)
 #define BACK_OFF_MAX_NS (5 * NS_PER_S)
 
+/* An ordered stop takes less than a second; a second signal before that would cut it short. */
+#define STOP_GRACE_NS (2 * NS_PER_S)
+
 static struct session *_Atomic signalled;
 
 static void stop_session(void)
@@ -34,7 +37,7 @@ static void catch_signals(void)
 {
 	struct sigaction ignore = { .sa_handler = SIG_IGN };
 
-	stop_catch(STOP_REPEAT_EXITS, stop_session);
+	stop_catch(STOP_GRACE_NS, stop_session);
 	sigaction(SIGPIPE, &ignore, NULL);
 	sigaction(SIGHUP, &ignore, NULL);
 }
@@ -257,9 +260,10 @@ static int run(struct program *pg)
 }
 
 static const char notes[] =
-	"SIGTERM or SIGINT: outputs to fail-safe, slaves to INIT, a summary. A second one exits "
-	"at\n"
-	"once; then the slaves' watchdogs switch the outputs to safe.\n"
+	"SIGTERM or SIGINT: outputs to fail-safe, slaves to INIT, within 1 s; a summary. Should "
+	"that\n"
+	"hang, another one 2 s later ends ecdaqd; then the slaves' watchdogs make the outputs "
+	"safe.\n"
 	"\n"
 	"environment: ECDAQ_RUN_DIR (run directory where none is configured), NOTIFY_SOCKET and\n"
 	"WATCHDOG_USEC (set by systemd for Type=notify)\n";

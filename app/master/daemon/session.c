@@ -126,6 +126,13 @@ void session_wait(struct session *s, span_t span)
 	} while (session_now(s).ns < until.ns && !session_is_stop_asked(s));
 }
 
+int session_is_cancelled(void *ctx)
+{
+	const struct session *s = ctx;
+
+	return s->stop_by.ns != 0 ? session_now(s).ns >= s->stop_by.ns : session_is_stop_asked(s);
+}
+
 int session_cancelled(const struct session *s, struct failure *failure)
 {
 	return session_is_stop_asked(s)
@@ -140,10 +147,11 @@ int session_step(struct session *s, int r, enum exit_code late, const char *erro
 	if (s->spec.hooks.alive != NULL) {
 		s->spec.hooks.alive(s->spec.hooks.ctx);
 	}
-	if (r < 0) {
-		return failure_set(failure, failure_code_of_bus(r, late), r, "%s", error);
+	/* Whatever failed after a stop request failed because of it. */
+	if (r >= 0 || session_is_stop_asked(s)) {
+		return session_cancelled(s, failure);
 	}
-	return session_cancelled(s, failure);
+	return failure_set(failure, failure_code_of_bus(r, late), r, "%s", error);
 }
 
 void session_state_set(struct session *s, enum bus_state state)

@@ -19,7 +19,8 @@ struct session {
 	struct session_spec spec;
 	struct run_dir run;
 	struct admin_server *admin;
-	_Atomic int stop_asked;  /* [any] */
+	_Atomic int stop_asked; /* [any] */
+	mono_t stop_by; /* 0: not stopping; else nothing on the wire is waited for any longer */
 	_Atomic int clear_asked; /* [service] set; [cycle] reset */
 	struct event_queue events;
 	unsigned replies_waiting;
@@ -59,6 +60,8 @@ mono_t session_now(const struct session *s);
  * for it. */
 struct platform session_cycle_platform(struct session *s);
 
+/** For line_set_cancel(): on the way up, a stop request; on the way down, its time is over. */
+int session_is_cancelled(void *ctx);
 /** 0; -ECANCELED with @failure on a stop request. */
 int session_cancelled(const struct session *s, struct failure *failure);
 /** After one call of bus/bus.h that gave @r and @error: @late is what "not in time" means for it.

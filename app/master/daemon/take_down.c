@@ -8,6 +8,8 @@
 /* Number of cycles with fail-safe outputs before the slaves leave OP. */
 enum { SAFE_CYCLES = 4 };
 #define SAFE_TIMEOUT_NS (200 * NS_PER_MS)
+/* From the beginning of a stop to the last frame, whatever is broken. */
+#define STOP_NS (850 * NS_PER_MS)
 
 int session_cycle_end(struct session *s)
 {
@@ -49,10 +51,11 @@ int session_stop(struct session *session, struct failure *failure)
 		session_drop(s);
 		return 0;
 	}
+	s->stop_by = mono_add(session_now(s), (span_t){ STOP_NS });
+	admin_server_cancel_all(s->admin);
 	if (s->is_riding) {
 		make_outputs_safe(s);
-		r = bus_request_state(s->bus, AL_SAFEOP, (span_t){ s->spec.cfg->bus_op_timeout_ns },
-				      error);
+		r = bus_stop_outputs(s->bus, error);
 		if (r < 0) {
 			first = failure_set(failure, failure_code_of_bus(r, EXIT_CODE_STATE), r,
 					    "%s", error);

@@ -177,7 +177,7 @@ void line_set_cancel(struct line *line, int (*is_cancelled)(void *ctx), void *ct
 	line->cancel_ctx = ctx;
 }
 
-static int is_cancelled(const struct line *line)
+int line_is_cancelled(const struct line *line)
 {
 	return line->is_cancelled != NULL && line->is_cancelled(line->cancel_ctx);
 }
@@ -359,7 +359,7 @@ static mono_t next_check(const struct line *line, mono_t until)
 static int sleep_until(struct line *line, mono_t until)
 {
 	do {
-		if (is_cancelled(line)) {
+		if (line_is_cancelled(line)) {
 			return -ECANCELED;
 		}
 		if (line->is_riding) {
@@ -394,7 +394,7 @@ static void receive_one(struct line *line, mono_t until)
  */
 static void receive(struct line *line, struct slot *slot)
 {
-	while (state_of(slot) == SLOT_OUT && !is_cancelled(line)) {
+	while (state_of(slot) == SLOT_OUT && !line_is_cancelled(line)) {
 		receive_one(line, next_check(line, slot->give_up));
 		if (now(line).ns >= slot->give_up.ns) {
 			break;
@@ -425,7 +425,7 @@ int line_transact(struct line *line, const uint8_t *frame, size_t frame_len, uin
 	int r;
 
 	get_on(line);
-	if (is_cancelled(line)) {
+	if (line_is_cancelled(line)) {
 		return -ECANCELED;
 	}
 	r = line_submit(line, LINE_SUPERVISOR, frame, frame_len);
@@ -436,7 +436,7 @@ int line_transact(struct line *line, const uint8_t *frame, size_t frame_len, uin
 		sl->give_up = mono_add(now(line), timeout);
 	}
 	while ((r = line_collect(line, LINE_SUPERVISOR, ret_answer, capacity)) == -EAGAIN) {
-		if (!line->is_riding || is_cancelled(line)) {
+		if (!line->is_riding || line_is_cancelled(line)) {
 			withdraw(sl);
 			set_state(sl, SLOT_FREE);
 			return -ECANCELED;

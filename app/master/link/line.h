@@ -106,6 +106,8 @@ void line_set_keepalive(struct line *line, void (*attend)(void *ctx), void *ctx)
  * asked before each frame and pause and at least every 10 ms of waiting. NULL: never.
  */
 void line_set_cancel(struct line *line, int (*is_cancelled)(void *ctx), void *ctx);
+/** What it says now. */
+int line_is_cancelled(const struct line *line);
 
 /** Frames that line_transact() and line_collect() dropped in direct mode. */
 uint64_t line_discarded(const struct line *line);

@@ -35,10 +35,14 @@ void osal_timer_start(osal_timert *self, uint32 timeout_us)
 	self->stop_time = to_timet(monotonic().ns + (int64_t)timeout_us * NS_PER_US);
 }
 
+/* SOEM repeats until a timer has expired: a cancelled line ends that at once. */
 boolean osal_timer_is_expired(osal_timert *self)
 {
 	ec_timet now = to_timet(monotonic().ns);
 
+	if (line_bound() != NULL && line_is_cancelled(line_bound())) {
+		return TRUE;
+	}
 	if (now.sec != self->stop_time.sec) {
 		return now.sec > self->stop_time.sec;
 	}

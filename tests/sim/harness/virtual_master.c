@@ -26,8 +26,12 @@ static mono_t door_now(void *ctx)
 {
 	struct virtual_master *vm = ctx;
 	struct platform pf = in_process_platform(vm->bench->host);
+	mono_t now = pf.now(pf.ctx);
 
-	return pf.now(pf.ctx);
+	if (vm->stop_at_ns != 0 && virtual_bench_now_ns(vm->bench) >= vm->stop_at_ns) {
+		session_stop_ask(vm->session);
+	}
+	return now;
 }
 
 static int64_t door_tai(void *ctx)

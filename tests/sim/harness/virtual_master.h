@@ -43,9 +43,10 @@ struct virtual_master {
 	struct cycle *cycle; /* NULL: does not run */
 	struct ring_reader *samples;
 	struct virtual_result result;
-	struct failure failure;                        /* of the newest call that failed */
-	unsigned steps;                                /* since the service loop ran */
-	int64_t op_ns;                                 /* virtual time that bring-up took */
+	struct failure failure; /* of the newest call that failed */
+	unsigned steps;         /* since the service loop ran */
+	int64_t op_ns;          /* virtual time that bring-up took */
+	int64_t stop_at_ns;     /* when a stop is requested, in a bring-up, too; 0: never */
 	void (*each_cycle)(struct virtual_master *vm); /* a checker, after every cycle; NULL: none
 							*/
 	/* Every frame that comes back to the master; NULL: none looks. */

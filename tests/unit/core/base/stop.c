@@ -48,14 +48,28 @@ TEST(stop, a_signal_is_kept_and_notified_once)
 
 static void two_signals(void)
 {
-	stop_catch(STOP_REPEAT_EXITS, NULL);
+	stop_catch(0, NULL);
 	raise(SIGTERM);
 	raise(SIGINT);
 }
 
-TEST(stop, a_second_signal_exits_where_requested)
+TEST(stop, a_second_signal_exits_after_the_grace)
 {
 	CHECK_EQ(exit_code_of(two_signals), 128 + SIGINT);
+}
+
+static void two_signals_in_a_minute(void)
+{
+	stop_catch(INT64_C(60) * 1000000000, notify);
+	raise(SIGTERM);
+	raise(SIGTERM);
+	raise(SIGINT);
+	CHECK_EQ(notified, 1);
+}
+
+TEST(stop, a_second_signal_in_the_grace_leaves_the_stop_to_finish)
+{
+	CHECK_EQ(exit_code_of(two_signals_in_a_minute), 0);
 }
 
 static void wait_for_a_blocked_one(void)
