@@ -70,6 +70,7 @@ struct config {
 	/* bus */
 	char interface[32];
 	int64_t bus_scan_timeout_ns;
+	int64_t bus_mailbox_timeout_ns;
 	int64_t bus_op_timeout_ns;
 	int64_t bus_frame_timeout_ns;
 	int64_t bus_watchdog_ns; /* SM watchdog of the slaves; 0 = leave */

@@ -43,6 +43,10 @@ int bus_create(const struct config *cfg, struct line *line, struct bus **ret_bus
 	bus->line = line;
 	bus->reference = -1;
 	bind_soem(bus);
+	if (bus_mailbox_create(bus) < 0) {
+		free(bus);
+		return -ENOMEM;
+	}
 	line_bind(line);
 	ecx_init(&bus->context, "");
 	*ret_bus = bus;
@@ -56,7 +60,10 @@ void bus_listen(struct bus *bus, void (*emit)(void *ctx, const struct event *ev)
 
 void bus_destroy(struct bus *bus)
 {
-	free(bus);
+	if (bus != NULL) {
+		mailbox_destroy(bus->mailbox);
+		free(bus);
+	}
 }
 
 mono_t bus_now(const struct bus *bus)

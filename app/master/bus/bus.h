@@ -29,6 +29,7 @@
 enum { BUS_ERROR_BYTES = 256, BUS_TROUBLE_BYTES = 208 };
 
 struct bus;
+struct mailbox_engine;
 
 /** @cfg and @line outlive the bus. Free with bus_destroy(). */
 int bus_create(const struct config *cfg, struct line *line, struct bus **ret_bus);
@@ -117,7 +118,15 @@ const struct exchange_plan *bus_plan(const struct bus *bus);
 
 /* --- mailbox and registers, in any state from PRE-OP on --- */
 
-/** @ret_abort is the SDO abort code or 0. Size in @len is updated by read. */
+/** The mailboxes of all slaves: requests that do not block (mailbox/mailbox.h). */
+struct mailbox_engine *bus_mailbox(struct bus *bus);
+/** One pass of it; in OP once a cycle or so while it is busy, else a few times a second. */
+void bus_mailbox_step(struct bus *bus);
+
+/**
+ * One SDO transfer; blocking, at most bus.mailbox_timeout for each mail. A download is never
+ * executed twice. @ret_abort is the SDO abort code or 0. Size in @len is updated by read.
+ */
 int bus_sdo_read(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t subindex,
 		 uint8_t *ret_data, size_t *len, uint32_t *ret_abort);
 int bus_sdo_write(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t subindex,

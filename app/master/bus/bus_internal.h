@@ -20,6 +20,7 @@
 #include "bus/error_counters.h"
 #include "bus/pdo.h"
 #include "bus/places.h"
+#include "mailbox/mailbox.h"
 #include "wire/sii.h"
 
 enum {
@@ -53,6 +54,17 @@ struct sync_limits {
 	uint32_t minimum_cycle_ns;
 };
 
+enum startup_state { STARTUP_IDLE, STARTUP_RUNNING, STARTUP_DONE, STARTUP_FAILED };
+
+/* The start-up SDOs of a slave, one after the other. */
+struct bus_startup {
+	enum startup_state state;
+	struct mailbox_request request;
+	uint8_t data[8];
+	size_t next;           /* 0: the mode, then bus->cfg->sdo[next - 1] */
+	struct config_sdo sdo; /* that runs */
+};
+
 struct bus_slave {
 	struct slave_info info;
 	struct dc_node clock; /* ports, receive times, parent, delay */
@@ -77,6 +89,7 @@ struct bus_slave {
 	int64_t clock_offset_ns; /* as written to 0x0920 */
 	unsigned good_looks;     /* at 0x092C, in a row */
 	struct error_counters errors;
+	struct bus_startup startup;
 	enum recovery_step step;
 	enum al_state accepted; /* request that it has taken in this step */
 	mono_t step_deadline;
@@ -98,6 +111,7 @@ struct bus {
 	const struct config *cfg;
 	struct bus_emit listener; /* of mailbox events */
 	struct line *line;
+	struct mailbox_engine *mailbox;
 	char *error;      /* of the public call that runs */
 	uint8_t sequence; /* index byte of our own frames */
 	/* In bus_watch() or bus_lead_back(): what is lost is polled again soon, so fewer tries.
@@ -138,8 +152,6 @@ struct bus {
 	ec_eepromSMt sii_sm;
 	ec_eepromFMMUt sii_fmmu;
 	struct sii parsed; /* the SII parsed last */
-	ec_ODlistt od_list;
-	ec_OElistt od_entries;
 };
 
 static inline uint16_t soem_index(size_t pos)
@@ -196,13 +208,24 @@ int bus_has_coe(const struct bus *bus, size_t pos);
 /** A little-endian value of 1 to 8 bytes; @ret_abort as bus_sdo_read(). */
 int bus_sdo_value(struct bus *bus, size_t pos, uint16_t index, uint8_t subindex,
 		  uint64_t *ret_value, uint32_t *ret_abort);
-/** Mode and configured start-up SDOs of one slave, in PRE-OP. */
-int bus_startup_sdos(struct bus *bus, size_t pos);
-/** The same, begun and polled: 1 under way, 0 done, -errno. */
+/** Description of an entry by SDO information. 0; -errno. */
+int bus_sdo_entry(struct bus *bus, size_t pos, uint16_t index, uint8_t subindex,
+		  struct coe_entry *ret_entry);
+
+int bus_mailbox_create(struct bus *bus);
+/** The slave's mailbox SyncManagers were programmed, as SOEM has them. */
+void bus_mailbox_set(struct bus *bus, size_t pos);
+
+/**
+ * Mode and configured start-up SDOs of one slave, in PRE-OP: begun, and polled until they are
+ * done, while the engine is stepped. poll() begins them if begin() was not called. 1 they run; 0;
+ * -errno with a line.
+ */
 void bus_startup_begin(struct bus *bus, size_t pos);
 int bus_startup_poll(struct bus *bus, size_t pos);
-/** Read unsolicited messages from a slave's mailbox: emergencies. */
-void bus_read_mail(struct bus *bus, size_t pos);
+void bus_startup_cancel(struct bus *bus, size_t pos);
+/** Those of all slaves at the same time; blocking. */
+int bus_startup_all(struct bus *bus);
 
 /* --- map_sm.c --- */
 

@@ -145,33 +145,22 @@ int bus_coe_entries(struct bus *bus, size_t pos, struct pdo_entry *ret, size_t c
 
 void bus_coe_names(struct bus *bus, size_t pos, struct pdo_entry *entry, size_t count)
 {
-	ec_ODlistt *list = &bus->od_list;
-	ec_OElistt *entries = &bus->od_entries;
-	ec_errort note;
-
 	if ((bus->soem_slave[soem_index(pos)].CoEdetails & ECT_COEDET_SDOINFO) == 0) {
 		return;
 	}
 	for (size_t i = 0; i < count; i++) {
 		struct pdo_entry *e = &entry[i];
+		struct coe_entry found;
 
-		if (e->index == 0 || (e->name[0] != '\0' && e->data_type != 0)) {
-			continue;
-		}
-		list->Slave = soem_index(pos);
-		list->Index[0] = e->index;
-		entries->DataType[e->subindex] = 0;
-		entries->Name[e->subindex][0] = '\0';
-		if (ecx_readOEsingle(&bus->context, 0, e->subindex, list, entries) <= 0) {
+		if (e->index == 0 || (e->name[0] != '\0' && e->data_type != 0) ||
+		    bus_sdo_entry(bus, pos, e->index, e->subindex, &found) < 0) {
 			continue;
 		}
 		if (e->data_type == 0) {
-			e->data_type = entries->DataType[e->subindex];
+			e->data_type = found.data_type;
 		}
 		if (e->name[0] == '\0') {
-			snprintf(e->name, sizeof(e->name), "%s", entries->Name[e->subindex]);
+			snprintf(e->name, sizeof(e->name), "%.*s", PDO_NAME_BYTES - 1, found.name);
 		}
-	}
-	while (ecx_poperror(&bus->context, &note)) {
 	}
 }

@@ -21,7 +21,7 @@ struct dc_track {
 	int64_t sent_ns;   /* what the FRMW on the wire carries: where the reference should be */
 	uint16_t wkc_full; /* most slaves that ever answered an FRMW */
 	unsigned rejected; /* implausible times in a row */
-	int is_confirmed;  /* the reference was identified: its next time is right, whatever it is */
+	int is_confirmed; /* the reference was identified: its next time is right, whatever it is */
 };
 
 /** The command for the next frame (enum ecat_cmd), and its payload in *ret_payload_ns. */

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * SDO transfers on SOEM's mailbox. A mailbox write is sent once only (link/nicdrv.c), so a lost one
- * is recovered here: the whole transfer is retried with a new counter after the mailbox has been
- * emptied (T42).
+ * The bus's mailbox engine: its wire is the mailbox slot of the line; blocking SDO transfers for
+ * bring-up; start-up SDOs, of all slaves at the same time; emergencies.
  */
 #include <errno.h>
 #include <inttypes.h>
@@ -10,56 +9,102 @@
 
 #include "base/bytes.h"
 #include "bus/bus_internal.h"
+#include "wire/sdo_abort.h"
 
-#include "ethercatprint.h"
+/* --- the wire --- */
 
-enum { TRIES = 3, FAST_US = 100000, SOEM_TOO_SMALL = 3 };
+static int submit(void *ctx, const uint8_t *frame, size_t frame_len)
+{
+	return line_submit(ctx, LINE_MAILBOX, frame, frame_len);
+}
+
+static int collect(void *ctx, uint8_t *ret_answer, size_t capacity)
+{
+	return line_collect(ctx, LINE_MAILBOX, ret_answer, capacity);
+}
+
+static size_t frame_limit(void *ctx)
+{
+	return line_frame_limit(ctx);
+}
+
+static mono_t now(void *ctx)
+{
+	const struct platform *platform = line_platform(ctx);
+
+	return platform->now(platform->ctx);
+}
+
+static int sleep_for(void *ctx, span_t span)
+{
+	return line_sleep(ctx, span);
+}
+
+static void take_coe(void *ctx, uint16_t slave_pos, const uint8_t *data, size_t len)
+{
+	struct bus *bus = ctx;
+	struct coe_emergency em;
+
+	if (coe_emergency_get(data, len, &em)) {
+		uint8_t bytes[8] = { 0 };
+
+		memcpy(bytes, em.data, sizeof(em.data));
+		bus_emit_event(bus, &bus->listener,
+			       (struct event){ .id = EVENT_EMERGENCY,
+					       .slave_pos = slave_pos,
+					       .value = (int64_t)get_le64(bytes),
+					       .arg = { em.code, em.error_register } });
+	}
+}
+
+int bus_mailbox_create(struct bus *bus)
+{
+	const struct mailbox_wire wire = { .submit = submit,
+					   .collect = collect,
+					   .frame_limit = frame_limit,
+					   .now = now,
+					   .sleep = sleep_for,
+					   .ctx = bus->line };
+	int r = mailbox_create(&wire, &bus->mailbox);
+
+	if (r >= 0) {
+		mailbox_sink_set(bus->mailbox, MAILBOX_TYPE_COE, take_coe, bus);
+	}
+	return r;
+}
+
+void bus_mailbox_set(struct bus *bus, size_t pos)
+{
+	const ec_slavet *soem = &bus->soem_slave[soem_index(pos)];
+	const struct mailbox_slave_spec spec = { .station_addr = bus->slave[pos].info.station_addr,
+						 .out_start = soem->mbx_wo,
+						 .out_bytes = soem->mbx_l,
+						 .in_start = soem->mbx_ro,
+						 .in_bytes = soem->mbx_rl,
+						 .protocols = soem->mbx_proto };
+
+	/* Boxes that no frame can carry: a slave without a mailbox. */
+	if (soem->mbx_l == 0 || mailbox_slave_set(bus->mailbox, (uint16_t)pos, &spec) < 0) {
+		mailbox_slave_set(bus->mailbox, (uint16_t)pos, NULL);
+	}
+}
+
+struct mailbox_engine *bus_mailbox(struct bus *bus)
+{
+	return bus->mailbox;
+}
+
+void bus_mailbox_step(struct bus *bus)
+{
+	mailbox_step(bus->mailbox);
+}
 
 int bus_has_coe(const struct bus *bus, size_t pos)
 {
-	const ec_slavet *soem = &bus->soem_slave[soem_index(pos)];
-
-	return soem->mbx_l > 0 && (soem->mbx_proto & ECT_MBXPROT_COE) != 0;
+	return mailbox_slave_has(bus->mailbox, (uint16_t)pos, SII_MAILBOX_COE);
 }
 
-static const char *abort_text(uint32_t abort)
-{
-	return ec_sdoerror2string(abort);
-}
-
-static void tell_emergency(struct bus *bus, const ec_errort *note)
-{
-	uint64_t data = (uint64_t)note->b1 | (uint64_t)note->w1 << 8 | (uint64_t)note->w2 << 24;
-
-	bus_emit_event(bus, &bus->listener,
-		       (struct event){ .id = EVENT_EMERGENCY,
-				       .slave_pos = (uint16_t)(note->Slave - 1),
-				       .value = (int64_t)data,
-				       .arg = { note->ErrorCode, note->ErrorReg } });
-}
-
-/*
- * What SOEM noted about the transfer that failed: -EREMOTEIO abort, -EMSGSIZE, -ETIMEDOUT nothing.
- * An emergency of any slave that came meanwhile is reported (T30).
- */
-static int take_errors(struct bus *bus, uint16_t index, uint32_t *ret_abort)
-{
-	int result = -ETIMEDOUT;
-	ec_errort note;
-
-	while (ecx_poperror(&bus->context, &note)) {
-		if (note.Etype == EC_ERR_TYPE_EMERGENCY) {
-			tell_emergency(bus, &note);
-		} else if (note.Etype == EC_ERR_TYPE_SDO_ERROR && note.Index == index) {
-			*ret_abort = (uint32_t)note.AbortCode;
-			result = -EREMOTEIO;
-		} else if (note.Etype == EC_ERR_TYPE_PACKET_ERROR && note.Index == index &&
-			   note.ErrorCode == SOEM_TOO_SMALL) {
-			result = -EMSGSIZE;
-		}
-	}
-	return result;
-}
+/* --- one transfer; blocking --- */
 
 static int check_request(const struct bus *bus, size_t pos)
 {
@@ -70,12 +115,6 @@ static int check_request(const struct bus *bus, size_t pos)
 		return -ENOTSUP;
 	}
 	return bus->slave[pos].is_lost ? -EIO : 0;
-}
-
-/* During recovery a dead mailbox must not delay the other slaves. */
-static int timeout_us(const struct bus *bus, size_t pos)
-{
-	return bus->slave[pos].step != RECOVERY_NONE ? FAST_US : EC_TIMEOUTRXM;
 }
 
 static void tell_abort(struct bus *bus, size_t pos, int32_t object, uint32_t abort)
@@ -92,29 +131,33 @@ static int32_t object_of(uint16_t index, uint8_t subindex)
 	return (int32_t)((uint32_t)index << 8 | subindex);
 }
 
+static int run(struct bus *bus, struct mailbox_request *rq)
+{
+	int r = check_request(bus, rq->slave_pos);
+
+	rq->protocol = &coe_protocol;
+	rq->timeout = (span_t){ bus->cfg->bus_mailbox_timeout_ns };
+	if (r >= 0) {
+		r = mailbox_submit(bus->mailbox, rq);
+	}
+	return r < 0 ? r : mailbox_wait(bus->mailbox, rq);
+}
+
 /* NOLINTNEXTLINE(readability-function-size): as bus_sdo_read() */
 static int read_sdo(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t subindex,
 		    uint8_t *ret_data, size_t *len, uint32_t *ret_abort)
 {
-	int r = check_request(bus, slave_pos);
-	uint32_t abort = 0;
+	struct mailbox_request rq = {
+		.slave_pos = slave_pos,
+		.with.coe = { .operation = COE_UPLOAD, .index = index, .subindex = subindex },
+		.buffer = ret_data,
+		.capacity = *len,
+	};
+	int r = run(bus, &rq);
 
-	*ret_abort = 0;
-	if (r < 0) {
-		return r;
-	}
-	r = -ETIMEDOUT;
-	take_errors(bus, index, &abort);
-	for (int i = 0; i < TRIES && r == -ETIMEDOUT; i++) {
-		int size = (int)*len;
-
-		if (ecx_SDOread(&bus->context, soem_index(slave_pos), index, subindex, FALSE, &size,
-				ret_data, timeout_us(bus, slave_pos)) > 0) {
-			*len = (size_t)size;
-			take_errors(bus, index, &abort);
-			return 0;
-		}
-		r = take_errors(bus, index, ret_abort);
+	*ret_abort = rq.is_mailbox_error ? 0 : rq.detail;
+	if (r == 0) {
+		*len = rq.len;
 	}
 	return r;
 }
@@ -135,37 +178,19 @@ int bus_sdo_read(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t su
 int bus_sdo_write(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t subindex,
 		  const uint8_t *data, size_t len, uint32_t *ret_abort)
 {
-	int r = check_request(bus, slave_pos);
-	uint32_t abort = 0;
+	struct mailbox_request rq = {
+		.slave_pos = slave_pos,
+		.with.coe = { .operation = COE_DOWNLOAD, .index = index, .subindex = subindex },
+		.buffer = (uint8_t *)(uintptr_t)data, /* a download only reads it */
+		.capacity = len,
+	};
+	int r = run(bus, &rq);
 
-	*ret_abort = 0;
-	if (r < 0) {
-		return r;
-	}
-	r = -ETIMEDOUT;
-	take_errors(bus, index, &abort);
-	for (int i = 0; i < TRIES && r == -ETIMEDOUT; i++) {
-		if (ecx_SDOwrite(&bus->context, soem_index(slave_pos), index, subindex, FALSE,
-				 (int)len, data, timeout_us(bus, slave_pos)) > 0) {
-			take_errors(bus, index, &abort);
-			return 0;
-		}
-		r = take_errors(bus, index, ret_abort);
-	}
+	*ret_abort = rq.is_mailbox_error ? 0 : rq.detail;
 	if (r == -EREMOTEIO) {
 		tell_abort(bus, slave_pos, object_of(index, subindex), *ret_abort);
 	}
 	return r;
-}
-
-void bus_read_mail(struct bus *bus, size_t pos)
-{
-	ec_mbxbuft mail = { 0 };
-	uint32_t abort;
-
-	/* A stale answer is dropped with it. */
-	ecx_mbxreceive(&bus->context, soem_index(pos), &mail, 0);
-	take_errors(bus, 0, &abort);
 }
 
 /* Looking whether an object is there: an abort is an answer, and no event. */
@@ -186,74 +211,194 @@ int bus_sdo_value(struct bus *bus, size_t pos, uint16_t index, uint8_t subindex,
 	return 0;
 }
 
-static int write_startup(struct bus *bus, size_t pos, const struct config_sdo *sdo)
+int bus_sdo_entry(struct bus *bus, size_t pos, uint16_t index, uint8_t subindex,
+		  struct coe_entry *ret_entry)
 {
-	uint8_t data[8];
-	uint32_t abort;
-	int r;
+	uint8_t description[MAILBOX_BYTES];
+	struct mailbox_request rq = {
+		.slave_pos = (uint16_t)pos,
+		.with.coe = { .operation = COE_ENTRY, .index = index, .subindex = subindex },
+		.buffer = description,
+		.capacity = sizeof(description),
+	};
+	int r = run(bus, &rq);
 
-	put_le64(data, sdo->value);
-	r = bus_sdo_write(bus, (uint16_t)pos, sdo->index, sdo->subindex, data, sdo->bytes, &abort);
-	if (r == -EREMOTEIO) {
-		return bus_fail_slave(bus, pos, -EPROTO,
-				      "start-up SDO 0x%04x:%02x = 0x%" PRIx64
-				      " (%s:%d) rejected: abort "
-				      "0x%08x, %s",
-				      sdo->index, sdo->subindex, sdo->value, bus->cfg->path,
-				      sdo->line, abort, abort_text(abort));
+	return r < 0 ? r : coe_entry_get(description, rq.len, ret_entry);
+}
+
+/* --- start-up SDOs --- */
+
+static int line_of(const struct bus *bus, size_t pos)
+{
+	return pos < bus->cfg->slave_count ? bus->cfg->slave[pos].line : 0;
+}
+
+static struct config_sdo mode_sdo(const struct bus *bus, size_t pos)
+{
+	return (struct config_sdo){
+		.slave_pos = (uint16_t)pos,
+		.index = PICCOLO_OBJECT_MODE,
+		.subindex = PICCOLO_SUBINDEX_MODE,
+		.bytes = 1,
+		.value = bus->slave[pos].mode == CONFIG_MODE_ONESHOT ? 1 : 0,
+		.line = line_of(bus, pos),
+	};
+}
+
+/* The slave's next one, the mode first: 1 and @ret; 0: there is none. */
+static int next_sdo(const struct bus *bus, size_t pos, size_t *next, struct config_sdo *ret)
+{
+	if (*next == 0) {
+		*next = 1;
+		if (bus->slave[pos].mode != CONFIG_MODE_UNSET) {
+			*ret = mode_sdo(bus, pos);
+			return 1;
+		}
 	}
-	if (r < 0) {
-		return bus_fail_slave(bus, pos, r, "start-up SDO 0x%04x:%02x (%s:%d): %s",
-				      sdo->index, sdo->subindex, bus->cfg->path, sdo->line,
-				      r == -ENOTSUP ? "the slave has no CoE mailbox"
-						    : strerror(-r));
+	while (*next <= bus->cfg->sdo_count) {
+		const struct config_sdo *sdo = &bus->cfg->sdo[*next - 1];
+
+		(*next)++;
+		if (sdo->slave_pos == pos) {
+			*ret = *sdo;
+			return 1;
+		}
 	}
 	return 0;
 }
 
-static int write_mode(struct bus *bus, size_t pos)
+static void go_on(struct bus *bus, size_t pos)
+{
+	struct bus_startup *su = &bus->slave[pos].startup;
+	int r = check_request(bus, pos);
+
+	if (!next_sdo(bus, pos, &su->next, &su->sdo)) {
+		su->state = STARTUP_DONE;
+		return;
+	}
+	put_le64(su->data, su->sdo.value);
+	su->request.buffer = su->data;
+	su->request.capacity = su->sdo.bytes;
+	su->request.with.coe = (struct coe_parameters){ .operation = COE_DOWNLOAD,
+							.index = su->sdo.index,
+							.subindex = su->sdo.subindex };
+	if (r >= 0) {
+		r = mailbox_submit(bus->mailbox, &su->request);
+	}
+	if (r < 0) {
+		su->request.result = r;
+		su->state = STARTUP_FAILED;
+	}
+}
+
+static void startup_sdo_done(void *ctx, struct mailbox_request *rq)
+{
+	struct bus *bus = ctx;
+	struct bus_startup *su = &bus->slave[rq->slave_pos].startup;
+
+	if (rq->result < 0) {
+		su->state = STARTUP_FAILED;
+	} else {
+		go_on(bus, rq->slave_pos);
+	}
+}
+
+void bus_startup_begin(struct bus *bus, size_t pos)
+{
+	struct bus_startup *su = &bus->slave[pos].startup;
+
+	bus_startup_cancel(bus, pos);
+	*su = (struct bus_startup){
+		.state = STARTUP_RUNNING,
+		.request = { .protocol = &coe_protocol,
+			     .slave_pos = (uint16_t)pos,
+			     .timeout = { bus->cfg->bus_mailbox_timeout_ns },
+			     .done = startup_sdo_done,
+			     .ctx = bus },
+	};
+	if (bus->slave[pos].mode != CONFIG_MODE_UNSET && !is_piccolo(&bus->slave[pos].info)) {
+		su->state = STARTUP_FAILED;
+		su->request.result = -ENOTSUP;
+		return;
+	}
+	go_on(bus, pos);
+}
+
+void bus_startup_cancel(struct bus *bus, size_t pos)
+{
+	struct bus_startup *su = &bus->slave[pos].startup;
+
+	if (mailbox_is_running(&su->request)) {
+		mailbox_cancel(bus->mailbox, &su->request);
+	}
+	su->state = STARTUP_IDLE;
+}
+
+static int fail_startup(struct bus *bus, size_t pos)
 {
 	const struct bus_slave *sl = &bus->slave[pos];
-	struct config_sdo sdo = {
-		.index = PICCOLO_OBJECT_MODE,
-		.subindex = PICCOLO_SUBINDEX_MODE,
-		.bytes = 1,
-		.value = sl->mode == CONFIG_MODE_ONESHOT ? 1 : 0,
-		.line = pos < bus->cfg->slave_count ? bus->cfg->slave[pos].line : 0,
-	};
+	const struct config_sdo *sdo = &sl->startup.sdo;
+	const struct mailbox_request *rq = &sl->startup.request;
 
-	if (sl->mode == CONFIG_MODE_UNSET) {
-		return 0;
-	}
-	if (!is_piccolo(&sl->info)) {
+	if (sl->mode != CONFIG_MODE_UNSET && !is_piccolo(&sl->info)) {
 		return bus_fail_slave(
 			bus, pos, -ENOTSUP,
 			"mode is an option of the FB1111-Piccolo; this is vendor 0x%08x "
 			"product 0x%08x",
 			sl->info.vendor, sl->info.product);
 	}
-	return write_startup(bus, pos, &sdo);
-}
-
-int bus_startup_sdos(struct bus *bus, size_t pos)
-{
-	int r = write_mode(bus, pos);
-
-	for (size_t i = 0; i < bus->cfg->sdo_count && r >= 0; i++) {
-		if (bus->cfg->sdo[i].slave_pos == pos) {
-			r = write_startup(bus, pos, &bus->cfg->sdo[i]);
-		}
+	if (rq->result == -EREMOTEIO && !rq->is_mailbox_error) {
+		tell_abort(bus, pos, object_of(sdo->index, sdo->subindex), rq->detail);
+		return bus_fail_slave(bus, pos, -EPROTO,
+				      "start-up SDO 0x%04x:%02x = 0x%" PRIx64
+				      " (%s:%d) rejected: abort "
+				      "0x%08x, %s",
+				      sdo->index, sdo->subindex, sdo->value, bus->cfg->path,
+				      sdo->line, rq->detail, sdo_abort_to_str(rq->detail));
 	}
-	return r;
-}
-
-void bus_startup_begin(struct bus *bus, size_t pos)
-{
-	(void)bus;
-	(void)pos;
+	return bus_fail_slave(bus, pos, rq->result, "start-up SDO 0x%04x:%02x (%s:%d): %s",
+			      sdo->index, sdo->subindex, bus->cfg->path, sdo->line,
+			      rq->is_mailbox_error       ? mailbox_error_to_str(rq->detail)
+			      : rq->result == -ENOTSUP   ? "the slave has no CoE mailbox"
+			      : rq->result == -ETIMEDOUT ? "no answer from its mailbox"
+							 : strerror(-rq->result));
 }
 
 int bus_startup_poll(struct bus *bus, size_t pos)
 {
-	return bus_startup_sdos(bus, pos);
+	struct bus_startup *su = &bus->slave[pos].startup;
+
+	if (su->state == STARTUP_IDLE) {
+		bus_startup_begin(bus, pos);
+	}
+	if (su->state == STARTUP_RUNNING) {
+		return 1;
+	}
+	if (su->state == STARTUP_FAILED) {
+		su->state = STARTUP_IDLE;
+		return fail_startup(bus, pos);
+	}
+	su->state = STARTUP_IDLE;
+	return 0;
+}
+
+int bus_startup_all(struct bus *bus)
+{
+	int r;
+
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		bus_startup_begin(bus, i);
+	}
+	r = mailbox_wait_all(bus->mailbox);
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		int one = r < 0 ? r : bus_startup_poll(bus, i);
+
+		if (one < 0) {
+			for (size_t k = 0; k < bus->slave_count; k++) {
+				bus_startup_cancel(bus, k);
+			}
+			return one;
+		}
+	}
+	return 0;
 }

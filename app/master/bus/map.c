@@ -257,26 +257,21 @@ int bus_restore_mapping(struct bus *bus, size_t pos)
 static int read_all(struct bus *bus)
 {
 	uint32_t total_bytes = 0;
+	int r;
 
 	bus->pdo_count = 0;
 	bus->channel_count = 0;
-	for (size_t i = 0; i < bus->slave_count; i++) {
-		int r = bus_startup_sdos(bus, i);
-
-		if (r >= 0) {
-			r = read_entries(bus, i);
-		}
+	r = bus_startup_all(bus);
+	for (size_t i = 0; i < bus->slave_count && r >= 0; i++) {
+		r = read_entries(bus, i);
 		if (r >= 0) {
 			r = bus_map_sm(bus, i, &total_bytes);
 		}
 		if (r >= 0) {
 			r = bus_sync_limits(bus, i);
 		}
-		if (r < 0) {
-			return r;
-		}
 	}
-	return 0;
+	return r;
 }
 
 int bus_map(struct bus *bus, char *error)

@@ -166,6 +166,7 @@ static void program_mailbox(struct bus *bus, size_t pos)
 	if (soem->mbx_l > 0) {
 		register_write(bus, pos, ESC_REG_SM, &soem->SM[0], 2 * ESC_SM_BYTES);
 	}
+	bus_mailbox_set(bus, pos);
 	ecx_eeprom2pdi(&bus->context, soem_index(pos));
 }
 

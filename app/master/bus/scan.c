@@ -238,6 +238,9 @@ int bus_scan(struct bus *bus, char *error)
 	int r;
 
 	bus->error = error;
+	for (uint16_t i = 0; i < LIMIT_SLAVES; i++) {
+		mailbox_slave_set(bus->mailbox, i, NULL);
+	}
 	r = find_slaves(bus);
 	if (r < 0) {
 		return r;
@@ -260,7 +263,11 @@ int bus_scan(struct bus *bus, char *error)
 	if (r < 0) {
 		return r;
 	}
-	return bus_request_state(bus, AL_PREOP, (span_t){ bus->cfg->bus_scan_timeout_ns }, error);
+	r = bus_request_state(bus, AL_PREOP, (span_t){ bus->cfg->bus_scan_timeout_ns }, error);
+	for (size_t i = 0; i < bus->slave_count && r >= 0; i++) {
+		bus_mailbox_set(bus, i);
+	}
+	return r;
 }
 
 int bus_compare(const struct bus *bus, char *error)

@@ -12,14 +12,11 @@ enum {
 	MISSES_LOST = 2,
 	RECOVERIES_PER_CALL = 8,
 	DIFF_MAGNITUDE = 0x7fffffff,
-	DETAILS = 4,            /* registers read of one slave beside its AL status */
+	DETAILS = 3,            /* registers read of one slave beside its AL status */
 	DETAILED_PER_CALL = 12, /* slaves, about one frame: the others have their turn later */
-	SM_MAILBOX_IN = ESC_REG_SM + ESC_SM_BYTES,
-	SM_STATUS = 5,
-	SM_STATUS_FULL = 0x08,
 };
 
-enum { LOOK_ERRORS, LOOK_LOST_LINKS, LOOK_DIFF, LOOK_MAILBOX };
+enum { LOOK_ERRORS, LOOK_LOST_LINKS, LOOK_DIFF };
 
 struct look {
 	uint8_t al[6];
@@ -27,7 +24,6 @@ struct look {
 	uint8_t errors[ERROR_PORT_BYTES];
 	uint8_t lost_links[ERROR_LINK_BYTES];
 	uint8_t diff[4];
-	uint8_t mailbox;
 	uint8_t is_detailed;
 	uint16_t wkc[DETAILS];
 };
@@ -68,8 +64,6 @@ static size_t add_details(struct bus *bus, size_t pos, struct look *look, struct
 		[LOOK_LOST_LINKS] = { ESC_REG_LOST_LINK_COUNTER, sizeof(look->lost_links),
 				      look->lost_links },
 		[LOOK_DIFF] = { ESC_REG_DC_SYSTEM_TIME_DIFF, sizeof(look->diff), look->diff },
-		[LOOK_MAILBOX] = { SM_MAILBOX_IN + SM_STATUS, sizeof(look->mailbox),
-				   &look->mailbox },
 	};
 
 	for (int k = 0; k < DETAILS; k++) {
@@ -200,15 +194,6 @@ static void count_errors(struct bus *bus, size_t pos, const struct look *look)
 	}
 }
 
-/* No request is pending, for they are answered one at a time: the message is unsolicited. */
-static int has_mail(const struct bus *bus, size_t pos, const struct look *look)
-{
-	const struct bus_slave *sl = &bus->slave[pos];
-
-	return look->wkc[LOOK_MAILBOX] == 1 && (look->mailbox & SM_STATUS_FULL) != 0 &&
-	       !sl->is_lost && sl->step == RECOVERY_NONE && bus_has_coe(bus, pos);
-}
-
 static void show_sync(const struct bus_slave *sl, struct slave_status *page)
 {
 	uint32_t out_ns = sl->output_sync.minimum_cycle_ns;
@@ -291,9 +276,6 @@ static void take_look(struct bus *bus, size_t pos, const struct look *look,
 		bus->slave[pos].misses = 0;
 		note_state(bus, pos, look, emit);
 		count_errors(bus, pos, look);
-	}
-	if (has_mail(bus, pos, look)) {
-		bus_read_mail(bus, pos);
 	}
 }
 

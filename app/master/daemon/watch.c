@@ -334,6 +334,7 @@ int session_service(struct session *session, struct failure *failure)
 	serve_admin(s);
 	if (s->is_riding) {
 		session_listen(s);
+		bus_mailbox_step(s->bus);
 	}
 	if (now.ns >= s->next_watch.ns || is_wkc_alarming(s) ||
 	    (s->is_riding && cycle_alerts(s->cycle) != s->alerts_seen)) {

@@ -74,6 +74,7 @@ enum esc_ecat_event {
 
 /* The buffers behind one SyncManager. */
 struct esc_sm {
+	unsigned completed; /* buffers or mails written to their last byte */
 	uint16_t start;
 	uint16_t len;
 	uint8_t control;

@@ -186,6 +186,7 @@ static void close_writer(struct esc *esc, struct esc_sm *sm, enum esc_side side,
 {
 	sm->is_writer_open = 0;
 	sm->is_full = sm->is_mailbox;
+	sm->completed++;
 	sm->newest = sm->writer;
 	sm->has_data = 1;
 	set_event(esc, sm, side);

@@ -15,7 +15,6 @@ enum {
 	TRANSMIT_NS = 4000,
 	SIGMA_NS = 2000,
 	FEATURES_DC = 0x000c,
-	MAILBOX_START = 0x1000,
 	NO_SLAVE_ADDR = 0x7777
 };
 
@@ -131,7 +130,6 @@ static int counted_send(void *ctx, const uint8_t *frame, size_t frame_len)
 	struct bus_bench *b = ctx;
 
 	b->frames_sent++;
-	b->mailbox_writes += frame[16] == ECAT_CMD_FPWR && get_le16(frame + 20) == MAILBOX_START;
 	return b->is_reference_mute ? muted_send(b, frame, frame_len)
 				    : b->wire.send(b->wire.ctx, frame, frame_len);
 }
@@ -155,7 +153,12 @@ unsigned bench_frames_sent(const struct bus_bench *b)
 
 unsigned bench_mailbox_writes(const struct bus_bench *b)
 {
-	return b->mailbox_writes;
+	unsigned sum = 0;
+
+	for (size_t i = 0; i < segment_slave_count(b->segment); i++) {
+		sum += segment_esc(b->segment, i)->sm[0].completed;
+	}
+	return sum;
 }
 
 static void make_master(struct bus_bench *b)
@@ -278,6 +281,7 @@ void bench_run(struct bus_bench *b, unsigned count)
 {
 	for (unsigned i = 0; i < count; i++) {
 		one_cycle(b);
+		bus_mailbox_step(b->bus);
 	}
 }
 

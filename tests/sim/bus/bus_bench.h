@@ -35,7 +35,6 @@ struct bus_bench {
 	struct fault_plan *faults;
 	struct transport wire; /* of the host; the master's goes through the bench */
 	unsigned frames_sent;
-	unsigned mailbox_writes;
 	int is_reference_mute;
 	struct config cfg;
 	struct line *line;
@@ -83,7 +82,7 @@ void bench_mute_reference(struct bus_bench *b, int is_mute);
 void bench_fault(struct bus_bench *b, const char *line);
 /** Frames that any master sent so far. */
 unsigned bench_frames_sent(const struct bus_bench *b);
-/** Of those, writes to a board's mailbox. */
+/** Mails that reached a slave's mailbox whole. */
 unsigned bench_mailbox_writes(const struct bus_bench *b);
 /** True time. */
 int64_t bench_now_ns(const struct bus_bench *b);

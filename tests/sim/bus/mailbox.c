@@ -4,16 +4,17 @@
 
 #include "base/bytes.h"
 #include "harness/test.h"
+#include "mailbox/mailbox.h"
 #include "sim/bus/bus_bench.h"
 #include "wire/esc_reg.h"
 
 enum {
 	SM_IN = ESC_REG_SM + ESC_SM_BYTES,
-	MAILBOX_BYTES = 128,
-	MAILBOX_TYPE_COE = 3,
+	BOX_BYTES = 128,
 	COE_EMERGENCY = 1,
 	CODE = 0x5112,
 	REGISTER = 0x21,
+	POLL_MAX_CYCLES = 120, /* a slave without a request is polled at least so often */
 };
 
 static struct {
@@ -45,9 +46,12 @@ static struct bus_bench *start(unsigned piccolos, uint64_t seed)
 static void put_emergency(struct bus_bench *b, size_t slave)
 {
 	struct esc *esc = segment_esc(b->segment, slave);
-	uint8_t box[MAILBOX_BYTES] = { [0] = 10, [5] = MAILBOX_TYPE_COE | 1 << 4 };
+	static uint8_t counter;
+	uint8_t box[BOX_BYTES] = { [0] = 10 };
 	uint8_t sm[4];
 
+	counter = mailbox_counter_next(counter);
+	box[5] = (uint8_t)(MAILBOX_TYPE_COE | counter << 4);
 	put_le16(box + 6, COE_EMERGENCY << 12);
 	put_le16(box + 8, CODE);
 	box[10] = REGISTER;
@@ -79,10 +83,9 @@ TEST(mailbox, unsolicited_emergency_becomes_an_event)
 
 	for (unsigned i = 1; i <= 5; i++) {
 		put_emergency(b, i % 3);
-		bench_run(b, 50);
-		CHECK_EQ(heard.count[EVENT_EMERGENCY], i - 1);
-		CHECK_EQ(bench_watch(b).is_all_op, 1);
+		bench_run(b, POLL_MAX_CYCLES);
 		check_emergency(i, (uint16_t)(i % 3));
+		CHECK_EQ(bench_watch(b).is_all_op, 1);
 		bench_watch(b);
 		CHECK_EQ(heard.count[EVENT_EMERGENCY], i);
 	}
@@ -105,6 +108,53 @@ TEST(mailbox, emergency_before_an_answer_is_reported_and_the_answer_is_read)
 		check_emergency(i, 1);
 	}
 	CHECK_EQ(heard.count[EVENT_SDO_ABORT], 0);
+	bench_destroy(b);
+}
+
+/* D3: whatever the time-out, the slave gets the download once. */
+TEST(mailbox, late_answer_to_a_download_does_not_repeat_it)
+{
+	struct bus_bench *b = start(1, 114);
+	uint8_t data[2] = { 7, 0 };
+	unsigned before = bench_mailbox_writes(b);
+	uint32_t abort = 0;
+	size_t len = sizeof(data);
+
+	b->cfg.bus_mailbox_timeout_ns = 700 * NS_PER_MS;
+	bench_fault(b, "at=0s mailbox-stuck slave=0 for=1500ms");
+	CHECK_EQ(bus_sdo_write(b->bus, 0, 0x8000, 2, data, sizeof(data), &abort), -ETIMEDOUT);
+	CHECK_EQ(bench_mailbox_writes(b) - before, 1);
+	bench_run(b, 2000);
+	/* the abort that follows the time-out, once the slave reads again */
+	CHECK_EQ(bench_mailbox_writes(b) - before, 2);
+	CHECK_EQ(bus_sdo_read(b->bus, 0, 0x8000, 2, data, &len, &abort), 0);
+	CHECK_EQ(get_le16(data), 7);
+	CHECK_EQ(heard.count[EVENT_SDO_ABORT], 0);
+	bench_destroy(b);
+}
+
+static void put_eoe_fragment(struct bus_bench *b, size_t slave)
+{
+	struct esc *esc = segment_esc(b->segment, slave);
+	uint8_t box[BOX_BYTES] = { [0] = 36, [5] = 2 | 1 << 4 };
+	uint8_t sm[4];
+
+	esc_pdi_read(esc, bench_now_ns(b), SM_IN, sm, sizeof(sm));
+	esc_pdi_write(esc, bench_now_ns(b), get_le16(sm), box, sizeof(box));
+}
+
+/* D25 */
+TEST(mailbox, eoe_fragment_in_front_of_an_answer_does_not_fail_the_transfer)
+{
+	struct bus_bench *b = start(2, 115);
+	uint8_t data[64];
+	size_t len = sizeof(data);
+	uint32_t abort = 0;
+
+	put_eoe_fragment(b, 0);
+	CHECK_EQ(bus_sdo_read(b->bus, 0, 0x1008, 0, data, &len, &abort), 0);
+	CHECK_EQ(len, strlen("FB1111-Piccolo"));
+	CHECK_EQ(mailbox_counters_of(bus_mailbox(b->bus), 0)->dropped, 1);
 	bench_destroy(b);
 }
 

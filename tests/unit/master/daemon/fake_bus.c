@@ -264,6 +264,11 @@ const struct exchange_plan *bus_plan(const struct bus *bus)
 	return &plan;
 }
 
+void bus_mailbox_step(struct bus *bus)
+{
+	(void)bus;
+}
+
 int bus_sdo_read(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t subindex,
 		 uint8_t *ret_data, size_t *len, uint32_t *ret_abort)
 {
