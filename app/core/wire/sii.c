@@ -14,6 +14,7 @@ enum {
 	PDO_ENTRY_BYTES = 8,
 	SM_BYTES = 8,
 	DC_MODE_BYTES = 24,
+	GENERAL_FLAGS = 11, /* offset in the general category */
 };
 
 uint8_t sii_checksum(const uint8_t *image)
@@ -115,6 +116,7 @@ static void parse_general(const uint8_t *p, size_t bytes, struct sii *sii)
 	sii->order_name = p[2];
 	sii->device_name = p[3];
 	sii->coe_details = p[5];
+	sii->general_flags = bytes > GENERAL_FLAGS ? p[GENERAL_FLAGS] : 0;
 	sii->has_general = 1;
 }
 

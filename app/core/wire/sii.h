@@ -39,6 +39,11 @@ enum sii_mailbox_protocol {
 	SII_MAILBOX_VOE = 0x20,
 };
 
+enum sii_general_flag {
+	SII_GENERAL_SAFEOP = 0x01,
+	SII_GENERAL_NOT_LRW = 0x02, /* use LRD and LWR instead */
+};
+
 struct sii_sm {
 	uint16_t start;
 	uint16_t len;
@@ -85,7 +90,8 @@ struct sii {
 	uint16_t boot_in_len;
 	uint32_t size_bytes;
 	uint8_t coe_details;
-	uint8_t group_name; /* string numbers */
+	uint8_t general_flags; /* enum sii_general_flag */
+	uint8_t group_name;    /* string numbers */
 	uint8_t order_name;
 	uint8_t device_name;
 	uint8_t has_general;

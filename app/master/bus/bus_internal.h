@@ -70,6 +70,7 @@ struct bus_slave {
 	struct dc_node clock; /* ports, receive times, parent, delay */
 	uint16_t esc_features;
 	uint8_t is_clock_64bit;
+	uint8_t is_lrw_forbidden;
 	uint16_t assign_activate; /* low byte 0x0980, high byte 0x0981; 0: no SYNC0 */
 	int64_t sync0_shift_ns;
 	size_t pdo_first; /* its entries in bus->pdo */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The cyclic exchange: our own frames, made once, sent every cycle. The first frame carries LRW (of
+ * The cyclic exchange: our own frames, made once, sent every cycle. The first frame carries LRW (or
+ * LWR and LRD, for slaves that forbid LRW, of
  * the first part of the process image), FRMW of 0x0910, and, if configured, BRD of 0x0130 and of
  * 0x092C; further frames carry the rest of the image. A SyncManager's buffer is never split (T41).
  * Every datagram's echo is checked (command, index, address, length, and that a slave marked the

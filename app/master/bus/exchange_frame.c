@@ -53,6 +53,20 @@ uint32_t exchange_frame_capacity(const struct exchange_plan *plan, unsigned numb
 	return ECAT_FRAME_MAX_BYTES - taken;
 }
 
+static enum ecat_cmd command_of(const struct exchange_plan *plan, unsigned chunk)
+{
+	switch ((enum exchange_kind)plan->chunk_kind[chunk]) {
+	case EXCHANGE_LRW:
+		return ECAT_CMD_LRW;
+	case EXCHANGE_LWR:
+		return ECAT_CMD_LWR;
+	case EXCHANGE_LRD:
+		return ECAT_CMD_LRD;
+	}
+	assert(!"unreachable exchange_kind");
+	return ECAT_CMD_NOP;
+}
+
 static size_t add(struct exchange_frame *ef, struct ecat_frame_builder *fb, enum ecat_cmd cmd,
 		  uint32_t address, uint16_t data_len)
 {
@@ -107,8 +121,8 @@ int exchange_frame_build(const struct exchange_plan *plan, unsigned number,
 	for (unsigned i = 0; i < ret->part_count; i++) {
 		struct exchange_part *part = &ret->part[i];
 
-		part->at = add(ret, &fb, ECAT_CMD_LRW, plan->logical_start + part->offset,
-			       (uint16_t)part->len);
+		part->at = add(ret, &fb, command_of(plan, part->chunk),
+			       plan->logical_start + part->offset, (uint16_t)part->len);
 	}
 	if (has_dc(plan, number)) {
 		ret->dc = add(ret, &fb, ECAT_CMD_FRMW,

@@ -22,7 +22,7 @@ enum {
 	EXCHANGE_NUMBERED = 2, /* datagrams whose index bytes carry the sequence */
 };
 
-/* One LRW: a chunk of the process image. */
+/* One datagram of process data: a chunk of the process image. */
 struct exchange_part {
 	size_t at;       /* as below */
 	uint32_t offset; /* of its data in the process image */

@@ -8,12 +8,20 @@
 #include "base/limits.h"
 #include "base/slave_set.h"
 
+/* The command of a process data datagram. */
+enum exchange_kind {
+	EXCHANGE_LRW,
+	EXCHANGE_LWR, /* outputs only, and */
+	EXCHANGE_LRD, /* inputs only, where a slave must not be sent LRW */
+};
+
 struct exchange_plan {
 	uint32_t image_bytes;
 	uint32_t output_bytes; /* the first of them */
 	uint32_t logical_start;
-	uint32_t chunk_bytes[LIMIT_CHUNKS]; /* how the image is cut into LRW datagrams */
+	uint32_t chunk_bytes[LIMIT_CHUNKS]; /* how the image is cut into datagrams */
 	unsigned chunk_count;
+	uint8_t chunk_kind[LIMIT_CHUNKS];            /* enum exchange_kind */
 	uint16_t chunk_wkc[LIMIT_CHUNKS];            /* expected of each */
 	uint8_t chunk_frame[LIMIT_CHUNKS];           /* which frame carries it, ascending */
 	struct slave_set chunk_slaves[LIMIT_CHUNKS]; /* whose data it has */

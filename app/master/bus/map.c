@@ -141,6 +141,7 @@ static void place_direction(const struct bus *bus, size_t pos, int is_output, st
 			.slave_pos = (uint16_t)pos,
 			.sm = (uint8_t)n,
 			.is_output = (uint8_t)is_output,
+			.is_lrw_forbidden = bus->slave[pos].is_lrw_forbidden,
 		};
 		at += bytes;
 	}

@@ -6,7 +6,8 @@
 #include "base/slave_set.h"
 #include "bus/exchange_frame.h"
 
-enum { WKC_READ = 1, WKC_WRITE = 2 }; /* what one slave adds to an LRW, ETG.1000.4 */
+/* What one slave adds to an LRW, ETG.1000.4; to LRD or LWR it adds 1. */
+enum { WKC_READ = 1, WKC_WRITE = 2 };
 
 /* The furthest cut in (@from, @to] that splits no area; @from when there is none, *ret_area what is
  * in the way. */
@@ -30,10 +31,10 @@ static uint32_t find_cut(const struct plan_area *area, size_t count, uint32_t fr
 	return to;
 }
 
-/* LRW adds once for each slave that reads and twice for each that is written, whatever it maps
+/* Once for each slave that is read and, in LRW, twice for each that is written, whatever it maps
  * there. */
 static uint16_t expected_wkc(const struct plan_area *area, size_t count, uint32_t from, uint32_t to,
-			     struct slave_set *ret_slaves)
+			     enum exchange_kind kind, struct slave_set *ret_slaves)
 {
 	uint8_t adds[LIMIT_SLAVES] = { 0 };
 	uint16_t wkc = 0;
@@ -46,7 +47,7 @@ static uint16_t expected_wkc(const struct plan_area *area, size_t count, uint32_
 		}
 	}
 	for (size_t i = 0; i < LIMIT_SLAVES; i++) {
-		wkc = (uint16_t)(wkc + adds[i]);
+		wkc = (uint16_t)(wkc + (kind == EXCHANGE_LRW ? adds[i] : adds[i] != 0));
 	}
 	return wkc;
 }
@@ -84,6 +85,16 @@ static uint32_t group_end(const struct plan_area *area, size_t count, uint32_t f
 	return next;
 }
 
+static int is_lrw_forbidden(const struct plan_area *area, size_t count, uint32_t from, uint32_t to)
+{
+	for (size_t i = 0; i < count; i++) {
+		if (area[i].is_lrw_forbidden && area[i].start < to && area[i].end > from) {
+			return 1;
+		}
+	}
+	return 0;
+}
+
 /* The frame that is being filled. */
 struct filling {
 	unsigned frame;
@@ -94,13 +105,21 @@ static void add_chunk(struct exchange_plan *plan, const struct plan_area *area, 
 		      uint32_t from, uint32_t to, struct filling *fill)
 {
 	unsigned n = plan->chunk_count++;
+	enum exchange_kind kind = EXCHANGE_LRW;
+	int is_half; /* the inputs follow in the same frame */
 
+	if (is_lrw_forbidden(area, count, from, to)) {
+		kind = from < plan->output_bytes ? EXCHANGE_LWR : EXCHANGE_LRD;
+	}
+	is_half = kind == EXCHANGE_LWR && to == plan->output_bytes;
+	plan->chunk_kind[n] = (uint8_t)kind;
 	plan->chunk_bytes[n] = to - from;
-	plan->chunk_wkc[n] = expected_wkc(area, count, from, to, &plan->chunk_slaves[n]);
+	plan->chunk_wkc[n] = expected_wkc(area, count, from, to, kind, &plan->chunk_slaves[n]);
 	plan->chunk_frame[n] = (uint8_t)fill->frame;
 	plan->wkc_expected = (uint16_t)(plan->wkc_expected + plan->chunk_wkc[n]);
 	fill->used += to - from + EXCHANGE_OVERHEAD;
-	if (!plan->is_split || fill->used >= exchange_frame_capacity(plan, fill->frame)) {
+	if ((!plan->is_split && !is_half) ||
+	    fill->used >= exchange_frame_capacity(plan, fill->frame)) {
 		*fill = (struct filling){ .frame = fill->frame + 1 };
 	}
 }
@@ -131,6 +150,10 @@ int plan_chunks(struct exchange_plan *plan, const struct plan_area *area, size_t
 		if (to == from) {
 			*ret_area = blocked;
 			return -E2BIG;
+		}
+		if (from < plan->output_bytes && to > plan->output_bytes &&
+		    is_lrw_forbidden(area, count, from, to)) {
+			to = plan->output_bytes;
 		}
 		add_chunk(plan, area, count, from, to, &fill);
 		from = to;

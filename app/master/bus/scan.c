@@ -15,8 +15,6 @@
 #include "bus/registers.h"
 
 enum {
-	FEATURE_DC = 1 << 2,
-	FEATURE_DC_64BIT = 1 << 3,
 	EEPROM_CHECKSUM_ERROR = 1 << 11,
 	EEPROM_NOT_LOADED = 1 << 12,
 	EEPROM_NO_ANSWER = 1 << 13,
@@ -162,9 +160,9 @@ static void take_clock(struct bus *bus, size_t pos)
 
 	register_read(bus, pos, ESC_REG_FEATURES, features, sizeof(features));
 	sl->esc_features = get_le16(features);
-	sl->is_clock_64bit = (sl->esc_features & FEATURE_DC_64BIT) != 0;
+	sl->is_clock_64bit = (sl->esc_features & ESC_FEATURE_DC_64BIT) != 0;
 	/* The feature bit does not show whether there is a system time: read it. */
-	if ((sl->esc_features & FEATURE_DC) == 0 ||
+	if ((sl->esc_features & ESC_FEATURE_DC) == 0 ||
 	    register_read(bus, pos, ESC_REG_DC_RECEIVE_TIME_PORT, times, sizeof(times)) < 0) {
 		sl->clock.kind = CLOCK_NONE;
 	} else if (register_read(bus, pos, ESC_REG_DC_SYSTEM_TIME, system_time,
@@ -205,6 +203,8 @@ static int describe(struct bus *bus, size_t pos)
 	/* Damage is reported when the mapping is read, where it matters. */
 	sii_parse(sl->sii, sl->sii_len, &bus->parsed, why, sizeof(why));
 	name_device(bus, pos);
+	sl->is_lrw_forbidden = (sl->esc_features & ESC_FEATURE_NO_LRW) != 0 ||
+			       (bus->parsed.general_flags & SII_GENERAL_NOT_LRW) != 0;
 	sl->assign_activate = choose_assign_activate(bus, pos);
 	if (sl->info.name[0] == '\0') {
 		name_slave(sl->info.device, is_piccolo(&sl->info), pos, sl->info.name,

@@ -95,7 +95,8 @@ static void put_general(struct writer *w, const struct slave_model *m)
 	put(w, s->coe_details, 1);
 	put(w, (s->mailbox_protocols & SII_MAILBOX_FOE) != 0, 1);
 	put(w, (s->mailbox_protocols & SII_MAILBOX_EOE) != 0, 1);
-	put(w, 0, 4); /* SoE channels, DS 402 channels, system class, flags */
+	put(w, 0, 3); /* SoE channels, DS 402 channels, system class */
+	put(w, s->general_flags, 1);
 	put(w, (uint16_t)m->ebus_ma, 2);
 	put(w, 0, 2);
 	put(w, physical_ports(m->features.port_descriptor), 2);

@@ -124,6 +124,13 @@ static int take_ebus(struct parse *p)
 	return r;
 }
 
+static int take_no_lrw(struct parse *p)
+{
+	p->m->sii.general_flags |= SII_GENERAL_NOT_LRW;
+	p->m->features.features |= ESC_FEATURE_NO_LRW;
+	return 0;
+}
+
 static int take_device_type(struct parse *p)
 {
 	return number16(p, "device type", &p->m->device_type);
@@ -488,6 +495,7 @@ static int take_line(struct parse *p)
 		{ "config", take_config },
 		{ "eeprom", take_eeprom },
 		{ "ebus", take_ebus },
+		{ "no_lrw", take_no_lrw },
 		{ "device_type", take_device_type },
 		{ "bootstrap", take_bootstrap },
 		{ "mailbox", take_mailbox },

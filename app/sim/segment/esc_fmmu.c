@@ -128,6 +128,9 @@ void esc_fmmu_access(struct esc *esc, const struct esc_frame *frame, struct ecat
 	int did_write = 0;
 
 	/* What is written is what came in, not what an FMMU before has put there. */
+	if (dg->cmd == ECAT_CMD_LRW && (esc->features.features & ESC_FEATURE_NO_LRW) != 0) {
+		return;
+	}
 	memcpy(came, dg->data, dg->data_len);
 	for (unsigned n = 0; n < esc->features.fmmu_count; n++) {
 		const struct esc_fmmu *f = &esc->fmmu[n];

@@ -6,6 +6,8 @@
 #include "devices/wago_750_354.h"
 #include "harness/test.h"
 #include "sim/harness/virtual_master.h"
+#include "wire/datagram.h"
+#include "wire/esc_reg.h"
 
 static struct virtual_bench b;
 static struct virtual_master vm;
@@ -152,6 +154,59 @@ TEST(catalogue, a_drive_follows_its_controlword_and_its_set_point)
 	set("drive.1st_set_point", 123456);
 	CHECK_EQ(virtual_master_value(&vm, "drive.position_actual_internal_value"), 123456);
 	close_all();
+}
+
+/* Slaves that support no LRW, between others. */
+static int make_without_lrw(int position, struct segment_slave_spec *ret_spec)
+{
+	static const char *const names[] = { "el2004", "akd", "el1004", "el2004" };
+	static struct slave_model model;
+
+	CHECK_EQ(catalogue_find(names[position], &model), 0);
+	if (position == 1 || position == 3) {
+		model.sii.general_flags |= SII_GENERAL_NOT_LRW;
+		model.features.features |= ESC_FEATURE_NO_LRW;
+	}
+	return catalogue_slave(&model, position, ret_spec);
+}
+
+static unsigned lrw_seen;
+
+static void look_for_lrw(struct virtual_master *master, const uint8_t *frame, size_t frame_len)
+{
+	uint8_t copy[LIMIT_FRAME_BYTES];
+	struct ecat_datagram dg;
+	size_t pos = 0;
+
+	(void)master;
+	memcpy(copy, frame, frame_len);
+	while (ecat_frame_next(copy, frame_len, &pos, &dg) == 1) {
+		lrw_seen += dg.cmd == ECAT_CMD_LRW;
+	}
+}
+
+static void run_without_lrw(const char *datagrams)
+{
+	const char *const settings[] = { "slaves[0].name=a", "slaves[1].name=drive", datagrams,
+					 NULL };
+
+	open_all(4, make_without_lrw, settings);
+	lrw_seen = 0;
+	vm.each_frame = look_for_lrw;
+	set("drive.controlword", 0x06);
+	CHECK_EQ(virtual_master_value(&vm, "drive.statusword"), 0x31);
+	set("drive.1st_set_point", 123456);
+	CHECK_EQ(virtual_master_sample(&vm)->wkc, virtual_master_sample(&vm)->wkc_expected);
+	CHECK_EQ(virtual_master_sample(&vm)->flags, 0);
+	close_all();
+}
+
+TEST(catalogue, slaves_without_lrw_are_served_with_lwr_and_lrd)
+{
+	run_without_lrw("bus.datagrams=one");
+	CHECK_EQ(lrw_seen, 0);
+	run_without_lrw("bus.datagrams=per_slave");
+	CHECK(lrw_seen > 0); /* of the others */
 }
 
 TEST(catalogue, terminals_are_read_and_set_by_the_address_of_their_entries)

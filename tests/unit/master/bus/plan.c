@@ -188,3 +188,58 @@ TEST(plan, split_fills_frames_in_order_up_to_sixty_four_slaves)
 	}
 	CHECK_EQ(bytes, plan.image_bytes);
 }
+
+/* Outputs of two slaves, then their inputs; slave 1 does not support LRW. */
+static struct exchange_plan plan_without_lrw(uint32_t bytes, int is_split)
+{
+	const uint32_t q = bytes / 4;
+	struct plan_area area[] = { area_of(0, q, 0, 1), area_of(q, 2 * q, 1, 1),
+				    area_of(2 * q, 3 * q, 0, 0), area_of(3 * q, bytes, 1, 0) };
+	struct exchange_plan plan = plan_of(bytes);
+	int blocked;
+
+	plan.output_bytes = 2 * q;
+	plan.is_split = is_split;
+	area[1].is_lrw_forbidden = 1;
+	area[3].is_lrw_forbidden = 1;
+	CHECK_EQ(plan_chunks(&plan, area, 4, &blocked), 0);
+	return plan;
+}
+
+TEST(plan, a_slave_that_forbids_lrw_gets_lwr_and_lrd_in_one_frame)
+{
+	struct exchange_plan plan = plan_without_lrw(40, 0);
+
+	CHECK_EQ(plan.chunk_count, 2);
+	CHECK_EQ(exchange_frame_count(&plan), 1);
+	CHECK_EQ(plan.chunk_kind[0], EXCHANGE_LWR);
+	CHECK_EQ(plan.chunk_bytes[0], 20);
+	CHECK_EQ(plan.chunk_wkc[0], 2);
+	CHECK_EQ(plan.chunk_kind[1], EXCHANGE_LRD);
+	CHECK_EQ(plan.chunk_bytes[1], 20);
+	CHECK_EQ(plan.chunk_wkc[1], 2);
+	CHECK_EQ(plan.wkc_expected, 4);
+}
+
+TEST(plan, long_outputs_and_inputs_without_lrw_take_frames_of_their_own)
+{
+	struct exchange_plan plan = plan_without_lrw(2800, 0);
+
+	CHECK_EQ(plan.chunk_count, 2);
+	CHECK_EQ(exchange_frame_count(&plan), 2);
+	CHECK_EQ(plan.chunk_kind[0], EXCHANGE_LWR);
+	CHECK_EQ(plan.chunk_kind[1], EXCHANGE_LRD);
+}
+
+TEST(plan, with_a_datagram_per_slave_the_others_keep_lrw)
+{
+	static const uint8_t kind[] = { EXCHANGE_LRW, EXCHANGE_LWR, EXCHANGE_LRW, EXCHANGE_LRD };
+	static const uint16_t wkc[] = { 2, 1, 1, 1 };
+	struct exchange_plan plan = plan_without_lrw(40, 1);
+
+	CHECK_EQ(plan.chunk_count, 4);
+	for (unsigned i = 0; i < 4; i++) {
+		CHECK_EQ(plan.chunk_kind[i], kind[i]);
+		CHECK_EQ(plan.chunk_wkc[i], wkc[i]);
+	}
+}
