@@ -15,6 +15,13 @@ static const char usage_text[] =
 
 static const char notes_text[] =
 	"\n"
+	"slaves: names of --list-slaves, in the order of the line: ek1100,el2828,el3104; or a "
+	"tree:\n"
+	"  ek1100(el2828,el3104),ek1100(el2004): parentheses hold what hangs on port 1, (2:...) "
+	"on\n"
+	"  port 2, of the slave before them. wago_750_354+430+530 has these modules (default 457,\n"
+	"  557, 430, 530); plant[:TAU_MS[:GAIN]] is a first-order lag (default plant:50:1)\n"
+	"\n"
 	"fault lines: WHEN WHAT [KEY=VALUE...]\n"
 	"  WHEN   at=TIME [for=TIME], frame=N, every=N, p=CHANCE; times as 2s, 300us\n"
 	"  WHAT   to frames: lose, drop, delay by=TIME, jitter by=TIME, hold, double, truncate,\n"
@@ -67,13 +74,8 @@ void sim_options_read(int argc, char **argv, struct sim_options *opt)
 		{ "interface", 0, args_text, &opt->interface, "NIC",
 		  "where the master is: a veth, a tap, a real NIC" },
 		{ "slaves", 0, args_text, &opt->slaves, "WHAT",
-		  "1 to 64: number of FB1111+Piccolo slaves (default 2); or names, in the order of "
-		  "the line: ek1100,el2828,el3104, or a tree: "
-		  "ek1100(el2828,el3104),ek1100(el2004), "
-		  "where parentheses hold what hangs on port 1, (2:...) on port 2, of the slave "
-		  "before them. See --list-slaves. wago_750_354+430+530 has "
-		  "these modules (default 457, 557, 430, 530); plant[:TAU_MS[:GAIN]] is a "
-		  "first-order lag (default plant:50:1)" },
+		  "number of FB1111+Piccolo slaves (default 2), or names in the order of the line: "
+		  "ek1100,el2828,el3104; see below" },
 		{ "sii", 0, args_text, &opt->sii_dir, "DIR",
 		  "folder of SII images of real slaves: NAME.bin is used instead of the "
 		  "catalogue's NAME" },
