@@ -161,9 +161,9 @@ const uint8_t *samples_image(const struct samples *samples)
 
 const char *samples_flag_name(unsigned bit)
 {
-	static const char *const names[] = { "lost",        "late",        "wkc_low",
-					     "not_op",      "fail_safe",   "skipped",
-					     "bad_counter", "dc_unlocked", "doubled" };
+	static const char *const names[] = { "lost",      "late",     "wkc_low",     "not_op",
+					     "fail_safe", "skipped",  "bad_counter", "dc_unlocked",
+					     "doubled",   "unchecked" };
 
 	return bit < sizeof(names) / sizeof(names[0]) ? names[bit] : NULL;
 }

@@ -29,6 +29,7 @@ enum sample_flag {
 	SAMPLE_BAD_COUNTER = 1u << 6, /* a slave's conversion counter did not advance as it must */
 	SAMPLE_DC_UNLOCKED = 1u << 7, /* the master's servo is not locked to the reference clock */
 	SAMPLE_DOUBLED = 1u << 8,     /* a frame came back twice; the second was dropped */
+	SAMPLE_UNCHECKED = 1u << 9, /* first sample of a slave in OP: no counter to compare with */
 };
 
 struct sample_header {

@@ -46,7 +46,7 @@ struct cycle_stats {
 	_Atomic uint64_t cycles_skipped; /* deadlines passed over */
 	_Atomic uint64_t samples_good;   /* slave samples in OP: fresh and counter right */
 	_Atomic uint64_t samples_bad;    /* slave samples in OP that are not */
-	_Atomic uint64_t samples_bad_unexplained; /* of those: the cycle had a fresh frame */
+	_Atomic uint64_t samples_bad_unexplained; /* of those: wrong counter, fresh frame */
 	_Atomic uint64_t op_lost;              /* times a frame showed that a slave had left OP */
 	_Atomic uint64_t cycles_with_stranger; /* more slaves answered than belong to the bus */
 	_Atomic uint64_t page_faults;          /* of the cycle thread since its start */

@@ -22,7 +22,8 @@
 #include "reader/utc.h"
 
 /* Installed programs compare with these numbers. */
-static_assert((int)ECDAQ_SAMPLE_DOUBLED == (int)SAMPLE_DOUBLED, "flags are handed on as they are");
+static_assert((int)ECDAQ_SAMPLE_UNCHECKED == (int)SAMPLE_UNCHECKED,
+	      "flags are handed on as they are");
 static_assert((int)ECDAQ_FLOAT == (int)CHANNEL_FLOAT, "types are handed on as they are");
 
 enum { STEP_MS = 2, TEXT_BYTES = 256 };

@@ -51,6 +51,8 @@ enum ecdaq_sample_flag {
 	ECDAQ_SAMPLE_BAD_COUNTER = 1 << 6, /* a slave's conversion counter is wrong */
 	ECDAQ_SAMPLE_DC_UNLOCKED = 1 << 7, /* the master is not locked to the reference clock */
 	ECDAQ_SAMPLE_DOUBLED = 1 << 8,     /* a frame came back twice */
+	ECDAQ_SAMPLE_UNCHECKED = 1 << 9,   /* first sample of a slave in OP: nothing to compare with
+					    */
 };
 
 /* One cycle: the inputs of all slaves at one SYNC0 edge, and the outputs of that cycle. */

@@ -42,14 +42,23 @@ static int counter_is_right(const struct check_slave *s, uint64_t seen, uint64_t
 	uint64_t edges = s->is_oneshot ? 1 : cycle - s->last_cycle;
 
 	*ret_expected = (s->last + edges) & mask;
-	return !s->has_last || seen == *ret_expected || (s->is_oneshot && seen == s->last);
+	return seen == *ret_expected || (s->is_oneshot && seen == s->last);
 }
 
-struct slave_set check_image(struct check *check, const uint8_t *image, uint64_t cycle,
-			     const struct slave_set *stale, struct check_fault *ret_fault)
+static void add_wrong(struct check_result *result, unsigned pos, uint64_t seen, uint64_t expected)
 {
-	struct slave_set bad = slave_set_empty();
-	int has_fault = 0;
+	if (slave_set_is_empty(&result->wrong)) {
+		result->first = (struct check_fault){ .slave_pos = (uint16_t)pos,
+						      .seen = seen,
+						      .expected = expected };
+	}
+	slave_set_add(&result->wrong, pos);
+}
+
+struct check_result check_image(struct check *check, const uint8_t *image, uint64_t cycle,
+				const struct slave_set *stale)
+{
+	struct check_result result = { .wrong = slave_set_empty(), .unknown = slave_set_empty() };
 
 	for (size_t i = 0; i < check->slave_count; i++) {
 		struct check_slave *s = &check->slave[i];
@@ -60,18 +69,14 @@ struct slave_set check_image(struct check *check, const uint8_t *image, uint64_t
 			continue;
 		}
 		seen = image_get_raw(image, s->counter);
-		if (!counter_is_right(s, seen, cycle, &expected)) {
-			if (!has_fault) {
-				*ret_fault = (struct check_fault){ .slave_pos = (uint16_t)i,
-								   .seen = seen,
-								   .expected = expected };
-			}
-			has_fault = 1;
-			slave_set_add(&bad, (unsigned)i);
+		if (!s->has_last) {
+			slave_set_add(&result.unknown, (unsigned)i);
+		} else if (!counter_is_right(s, seen, cycle, &expected)) {
+			add_wrong(&result, (unsigned)i, seen, expected);
 		}
 		s->has_last = 1;
 		s->last = seen;
 		s->last_cycle = cycle;
 	}
-	return bad;
+	return result;
 }

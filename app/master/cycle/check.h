@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Is the sample of each slave good? It is, if its frame was fresh and its conversion counter went
- * on by as many as there were SYNC0 edges since the last fresh one. Context: cycle thread, RT-safe.
+ * on by as many as there were SYNC0 edges since the last fresh one. Without a last one nobody
+ * knows, and the sample is not good. Context: cycle thread, RT-safe.
  */
 #ifndef CYCLE_CHECK_H
 #define CYCLE_CHECK_H
@@ -36,15 +37,21 @@ struct check_fault {
 
 void check_init(struct check *check, const struct config *cfg, const struct slave_info *slaves,
 		size_t slave_count, const struct channel *channels);
-/** Accept the next fresh sample without check: entering OP, or after a wrong one. */
+/** The next fresh sample has nothing to be compared with: entering OP, or a new numbering. */
 void check_restart(struct check *check);
 /** The same for some slaves. */
 void check_restart_some(struct check *check, const struct slave_set *slaves);
-/**
- * Judge a fresh image of @cycle, but for the slaves of @stale, whose part of it is not. Returns the
- * bad slaves; the first of them is described in @ret_fault.
- */
-struct slave_set check_image(struct check *check, const uint8_t *image, uint64_t cycle,
-			     const struct slave_set *stale, struct check_fault *ret_fault);
+
+struct check_result {
+	struct slave_set wrong;   /* the counter is not as expected */
+	struct slave_set unknown; /* the first fresh sample since a restart: it may be a stale one
+				   */
+	struct check_fault first; /* of the first in @wrong */
+};
+
+/** Judge a fresh image of @cycle, but for the slaves of @stale, whose part of it is not. Slaves
+ * without a counter are in neither set. */
+struct check_result check_image(struct check *check, const uint8_t *image, uint64_t cycle,
+				const struct slave_set *stale);
 
 #endif

@@ -71,29 +71,21 @@ struct cycle_place cycle_place(struct cycle *cy, const struct exchange_result *r
 	return ret;
 }
 
-/* A slave known to be out of OP is not counted, nor is any while the bus is out of OP. */
-static void count_bad(struct cycle *cy, int is_explained)
+/* A slave that is not live is not counted. Only a wrong counter in a fresh frame is unexplained. */
+static void count_samples(struct cycle *cy, const struct slave_set *wrong)
 {
 	struct cycle_stats *st = cy->spec.stats;
-	uint64_t bad_count = 0;
-	uint64_t good_count = 0;
 
-	for (unsigned i = 0; i < cy->spec.slave_count; i++) {
-		if (!slave_set_has(&cy->live, i)) {
-			continue;
-		}
+	for (unsigned i = slave_set_next(&cy->live, 0); i < cy->spec.slave_count;
+	     i = slave_set_next(&cy->live, i + 1)) {
 		if (slave_set_has(&cy->sample.slaves_bad, i)) {
-			bad_count++;
+			ADD(st->samples_bad, 1);
 			ADD(st->slave_bad[i], 1);
 		} else {
-			good_count++;
+			ADD(st->samples_good, 1);
 			ADD(st->slave_good[i], 1);
 		}
-	}
-	ADD(st->samples_bad, bad_count);
-	ADD(st->samples_good, good_count);
-	if (!is_explained) {
-		ADD(st->samples_bad_unexplained, bad_count);
+		ADD(st->samples_bad_unexplained, slave_set_has(wrong, i) ? 1u : 0u);
 	}
 }
 
@@ -103,36 +95,41 @@ int cycle_has_inputs(const struct cycle *cy, const struct exchange_result *res)
 	       (res->status == EXCHANGE_WKC_LOW && cy->spec.plan->is_split);
 }
 
+static void report_wrong(struct cycle *cy, const struct check_fault *fault)
+{
+	struct event ev = { .id = EVENT_COUNTER_BAD,
+			    .slave_pos = fault->slave_pos,
+			    .value = (int64_t)cy->sample.cycle,
+			    .arg = { (int32_t)fault->seen, (int32_t)fault->expected } };
+
+	cy->sample.flags |= SAMPLE_BAD_COUNTER;
+	cycle_emit(cy, &ev);
+}
+
 void cycle_judge(struct cycle *cy, const struct exchange_result *res, int is_in_window)
 {
 	int is_fresh = cycle_has_inputs(cy, res);
+	struct check_result checked = { .wrong = slave_set_empty() };
 	struct slave_set stale = all_slaves(cy);
-	struct slave_set wrong;
-	struct check_fault fault;
 
+	cy->sample.slaves_bad = stale;
 	if (slave_set_is_empty(&cy->live)) {
 		cy->sample.flags |= SAMPLE_NOT_OP;
-		cy->sample.slaves_bad = all_slaves(cy);
 		return;
 	}
-	if (!is_fresh || !is_in_window) {
-		cy->sample.slaves_bad = all_slaves(cy);
-		count_bad(cy, is_fresh || res->status != EXCHANGE_WKC_LOW);
-		return;
+	if (is_fresh && is_in_window) {
+		slave_set_and_not(&stale, &cy->live);
+		slave_set_or(&stale, &res->slaves_low);
+		checked = check_image(&cy->check, cy->image, cy->sample.cycle, &stale);
+		cy->sample.slaves_bad = stale;
+		slave_set_or(&cy->sample.slaves_bad, &checked.wrong);
+		slave_set_or(&cy->sample.slaves_bad, &checked.unknown);
 	}
-	slave_set_and_not(&stale, &cy->live);
-	slave_set_or(&stale, &res->slaves_low);
-	wrong = check_image(&cy->check, cy->image, cy->sample.cycle, &stale, &fault);
-	cy->sample.slaves_bad = stale;
-	slave_set_or(&cy->sample.slaves_bad, &wrong);
-	if (!slave_set_is_empty(&wrong)) {
-		struct event ev = { .id = EVENT_COUNTER_BAD,
-				    .slave_pos = fault.slave_pos,
-				    .value = (int64_t)cy->sample.cycle,
-				    .arg = { (int32_t)fault.seen, (int32_t)fault.expected } };
-
-		cy->sample.flags |= SAMPLE_BAD_COUNTER;
-		cycle_emit(cy, &ev);
+	if (!slave_set_is_empty(&checked.unknown)) {
+		cy->sample.flags |= SAMPLE_UNCHECKED;
 	}
-	count_bad(cy, 0);
+	if (!slave_set_is_empty(&checked.wrong)) {
+		report_wrong(cy, &checked.first);
+	}
+	count_samples(cy, &checked.wrong);
 }

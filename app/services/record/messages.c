@@ -51,7 +51,7 @@ static const struct {
 				    { "uint32", "unsigned long", "flags",
 				      "1 lost, 2 late, 4 WKC low, 8 not OP, 16 fail-safe, 32 "
 				      "skipped, 64 bad counter, "
-				      "128 DC unlocked, 256 doubled" },
+				      "128 DC unlocked, 256 doubled, 512 unchecked" },
 				    { "uint16", "unsigned short", "wkc",
 				      "working counter of the process data" },
 				    { "uint16", "unsigned short", "wkc_expected",

@@ -193,7 +193,8 @@ static const struct sample_meta *meta_of(const struct virtual_master *vm)
 
 static void count_op(struct virtual_result *res, const struct sample_header *h)
 {
-	static const uint32_t reasons = SAMPLE_LOST | SAMPLE_LATE | SAMPLE_SKIPPED | SAMPLE_WKC_LOW;
+	static const uint32_t reasons =
+		SAMPLE_LOST | SAMPLE_LATE | SAMPLE_SKIPPED | SAMPLE_WKC_LOW | SAMPLE_UNCHECKED;
 
 	res->op++;
 	res->bad += !slave_set_is_empty(&h->slaves_bad);

@@ -22,7 +22,8 @@ struct virtual_result {
 	uint64_t gaps;            /* a cycle number that is not one more */
 	uint64_t op;              /* samples in OP; of those: */
 	uint64_t bad;             /* with any slave's bit */
-	uint64_t bad_unexplained; /* bad, and neither lost, late, skipped nor WKC low */
+	uint64_t bad_unexplained; /* bad, and neither lost, late, skipped, WKC low nor
+				     unchecked */
 	uint64_t lost;
 	uint64_t late;
 	uint64_t doubled;

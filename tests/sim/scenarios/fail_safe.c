@@ -185,16 +185,17 @@ static void check_fail_safe_times(unsigned trials, int with_sdo)
 	static int64_t took_ns[PHASES];
 	struct prng prng = { with_sdo ? 7 : 3 };
 
-	open_live(2, 5, NULL);
 	for (unsigned i = 0; i < trials; i++) {
 		int64_t phase_ns = (int64_t)i * PERIOD_NS / trials +
 				   (int64_t)prng_below(&prng, PERIOD_NS / trials);
 
+		open_live(2, i + 1, NULL);
 		took_ns[i] = time_to_safe(5 * PERIOD_NS + phase_ns, with_sdo);
-		CHECK_EQ(atomic_load(&stats()->op_lost), i + 1);
+		CHECK_EQ(atomic_load(&stats()->op_lost), 1);
 		wait_for_op(3000);
 		virtual_master_run(&vm, 30);
 		CHECK_EQ(virtual_master_value(&vm, "a.led"), 1);
+		close_all();
 	}
 	qsort(took_ns, trials, sizeof(took_ns[0]), by_size);
 	printf("a slave leaves OP%s: fail-safe outputs on the wire after min %.3f, median %.3f, "
@@ -205,7 +206,6 @@ static void check_fail_safe_times(unsigned trials, int with_sdo)
 	/* The frame that shows it is still a live one: never less than the way to the next. */
 	CHECK(took_ns[0] > PERIOD_NS * 9 / 10);
 	CHECK(took_ns[trials - 1] < 2 * PERIOD_NS + PERIOD_NS / 5);
-	close_all();
 }
 
 TEST(sim_fail_safe, outputs_are_safe_two_cycles_after_a_slave_has_left_op)

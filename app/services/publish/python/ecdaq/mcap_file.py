@@ -37,7 +37,7 @@ int32 round_trip_ns  # not published: 0
 int32 phase_error_ns  # not published: 0
 int32 dc_diff_ns  # not published: 0
 uint32 flags  # 1 lost, 2 late, 4 WKC low, 8 not OP, 16 fail-safe, 32 skipped, 64 bad counter, \
-128 DC unlocked, 256 doubled
+128 DC unlocked, 256 doubled, 512 unchecked
 uint16 wkc  # not published: 0
 uint16 wkc_expected  # not published: 0
 uint8[<=64] slaves_bad  # bit n % 8 of octet n / 8: the sample of slave n is not good
