@@ -42,7 +42,7 @@ MODULES: dict[str, dict[str, set[str]]] = {
         "cycle": {"base", "wire", "config", "image", "link", "bus", "control"},
         "admin": {"base", "wire", "config", "image", "cycle"},
         "daemon": {"base", "wire", "config", "image", "link", "bus", "control", "cycle", "admin"}
-        | {"program"},
+        | {"mailbox", "program"},
     },
     "services": {
         "record": READERS,

@@ -30,6 +30,7 @@ enum { BUS_ERROR_BYTES = 256, BUS_TROUBLE_BYTES = 208 };
 
 struct bus;
 struct mailbox_engine;
+struct mailbox_request;
 
 /** @cfg and @line outlive the bus. Free with bus_destroy(). */
 int bus_create(const struct config *cfg, struct line *line, struct bus **ret_bus);
@@ -122,7 +123,15 @@ const struct exchange_plan *bus_plan(const struct bus *bus);
 struct mailbox_engine *bus_mailbox(struct bus *bus);
 /** One pass of it; in OP once a cycle or so while it is busy, else a few times a second. */
 void bus_mailbox_step(struct bus *bus);
+int bus_mailbox_is_busy(const struct bus *bus);
 
+/**
+ * Begin an SDO transfer: @rq has slave, parameters, buffer and done(); its result comes from
+ * bus_mailbox_step(). 0; -ENODEV, -ENOTSUP, -EIO the slave is lost, -EINVAL, and done() is not
+ * called.
+ */
+int bus_sdo_submit(struct bus *bus, struct mailbox_request *rq);
+void bus_sdo_cancel(struct bus *bus, struct mailbox_request *rq);
 /**
  * One SDO transfer; blocking, at most bus.mailbox_timeout for each mail. A download is never
  * executed twice. @ret_abort is the SDO abort code or 0. Size in @len is updated by read.

@@ -99,6 +99,11 @@ void bus_mailbox_step(struct bus *bus)
 	mailbox_step(bus->mailbox);
 }
 
+int bus_mailbox_is_busy(const struct bus *bus)
+{
+	return mailbox_is_busy(bus->mailbox);
+}
+
 int bus_has_coe(const struct bus *bus, size_t pos)
 {
 	return mailbox_slave_has(bus->mailbox, (uint16_t)pos, SII_MAILBOX_COE);
@@ -131,15 +136,24 @@ static int32_t object_of(uint16_t index, uint8_t subindex)
 	return (int32_t)((uint32_t)index << 8 | subindex);
 }
 
-static int run(struct bus *bus, struct mailbox_request *rq)
+int bus_sdo_submit(struct bus *bus, struct mailbox_request *rq)
 {
 	int r = check_request(bus, rq->slave_pos);
 
 	rq->protocol = &coe_protocol;
 	rq->timeout = (span_t){ bus->cfg->bus_mailbox_timeout_ns };
-	if (r >= 0) {
-		r = mailbox_submit(bus->mailbox, rq);
-	}
+	return r < 0 ? r : mailbox_submit(bus->mailbox, rq);
+}
+
+void bus_sdo_cancel(struct bus *bus, struct mailbox_request *rq)
+{
+	mailbox_cancel(bus->mailbox, rq);
+}
+
+static int run(struct bus *bus, struct mailbox_request *rq)
+{
+	int r = bus_sdo_submit(bus, rq);
+
 	return r < 0 ? r : mailbox_wait(bus->mailbox, rq);
 }
 

@@ -51,6 +51,8 @@ struct session {
 
 /** @ev goes to the event ring, stamped with the time now. */
 void session_emit(struct session *s, const struct event *ev);
+/** Begin the SDO transfer of an admin request; @ctx is the session. */
+void session_sdo(void *ctx, struct admin_pending *pending);
 /** State, page and event. */
 void session_state_set(struct session *s, enum bus_state state);
 void session_wait(struct session *s, span_t span);

@@ -32,32 +32,6 @@ static int admin_dc_now(void *ctx, int64_t *ret_dc_ns)
 	return s->cycle != NULL ? cycle_dc_now(s->cycle, ret_dc_ns) : -EAGAIN;
 }
 
-static void admin_sdo(void *ctx, struct admin_pending *pending)
-{
-	const struct session *s = ctx;
-	const struct admin_request *rq = &pending->request;
-	struct admin_reply *reply = &pending->reply;
-	size_t len = sizeof(reply->data);
-	int r;
-
-	if (rq->verb == ADMIN_SDO_READ) {
-		r = bus_sdo_read(s->bus, rq->slave_pos, rq->index, rq->subindex, reply->data, &len,
-				 &reply->sdo_abort);
-		reply->data_len = r == 0 ? (uint32_t)len : 0;
-	} else {
-		r = bus_sdo_write(s->bus, rq->slave_pos, rq->index, rq->subindex, pending->data,
-				  pending->data_len, &reply->sdo_abort);
-	}
-	if (r < 0 && reply->sdo_abort == 0) {
-		admin_pending_refuse(pending, r,
-				     "slave %u: SDO %s of 0x%04x:%02x: no answer (error %d)",
-				     rq->slave_pos, rq->verb == ADMIN_SDO_READ ? "read" : "write",
-				     rq->index, rq->subindex, -r);
-		return;
-	}
-	admin_pending_complete(pending, r);
-}
-
 static void admin_stop(void *ctx)
 {
 	session_stop_ask(ctx);
@@ -89,7 +63,7 @@ static void serve_admin(struct session *s)
 		target.channels = bus_channels(s->bus, &target.channel_count);
 		target.slaves = bus_slaves(s->bus, &target.slave_count);
 		target.board = &s->board;
-		target.sdo = admin_sdo;
+		target.sdo = session_sdo;
 	}
 	s->replies_waiting = admin_server_service(s->admin, &target, session_now(s));
 }

@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "mailbox/mailbox.h"
+
 enum { IMAGE_BYTES = 3, ROUND_TRIP_NS = 20000 };
 
 struct fake_bus fake_bus;
@@ -264,34 +266,49 @@ const struct exchange_plan *bus_plan(const struct bus *bus)
 	return &plan;
 }
 
-void bus_mailbox_step(struct bus *bus)
-{
-	(void)bus;
-}
+/* A read gives its subindex; a write is aborted. The answer comes with the next step. */
+static struct mailbox_request *sdo;
 
-int bus_sdo_read(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t subindex,
-		 uint8_t *ret_data, size_t *len, uint32_t *ret_abort)
+int bus_sdo_submit(struct bus *bus, struct mailbox_request *rq)
 {
 	(void)bus;
-	(void)slave_pos;
-	(void)index;
-	*ret_abort = 0;
-	ret_data[0] = subindex;
-	*len = 1;
+	rq->result = -EINPROGRESS;
+	sdo = rq;
 	return 0;
 }
 
-int bus_sdo_write(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t subindex,
-		  const uint8_t *data, size_t len, uint32_t *ret_abort)
+void bus_sdo_cancel(struct bus *bus, struct mailbox_request *rq)
 {
 	(void)bus;
-	(void)slave_pos;
-	(void)index;
-	(void)subindex;
-	(void)data;
-	(void)len;
-	*ret_abort = 0x06020000;
-	return -EIO;
+	sdo = NULL;
+	rq->result = -ECANCELED;
+	rq->done(rq->ctx, rq);
+}
+
+int bus_mailbox_is_busy(const struct bus *bus)
+{
+	(void)bus;
+	return sdo != NULL;
+}
+
+void bus_mailbox_step(struct bus *bus)
+{
+	struct mailbox_request *rq = sdo;
+
+	(void)bus;
+	if (rq == NULL) {
+		return;
+	}
+	sdo = NULL;
+	if (rq->with.coe.operation == COE_UPLOAD) {
+		rq->buffer[0] = rq->with.coe.subindex;
+		rq->len = 1;
+		rq->result = 0;
+	} else {
+		rq->detail = 0x06020000;
+		rq->result = -EREMOTEIO;
+	}
+	rq->done(rq->ctx, rq);
 }
 
 /* --- bus/exchange.h --- */
