@@ -21,8 +21,12 @@
 
 #include "base/limits.h"
 #include "base/platform.h"
+#include "mailbox/aoe.h"
 #include "mailbox/coe.h"
+#include "mailbox/eoe.h"
 #include "mailbox/foe.h"
+#include "mailbox/soe.h"
+#include "mailbox/voe.h"
 #include "wire/mailbox.h"
 
 enum { MAILBOX_TYPES = 16 };
@@ -90,6 +94,10 @@ struct mailbox_request {
 	union {
 		struct coe_parameters coe;
 		struct foe_parameters foe;
+		struct soe_parameters soe;
+		struct eoe_parameters eoe;
+		struct aoe_parameters aoe;
+		struct voe_parameters voe;
 	} with;          /* parameters */
 	uint8_t *buffer; /* what is written, or where it is read to */
 	size_t capacity; /* of the buffer; of what is written: its length */
@@ -111,6 +119,10 @@ struct mailbox_request {
 	union {
 		struct coe_state coe;
 		struct foe_state foe;
+		struct soe_state soe;
+		struct eoe_state eoe;
+		struct aoe_state aoe;
+		struct voe_state voe;
 	} state;
 	uint16_t mail_capacity; /* data bytes of a mail to this slave */
 	uint16_t mail_room;     /* data bytes of a mail of this slave */

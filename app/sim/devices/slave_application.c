@@ -5,6 +5,8 @@
 #include <string.h>
 
 #include "base/bytes.h"
+#include "devices/aoe_server.h"
+#include "devices/voe_server.h"
 #include "wire/al.h"
 #include "wire/esc_reg.h"
 
@@ -123,11 +125,18 @@ static uint16_t check_step(struct slave_application *app, int64_t t_ns, uint8_t 
 	return AL_CODE_NONE;
 }
 
+static void reset_servers(struct slave_application *app)
+{
+	foe_server_reset(&app->foe);
+	soe_server_reset(&app->soe);
+	eoe_server_reset(&app->eoe);
+}
+
 static void entered(struct slave_application *app, uint8_t from, uint8_t to)
 {
 	if (from == AL_INIT) {
 		mailbox_reset(&app->mailbox);
-		foe_server_reset(&app->foe);
+		reset_servers(app);
 		coe_dictionary_reset(&app->coe.dictionary);
 	}
 	app->coe.dictionary.is_preop = to == AL_PREOP;
@@ -185,6 +194,13 @@ static void run_mailbox(struct slave_application *app, int64_t t_ns, uint8_t sta
 	} all[] = {
 		{ SII_MAILBOX_COE, { MAILBOX_TYPE_COE, answer_coe, NULL, &app->coe } },
 		{ SII_MAILBOX_FOE, { MAILBOX_TYPE_FOE, foe_server_answer, NULL, &app->foe } },
+		{ SII_MAILBOX_SOE,
+		  { MAILBOX_TYPE_SOE, soe_server_answer, soe_server_next, &app->soe } },
+		{ SII_MAILBOX_EOE,
+		  { MAILBOX_TYPE_EOE, eoe_server_answer, eoe_server_next, &app->eoe } },
+		{ SII_MAILBOX_AOE,
+		  { MAILBOX_TYPE_AOE, aoe_server_answer, NULL, &app->coe.dictionary } },
+		{ SII_MAILBOX_VOE, { MAILBOX_TYPE_VOE, voe_server_answer, NULL, NULL } },
 	};
 	struct mailbox_server server[sizeof(all) / sizeof(all[0])];
 	unsigned protocols = app->sii->mailbox_protocols;
@@ -245,7 +261,7 @@ void slave_application_power_on(struct slave_application *app, struct esc *esc)
 {
 	app->esc = esc;
 	mailbox_reset(&app->mailbox);
-	foe_server_reset(&app->foe);
+	reset_servers(app);
 	coe_dictionary_reset(&app->coe.dictionary);
 	app->coe.dictionary.is_preop = 0;
 }

@@ -11,8 +11,10 @@
 #include <stdint.h>
 
 #include "devices/coe_server.h"
+#include "devices/eoe_server.h"
 #include "devices/foe_server.h"
 #include "devices/mailbox.h"
+#include "devices/soe_server.h"
 #include "segment/esc.h"
 #include "wire/sii.h"
 
@@ -31,6 +33,8 @@ struct slave_application {
 	struct esc *esc;       /* as of the last power-on */
 	struct coe_server coe;
 	struct foe_server foe;
+	struct soe_server soe;
+	struct eoe_server eoe;
 	struct mailbox mailbox;
 };
 

@@ -10,7 +10,7 @@
 #include "wire/esc_reg.h"
 #include "wire/foe.h"
 
-enum { SM_MAILBOX_OUT = 0x26, SM_MAILBOX_IN = 0x22, TRANSMIT_NS = 4000 };
+enum { SM_MAILBOX_OUT = 0x26, SM_MAILBOX_IN = 0x22, TRANSMIT_NS = 4000, ALL_PROTOCOLS = 0x3f };
 
 /* --- one datagram --- */
 
@@ -103,7 +103,10 @@ static unsigned make_segment(struct protocol_bench *b, const char *const *names)
 		if (strcmp(names[count], "fb1111_piccolo") == 0) {
 			CHECK_EQ(fb1111_piccolo_slave((int)count, &specs[count]), 0);
 		} else {
-			CHECK_EQ(catalogue_find(names[count], &model), 0);
+			int is_all = strcmp(names[count], "all") == 0;
+
+			CHECK_EQ(catalogue_find(is_all ? "akd" : names[count], &model), 0);
+			model.sii.mailbox_protocols |= is_all ? ALL_PROTOCOLS : 0;
 			CHECK_EQ(catalogue_slave(&model, (int)count, &specs[count]), 0);
 		}
 		CHECK_EQ(sii_parse(specs[count].sii, specs[count].sii_bytes, &b->sii[count], error,

@@ -24,7 +24,8 @@ struct protocol_bench {
 	struct sii sii[BENCH_SLAVES];
 };
 
-/** Slaves "fb1111_piccolo" or of the catalogue, NULL at the end; all in INIT with an address. */
+/** Slaves "fb1111_piccolo", of the catalogue, or "all": a drive with every protocol; NULL at the
+ * end; all in INIT with an address. */
 void bench_begin(struct protocol_bench *b, const char *const *names);
 void bench_end(struct protocol_bench *b);
 int64_t bench_now_ns(const struct protocol_bench *b);
