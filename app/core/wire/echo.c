@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "wire/echo.h"
 
+#include <string.h>
+
 #include "base/bytes.h"
 #include "wire/datagram.h"
 
@@ -59,4 +61,9 @@ int echo_matches(const uint8_t *sent, const uint8_t *frame, size_t frame_len, en
 		       ECAT_WKC_BYTES;
 	}
 	return 0;
+}
+
+int echo_is_unchanged(const uint8_t *sent, size_t sent_len, const uint8_t *frame, size_t frame_len)
+{
+	return frame_len >= sent_len && memcmp(sent, frame, sent_len) == 0;
 }

@@ -18,4 +18,7 @@ enum echo_index { ECHO_INDEX_SAME, ECHO_INDEX_ANY };
 int echo_matches(const uint8_t *sent, const uint8_t *frame, size_t frame_len,
 		 enum echo_index index);
 
+/** 1 if @frame is @sent as it was sent: no slave has processed it, something has returned it. */
+int echo_is_unchanged(const uint8_t *sent, size_t sent_len, const uint8_t *frame, size_t frame_len);
+
 #endif

@@ -12,6 +12,7 @@
 #include "bus/exchange_dc.h"
 #include "bus/exchange_frame.h"
 #include "wire/datagram.h"
+#include "wire/echo.h"
 
 enum {
 	PATH_WINDOW = 64, /* exchanges over which the shortest path is taken */
@@ -303,6 +304,9 @@ static int take_frame(struct exchange *ex, size_t len, mono_t at)
 
 		if (exchange_frame_matches(&ex->frame[i], ex->received, len, &sequence)) {
 			return sort_frame(ex, i, sequence, at);
+		}
+		if (echo_is_unchanged(ex->frame[i].bytes, ex->frame[i].len, ex->received, len)) {
+			line_note_unchanged(ex->line);
 		}
 	}
 	if (!line_ride_answer(ex->line, ex->received, len)) {

@@ -44,10 +44,23 @@ static void free_sync(struct bus *bus, size_t pos)
 	}
 }
 
+static const char *why_none(const struct line *line, int has_loop)
+{
+	const struct transport *tp = line_transport(line);
+
+	if (has_loop) {
+		return LINE_UNCHANGED_TEXT;
+	}
+	if (tp->is_up != NULL && tp->is_up(tp->ctx) == 0) {
+		return "the link is down (cable, power of the first slave)";
+	}
+	return "the link is up; is this the EtherCAT port, is the IN side connected?";
+}
+
 static int find_slaves(struct bus *bus)
 {
 	mono_t give_up = mono_add(bus_now(bus), (span_t){ bus->cfg->bus_scan_timeout_ns });
-	const struct transport *tp = line_transport(bus->line);
+	uint64_t unchanged = line_unchanged(bus->line);
 	int found;
 
 	for (;;) {
@@ -65,13 +78,9 @@ static int find_slaves(struct bus *bus)
 				LIMIT_SLAVES);
 	}
 	if (found <= 0) {
-		return bus_fail(
-			bus, -ENODEV, "no slave answers on %s: %s",
-			bus->cfg->interface[0] != '\0' ? bus->cfg->interface : "the line",
-			tp->is_up != NULL && tp->is_up(tp->ctx) == 0
-				? "the link is down (cable, power of the first slave)"
-				: "the link is up; is this the EtherCAT port, is the IN side "
-				  "connected?");
+		return bus_fail(bus, -ENODEV, "no slave answers on %s: %s",
+				bus->cfg->interface[0] != '\0' ? bus->cfg->interface : "the line",
+				why_none(bus->line, line_unchanged(bus->line) > unchanged));
 	}
 	bus->slave_count = (size_t)found;
 	return 0;

@@ -37,7 +37,8 @@ struct session {
 	enum bus_state state;
 	int is_partial; /* RECOVERING, and the cycle continues with the slaves that are in OP */
 	mono_t next_watch;
-	uint64_t silent_cycles; /* in a row without a frame */
+	uint64_t silent_cycles;  /* in a row without a frame */
+	uint64_t unchanged_seen; /* frames that came back unchanged before the silence */
 	uint64_t cycles_seen;
 	uint64_t lost_seen;
 	mono_t lost_since; /* all slaves, from then on; 0: not so */

@@ -170,6 +170,7 @@ static void count_silence(struct session *s)
 
 	if (lost < s->lost_seen || lost - s->lost_seen < cycles - s->cycles_seen) {
 		s->silent_cycles = 0;
+		s->unchanged_seen = line_unchanged(s->line);
 	} else {
 		s->silent_cycles += cycles - s->cycles_seen;
 	}
@@ -184,6 +185,9 @@ static void follow_silence(struct session *s)
 			atomic_load_explicit(&s->run.page->slave_count, memory_order_relaxed),
 	};
 
+	if (line_unchanged(s->line) > s->unchanged_seen) {
+		snprintf(report.trouble, sizeof(report.trouble), "%s", LINE_UNCHANGED_TEXT);
+	}
 	follow_bus(s, &report);
 }
 

@@ -78,6 +78,7 @@ struct line {
 	uint64_t thrown_away;           /* [service] */
 	uint64_t answered;              /* [service] direct mode */
 	uint8_t in[LIMIT_FRAME_BYTES];  /* [service] direct mode */
+	_Atomic uint64_t unchanged;     /* [owner of the transport] */
 	struct slot slot[LINE_SLOTS];
 	int64_t credit_ns;  /* [cycle] what service frames may still use */
 	struct slot *taken; /* [cycle] last */
@@ -130,6 +131,16 @@ const struct transport *line_transport(const struct line *line)
 uint64_t line_discarded(const struct line *line)
 {
 	return line->thrown_away;
+}
+
+uint64_t line_unchanged(const struct line *line)
+{
+	return atomic_load_explicit(&line->unchanged, memory_order_relaxed);
+}
+
+void line_note_unchanged(struct line *line)
+{
+	atomic_fetch_add_explicit(&line->unchanged, 1, memory_order_relaxed);
 }
 
 uint64_t line_answered(const struct line *line)
@@ -239,6 +250,11 @@ static enum offer offer(struct line *line, const uint8_t *frame, size_t frame_le
 	for (unsigned i = 0; i < LINE_SLOTS; i++) {
 		struct slot *sl = &line->slot[i];
 
+		if (sl->out.len > 0 &&
+		    echo_is_unchanged(sl->out.bytes, sl->out.len, frame, frame_len)) {
+			line_note_unchanged(line);
+			break;
+		}
 		if (sl->out.len == 0 || frame_len > sizeof(sl->answer.bytes) ||
 		    !echo_matches(sl->out.bytes, frame, frame_len, ECHO_INDEX_SAME)) {
 			continue;

@@ -114,6 +114,13 @@ uint64_t line_discarded(const struct line *line);
 /** Frames of direct mode that were answered. */
 uint64_t line_answered(const struct line *line);
 
+/** Frames that came back as they were sent, without the mark of a slave, in either mode. */
+uint64_t line_unchanged(const struct line *line);
+/* What that means, for a person. */
+#define LINE_UNCHANGED_TEXT                                                                        \
+	"frames return unchanged, no slave has processed them: loopback or wrong cable (plug, "    \
+	"switch, mirrored port)"
+
 /** Wait for @span; while riding, the cycle runs meanwhile. 0 or -ECANCELED. */
 int line_sleep(struct line *line, span_t span);
 
@@ -136,6 +143,8 @@ void line_ride_refused(struct line *line, int error);
 /** Offer a received frame that is not the cycle's: 1 if it was the answer waited for, or one that
  * came too late; else 0. */
 int line_ride_answer(struct line *line, const uint8_t *frame, size_t frame_len);
+/** A frame of the cycle has come back unchanged (echo_is_unchanged()). */
+void line_note_unchanged(struct line *line);
 /** 1 while a service frame is out and its answer has not come. */
 int line_ride_is_out(const struct line *line);
 

@@ -166,6 +166,9 @@ static void apply_to_frame(struct fault_plan *plan, const struct fault *f, struc
 	case FAULT_JITTER:
 		v->transit_ns += (int64_t)prng_below(&plan->prng, (uint64_t)f->by_ns + 1);
 		break;
+	case FAULT_MIRROR:
+		v->is_mirrored = 1;
+		break;
 	case FAULT_HOLD:
 		v->is_held = 1;
 		break;
@@ -277,6 +280,7 @@ static void apply_to_slave(const struct fault *f, struct segment *segment, int64
 	case FAULT_DROP:
 	case FAULT_DELAY:
 	case FAULT_JITTER:
+	case FAULT_MIRROR:
 	case FAULT_HOLD:
 	case FAULT_DOUBLE:
 	case FAULT_TRUNCATE:

@@ -7,6 +7,7 @@
  *   at=2s lose                         one frame, the first after 2 s
  *   frame=1000 delay by=300us          the 1000th frame
  *   p=1 jitter by=500ns                each frame reaches the slaves later by 0 to 500 ns
+ *   at=1s for=5s mirror                it comes back unchanged, from a plug that loops the port
  *   frame=1000 hold                    it comes back only when the next frame is sent
  *   at=2s damage slave=1               its check sum is wrong from the wire towards slave 1 on
  *   every=500 double                   each 500th frame
@@ -41,6 +42,7 @@ enum fault_action {
 	FAULT_DROP,     /* the frame is lost before the first slave */
 	FAULT_DELAY,    /* it comes back later by @by_ns */
 	FAULT_JITTER,   /* it reaches the slaves later by up to @by_ns */
+	FAULT_MIRROR,   /* it comes back unchanged; no slave has seen it */
 	FAULT_HOLD,     /* it comes back when the next frame is sent */
 	FAULT_DOUBLE,   /* it comes back twice */
 	FAULT_TRUNCATE, /* it comes back short */
@@ -90,6 +92,7 @@ struct fault {
 struct fault_verdict {
 	int is_dropped; /* before the slaves */
 	int is_lost;    /* behind them */
+	int is_mirrored;
 	int is_doubled;
 	int is_held;        /* until the next frame is sent */
 	int64_t delay_ns;   /* on the way back */

@@ -21,6 +21,7 @@ static const struct {
 	{ "drop", FAULT_DROP, 1, NULL },
 	{ "delay", FAULT_DELAY, 1, "by" },
 	{ "jitter", FAULT_JITTER, 1, "by" },
+	{ "mirror", FAULT_MIRROR, 1, NULL },
 	{ "hold", FAULT_HOLD, 1, NULL },
 	{ "double", FAULT_DOUBLE, 1, NULL },
 	{ "truncate", FAULT_TRUNCATE, 1, NULL },

@@ -153,8 +153,15 @@ static int ip_send(void *ctx, const uint8_t *frame, size_t frame_len)
 		v = fault_plan_judge(ip->spec.faults, ip->spec.segment, out_ns, frame_len);
 	}
 	out_ns += v.transit_ns;
-	if (v.is_dropped ||
-	    segment_frame(ip->spec.segment, out_ns, copy, frame_len, &back_ns) < 0 || v.is_lost) {
+	back_ns = out_ns;
+	if (v.is_dropped) {
+		return 0;
+	}
+	if (!v.is_mirrored &&
+	    segment_frame(ip->spec.segment, out_ns, copy, frame_len, &back_ns) < 0) {
+		return 0;
+	}
+	if (v.is_lost) {
 		return 0;
 	}
 	if (v.corrupt_at > 0) {

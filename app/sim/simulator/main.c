@@ -180,7 +180,7 @@ static void answer(struct simulation *sim, uint8_t *frame, size_t len, int64_t t
 		return;
 	}
 	t_ns += v.transit_ns;
-	if (segment_frame(sim->segment, t_ns, frame, len, &back_ns) < 0) {
+	if (!v.is_mirrored && segment_frame(sim->segment, t_ns, frame, len, &back_ns) < 0) {
 		sim->bad_frames++;
 		return;
 	}

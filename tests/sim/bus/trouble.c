@@ -18,6 +18,20 @@ TEST(trouble, a_segment_without_slaves_is_an_error)
 	segment_power_off(b->segment, 0, bench_now_ns(b));
 	CHECK_EQ(bench_find(b), -ENODEV);
 	CHECK(strstr(b->error, "no slave answers") != NULL);
+	CHECK(strstr(b->error, "unchanged") == NULL);
+	bench_destroy(b);
+}
+
+TEST(trouble, frames_that_return_unchanged_are_named_as_such)
+{
+	static const char *const settings[] = { "bus.scan_timeout=200ms", NULL };
+	struct bus_bench *b = bench_create(
+		&(struct bench_spec){ .piccolos = 1, .seed = 12, .settings = settings });
+	char error[BUS_ERROR_BYTES];
+
+	CHECK_EQ(fault_plan_add(b->faults, "p=1 mirror", 1, error, sizeof(error)), 0);
+	CHECK_EQ(bench_find(b), -ENODEV);
+	CHECK(strstr(b->error, "no slave answers on the line: frames return unchanged") != NULL);
 	bench_destroy(b);
 }
 

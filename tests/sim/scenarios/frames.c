@@ -145,3 +145,22 @@ TEST(sim_frames, a_cycle_delayed_by_five_periods_leaves_no_gap_in_the_numbers)
 	CHECK_EQ(atomic_load(&session_page(r.vm.session)->bus_state), BUS_OP);
 	run_close(&r);
 }
+
+TEST(sim_frames, a_segment_that_becomes_a_loop_is_named_and_recovered_from)
+{
+	static struct run r;
+
+	run_open(&r);
+	virtual_bench_fault(&r.b, "at=10ms for=500ms mirror");
+	CHECK_EQ(virtual_master_run(&r.vm, 400), SESSION_GOES_ON);
+	CHECK_EQ(atomic_load(&session_page(r.vm.session)->bus_state), BUS_RECOVERING);
+	CHECK(strstr(session_page(r.vm.session)->message, "frames return unchanged") != NULL);
+	CHECK(r.vm.result.lost > 300);
+	CHECK_EQ(virtual_master_run(&r.vm, 4000), SESSION_GOES_ON);
+	CHECK_EQ(atomic_load(&session_page(r.vm.session)->bus_state), BUS_OP);
+	CHECK_STR(session_page(r.vm.session)->message, "");
+	virtual_bench_fault(&r.b, "at=10ms for=300ms lose");
+	CHECK_EQ(virtual_master_run(&r.vm, 200), SESSION_GOES_ON);
+	CHECK(strstr(session_page(r.vm.session)->message, "unchanged") == NULL);
+	run_close(&r);
+}
