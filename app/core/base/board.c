@@ -97,9 +97,18 @@ void board_begin(struct board *board)
 	atomic_thread_fence(memory_order_release);
 }
 
+/* The sequence that board_commit() will give, while the set is odd. */
+static void mark(struct board *board, unsigned output)
+{
+	uint64_t s = atomic_load_explicit(&board->sequence, RELAXED) + 1;
+
+	atomic_store_explicit(&board->output[output].put, (uint32_t)s, RELAXED);
+}
+
 void board_put(struct board *board, unsigned output, uint64_t raw)
 {
 	if (output < BOARD_OUTPUTS) {
+		mark(board, output);
 		atomic_store_explicit(&board->output[output].raw, raw, RELAXED);
 		atomic_store_explicit(&board->output[output].is_set, 1, RELAXED);
 	}
@@ -108,8 +117,21 @@ void board_put(struct board *board, unsigned output, uint64_t raw)
 void board_unset(struct board *board, unsigned output)
 {
 	if (output < BOARD_OUTPUTS) {
+		mark(board, output);
 		atomic_store_explicit(&board->output[output].is_set, 0, RELAXED);
 	}
+}
+
+void board_withdraw(struct board *board, uint64_t sequence)
+{
+	board_begin(board);
+	for (unsigned i = 0; i < BOARD_OUTPUTS; i++) {
+		if (atomic_load_explicit(&board->output[i].is_set, RELAXED) != 0 &&
+		    atomic_load_explicit(&board->output[i].put, RELAXED) == (uint32_t)sequence) {
+			board_unset(board, i);
+		}
+	}
+	board_commit(board);
 }
 
 uint64_t board_commit(struct board *board)
@@ -130,6 +152,7 @@ int board_take(const struct board *board, unsigned output_count, struct board_se
 	}
 	for (unsigned i = 0; i < output_count && i < BOARD_OUTPUTS; i++) {
 		copy.raw[i] = atomic_load_explicit(&board->output[i].raw, RELAXED);
+		copy.put[i] = atomic_load_explicit(&board->output[i].put, RELAXED);
 		copy.is_set[i] =
 			(uint8_t)(atomic_load_explicit(&board->output[i].is_set, RELAXED) != 0);
 	}
@@ -139,6 +162,7 @@ int board_take(const struct board *board, unsigned output_count, struct board_se
 	}
 	for (unsigned i = 0; i < output_count && i < BOARD_OUTPUTS; i++) {
 		set->raw[i] = copy.raw[i];
+		set->put[i] = copy.put[i];
 		set->is_set[i] = copy.is_set[i];
 	}
 	set->sequence = before;

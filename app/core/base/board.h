@@ -2,7 +2,7 @@
 /*
  * The command board: how output values reach the cycle. One page per writer (local, program,
  * remote), each a sequence-numbered set of values; the cycle takes the newest whole set at the
- * cycle boundary and answers with the cycle in which it went on the wire. Plain memory or a
+ * cycle boundary and answers with the cycle whose frame brought it to the slaves. Plain memory or a
  * shared page; one writer, one reader; neither side blocks.
  */
 #ifndef BASE_BOARD_H
@@ -18,7 +18,7 @@ enum { BOARD_OUTPUTS = 512 }; /* the n-th output channel of the channel table */
 struct board_output {
 	_Atomic uint64_t raw;    /* [writer] as it goes into the image */
 	_Atomic uint32_t is_set; /* [writer] 1 once it was written */
-	uint32_t reserved;
+	_Atomic uint32_t put;    /* [writer] lower half of the sequence of the set it changed in */
 };
 
 struct board {
@@ -28,14 +28,15 @@ struct board {
 	_Atomic uint64_t sequence; /* [writer] odd: being written; even: set number * 2 */
 	_Atomic uint64_t beat;     /* [writer] counts up as a sign of life; for time-outs */
 	_Alignas(64) struct board_output output[BOARD_OUTPUTS];
-	_Alignas(64) _Atomic uint64_t taken_sequence; /* [cycle] newest set that is on the wire */
-	_Atomic uint64_t taken_cycle; /* [cycle] the cycle whose frame carried it first */
+	_Alignas(64) _Atomic uint64_t taken_sequence; /* [cycle] newest set that is in effect */
+	_Atomic uint64_t taken_cycle; /* [cycle] the first whose frame came back with it */
 };
 
 /* Plain values of one set, as the cycle sees them. */
 struct board_set {
 	uint64_t sequence;
 	uint64_t raw[BOARD_OUTPUTS];
+	uint32_t put[BOARD_OUTPUTS];
 	uint8_t is_set[BOARD_OUTPUTS];
 };
 
@@ -63,9 +64,15 @@ void board_unset(struct board *board, unsigned output);
 void board_begin(struct board *board);
 uint64_t board_commit(struct board *board);
 
+/**
+ * Withdraw what the set @sequence has put, unless a newer one has put it anew; a set of its own.
+ * Context: the writer.
+ */
+void board_withdraw(struct board *board, uint64_t sequence);
+
 /** 1 and a copy of the newest set if newer than @set->sequence and whole; else 0. RT-safe. */
 int board_take(const struct board *board, unsigned output_count, struct board_set *set);
-/** Report that the set with @sequence is sent in @cycle. Context: the cycle. */
+/** Report that the set with @sequence took effect in @cycle. Context: the cycle. */
 void board_answer(struct board *board, uint64_t sequence, uint64_t cycle);
 
 #endif

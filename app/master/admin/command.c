@@ -92,10 +92,10 @@ static uint64_t put_all(const struct admin_target *t, const struct placed *place
 	return board_commit(t->board);
 }
 
-/* Each pass: has the cycle put the values on the wire? */
+/* Each pass: have the values taken effect? */
 static void poll_board(struct admin_pending *pending, const struct admin_target *t)
 {
-	/* Sequences only grow: a newer set on the wire holds the values of this one, too. */
+	/* Sequences only grow: a newer set in effect holds the values of this one, too. */
 	if (t->board == NULL) {
 		admin_pending_refuse(pending, -ECANCELED, "the cycle has ended");
 	} else if (atomic_load_explicit(&t->board->taken_sequence, memory_order_acquire) >=
@@ -106,8 +106,15 @@ static void poll_board(struct admin_pending *pending, const struct admin_target 
 	}
 }
 
-static void abandon(struct admin_pending *pending)
+/* Nobody was told that the values are in effect: they must not get so later. */
+static void withdraw(struct admin_pending *pending)
 {
+	struct board *board = pending->work;
+
+	if (atomic_load_explicit(&board->taken_sequence, memory_order_acquire) <
+	    pending->sequence) {
+		board_withdraw(board, pending->sequence);
+	}
 	admin_pending_complete(pending, -ECANCELED);
 }
 
@@ -116,7 +123,8 @@ static void wait_for_cycle(const struct admin_target *t, struct admin_pending *p
 {
 	pending->sequence = put_all(t, placed, count);
 	pending->poll = poll_board;
-	pending->cancel = abandon;
+	pending->cancel = withdraw;
+	pending->work = t->board;
 }
 
 static void run_set(const struct admin_target *t, struct admin_pending *pending)

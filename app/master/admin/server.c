@@ -450,8 +450,10 @@ static int attend(const struct pass *pass, struct admin_pending *pending)
 	if ((pending->state == ADMIN_PENDING_OPEN || pending->state == ADMIN_PENDING_COLLECTING) &&
 	    pending->client != NULL && pass->now.ns >= pending->give_up.ns) {
 		end_early(pass, pending, -ETIMEDOUT,
-			  pending->poll != NULL ? "the cycle did not take the values in time"
-						: "not answered in time");
+			  pending->poll != NULL
+				  ? "withdrawn: no frame came back with the values in "
+				    "time, or the outputs are at fail-safe"
+				  : "not answered in time");
 	}
 	if (pending->state == ADMIN_PENDING_OPEN && pending->client != NULL &&
 	    pending->has_progress) {

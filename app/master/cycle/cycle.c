@@ -158,6 +158,18 @@ static void choose_outputs(struct cycle *cy, uint8_t *image)
 	SET(cy->spec.stats->is_fail_safe, (uint32_t)is_fail_safe);
 }
 
+/* A set is answered as effective when a frame came back with it, from slaves that use it. */
+static void answer_boards(struct cycle *cy, const struct exchange_result *res)
+{
+	struct slave_set arrived = slave_set_empty();
+
+	if (cycle_has_inputs(cy, res)) {
+		arrived = cy->live;
+		slave_set_and_not(&arrived, &res->slaves_low);
+	}
+	outputs_arrived(&cy->outputs, &arrived, cy->sample.cycle);
+}
+
 static void count_page_faults(struct cycle *cy)
 {
 	struct rusage usage;
@@ -210,7 +222,7 @@ void cycle_step(struct cycle *cy)
 		ADD(st->frames_late, 1);
 		cy->sample.flags |= SAMPLE_LATE;
 	}
-	outputs_sent(&cy->outputs, cy->sample.cycle);
+	answer_boards(cy, &res);
 	cycle_judge(cy, &res, place.is_in_window);
 
 	cy->sample.dc_time_ns = numbering_dc_time(&cy->numbering, cy->sample.cycle);

@@ -137,24 +137,47 @@ unsigned outputs_choose(struct outputs *outputs, uint8_t *image, const struct sl
 		const struct board_set *set = &outputs->set[out->owner];
 		int is_silent = out->timeout_cycles > 0 &&
 				cycle - outputs->alive_cycle[out->owner] > out->timeout_cycles;
-		int is_live = slave_set_has(live, out->channel->slave_pos);
-		uint64_t raw = out->fail_safe_raw;
+		int is_wanted = set->is_set[i] && slave_set_has(live, out->channel->slave_pos);
 
-		if (is_live && set->is_set[i] && !is_silent) {
-			raw = limited(out, set->raw[i]);
-		}
-		timed_out += is_live && set->is_set[i] && is_silent;
-		image_set_raw(image, out->channel, raw);
+		outputs->is_live[i] = (uint8_t)(is_wanted && !is_silent);
+		timed_out += is_wanted && is_silent;
+		image_set_raw(image, out->channel,
+			      outputs->is_live[i] ? limited(out, set->raw[i]) : out->fail_safe_raw);
 	}
 	return timed_out;
 }
 
-void outputs_sent(struct outputs *outputs, uint64_t cycle)
+/* Nothing of the newest set of @writer is missing in the slaves of @arrived. */
+static int is_in_effect(const struct outputs *outputs, unsigned writer,
+			const struct slave_set *arrived)
 {
+	const struct board_set *set = &outputs->set[writer];
+
+	for (size_t i = 0; i < outputs->output_count; i++) {
+		const struct output *out = &outputs->output[i];
+		int is_newer = (int32_t)(set->put[i] - (uint32_t)outputs->answered[writer]) > 0;
+
+		/* A withdrawn value is in effect by not being there. */
+		if (out->owner == writer && is_newer && set->is_set[i] &&
+		    !(outputs->is_live[i] && slave_set_has(arrived, out->channel->slave_pos))) {
+			return 0;
+		}
+	}
+	return 1;
+}
+
+void outputs_arrived(struct outputs *outputs, const struct slave_set *arrived, uint64_t cycle)
+{
+	if (slave_set_is_empty(arrived)) {
+		return;
+	}
 	for (unsigned w = 0; w < CYCLE_WRITERS; w++) {
-		if (outputs->board[w] != NULL && outputs->set[w].sequence != outputs->answered[w]) {
-			outputs->answered[w] = outputs->set[w].sequence;
-			board_answer(outputs->board[w], outputs->answered[w], cycle);
+		uint64_t sequence = outputs->set[w].sequence;
+
+		if (outputs->board[w] != NULL && sequence != outputs->answered[w] &&
+		    is_in_effect(outputs, w, arrived)) {
+			outputs->answered[w] = sequence;
+			board_answer(outputs->board[w], sequence, cycle);
 		}
 	}
 }

@@ -34,6 +34,7 @@ struct outputs {
 	uint64_t beat[CYCLE_WRITERS];
 	uint64_t alive_cycle[CYCLE_WRITERS]; /* the last with a sign of life of the writer */
 	struct output output[BOARD_OUTPUTS];
+	uint8_t is_live[BOARD_OUTPUTS]; /* the image last written carries its owner's value */
 	size_t output_count;
 };
 
@@ -49,7 +50,10 @@ int outputs_init(struct outputs *outputs, const struct cycle_spec *spec, char *e
 unsigned outputs_choose(struct outputs *outputs, uint8_t *image, const struct slave_set *live,
 			uint64_t cycle);
 
-/** The image last written went on the wire in @cycle: answer the boards. */
-void outputs_sent(struct outputs *outputs, uint64_t cycle);
+/**
+ * The image last written reached the slaves of @arrived with the frame of @cycle. Answers the
+ * boards whose newest set is in effect with that: every value that it has put or withdrawn.
+ */
+void outputs_arrived(struct outputs *outputs, const struct slave_set *arrived, uint64_t cycle);
 
 #endif

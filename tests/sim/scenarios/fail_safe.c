@@ -304,6 +304,66 @@ TEST(sim_fail_safe, a_stranger_is_counted_in_one_cycle_and_leaves_our_outputs_al
 	close_all();
 }
 
+/* --- commands --- */
+
+/* The sample of @cycle; the test ends if it has left the ring. */
+static struct sample_header sample_of(uint64_t cycle)
+{
+	static _Alignas(8) uint8_t payload[sizeof(struct sample_header) + LIMIT_IMAGE_BYTES];
+	struct ring_reader *reader = NULL;
+	struct sample_header h = { .cycle = 0 };
+	char path[128];
+	uint64_t lost;
+
+	snprintf(path, sizeof(path), "%s/" CONFIG_RUN_SAMPLES, vm.dir);
+	CHECK_EQ(ring_reader_open(path, &reader), 0);
+	ring_seek(reader, ring_oldest(reader));
+	do {
+		CHECK_EQ(ring_read(reader, payload, sizeof(payload), &lost), RING_OK);
+		memcpy(&h, payload, sample_head_bytes(2));
+	} while (h.cycle != cycle);
+	ring_reader_destroy(reader);
+	return h;
+}
+
+TEST(sim_fail_safe, a_command_names_the_first_cycle_whose_frame_came_back_with_its_value)
+{
+	struct admin_reply reply;
+	uint64_t now;
+
+	open_live(2, 14, NULL);
+	virtual_bench_fault(&b, "at=0s for=30ms drop");
+	now = atomic_load(&stats()->cycle_number);
+	reply = set_led("b.led", 1);
+	CHECK_EQ(reply.result, 0);
+	CHECK(reply.cycle >= now + 29);
+	CHECK(reply.cycle <= now + 33);
+	CHECK_EQ(sample_of(reply.cycle).flags & SAMPLE_LOST, 0);
+	CHECK_EQ(sample_of(reply.cycle - 1).flags & SAMPLE_LOST, SAMPLE_LOST);
+	close_all();
+}
+
+TEST(sim_fail_safe, a_command_that_cannot_take_effect_is_refused_and_never_does)
+{
+	struct admin_reply reply;
+
+	open_live(2, 15, "cycle.overrun=fail_safe");
+	in_process_stall(b.host, 3 * PERIOD_NS);
+	virtual_master_run(&vm, 20);
+	CHECK_EQ(atomic_load(&stats()->is_fail_safe), 1);
+	reply = set_led("b.led", 1);
+	CHECK_EQ(reply.result, -ETIMEDOUT);
+	CHECK(strstr(reply.text, "withdrawn") != NULL);
+	/* The next entry to OP ends the latch of the overrun. */
+	virtual_bench_fault(&b, "at=0s al-error slave=0 code=0x001a");
+	virtual_master_run(&vm, 100);
+	wait_for_op(1000);
+	virtual_master_run(&vm, 20);
+	CHECK_EQ(virtual_master_value(&vm, "a.led"), 1);
+	CHECK_EQ(virtual_master_value(&vm, "b.led"), 0);
+	close_all();
+}
+
 /* --- overrun --- */
 
 TEST(sim_fail_safe, an_overrun_with_policy_stop_sends_fail_safe_values_first)

@@ -78,6 +78,33 @@ TEST(board, the_cycle_never_takes_half_a_set)
 	CHECK_EQ(set.raw[0], 50000 * 16);
 }
 
+TEST(board, withdrawing_a_set_leaves_what_others_have_put)
+{
+	uint64_t sequence;
+
+	board_init(&board);
+	memset(&set, 0, sizeof(set));
+	board_begin(&board);
+	board_put(&board, 1, 10);
+	board_put(&board, 2, 20);
+	board_commit(&board);
+	board_begin(&board);
+	board_put(&board, 2, 21);
+	board_put(&board, 3, 31);
+	sequence = board_commit(&board);
+	board_begin(&board);
+	board_put(&board, 3, 32);
+	board_commit(&board);
+	board_withdraw(&board, sequence);
+	CHECK(board_take(&board, 8, &set));
+	CHECK_EQ(set.is_set[1], 1); /* put by an older one */
+	CHECK_EQ(set.is_set[2], 0);
+	CHECK_EQ(set.is_set[3], 1); /* put anew */
+	CHECK_EQ(set.raw[3], 32);
+	CHECK_EQ(set.put[2], (uint32_t)set.sequence);
+	CHECK_EQ(set.put[3], (uint32_t)sequence + 2);
+}
+
 TEST(board, a_withdrawn_output_is_not_set_in_the_next_set)
 {
 	board_init(&board);

@@ -171,3 +171,121 @@ TEST(outputs, a_timeout_counts_the_cycles_that_an_overrun_has_skipped)
 	CHECK_EQ(silent_since(1000000, 50000000, 10), 160);
 	CHECK_EQ(silent_since(1000000, 50000000, 60), 160);
 }
+
+/* --- answers --- */
+
+static const struct channel lamps[] = {
+	{ .name = "a.led",
+	  .direction = CHANNEL_OUTPUT,
+	  .type = CHANNEL_BOOL,
+	  .bit_len = 1,
+	  .scale = 1 },
+	{ .name = "b.led",
+	  .direction = CHANNEL_OUTPUT,
+	  .type = CHANNEL_BOOL,
+	  .bit_len = 1,
+	  .bit_offset = 1,
+	  .slave_pos = 1,
+	  .scale = 1 },
+};
+static const struct slave_set second = { .word = { 2 } };
+static const struct slave_set both = { .word = { 3 } };
+static const struct slave_set none;
+
+static void start_lamps(void)
+{
+	char error[128] = "";
+	struct cycle_spec spec = { .cfg = &cfg,
+				   .channels = lamps,
+				   .channel_count = 2,
+				   .boards = { [CYCLE_WRITER_LOCAL] = &board } };
+
+	memset(&cfg, 0, sizeof(cfg));
+	cfg.cycle_period_ns = 1000000;
+	board_init(&board);
+	CHECK_EQ(outputs_init(&outputs, &spec, error, sizeof(error)), 0);
+}
+
+static uint64_t light(unsigned lamp)
+{
+	board_begin(&board);
+	board_put(&board, lamp, 1);
+	return board_commit(&board);
+}
+
+/* One cycle: the frame of @cycle carries what was chosen before it. */
+static void cycle_with(const struct slave_set *live, const struct slave_set *arrived,
+		       uint64_t cycle)
+{
+	uint8_t image[1] = { 0 };
+
+	outputs_arrived(&outputs, arrived, cycle);
+	outputs_choose(&outputs, image, live, cycle);
+}
+
+TEST(outputs, a_set_is_answered_with_the_first_cycle_whose_frame_came_back_with_it)
+{
+	uint64_t sequence;
+
+	start_lamps();
+	sequence = light(0);
+	cycle_with(&both, &both, 10); /* it is chosen at the end of this one */
+	CHECK_EQ(board.taken_sequence, 0);
+	cycle_with(&both, &none, 11);   /* lost */
+	cycle_with(&both, &second, 12); /* the data of the other slave only */
+	CHECK_EQ(board.taken_sequence, 0);
+	cycle_with(&both, &both, 13);
+	CHECK_EQ(board.taken_sequence, sequence);
+	CHECK_EQ(board.taken_cycle, 13);
+}
+
+TEST(outputs, a_set_is_not_answered_while_its_output_is_at_fail_safe)
+{
+	uint64_t sequence;
+
+	start_lamps();
+	sequence = light(0);
+	for (uint64_t cycle = 10; cycle < 20; cycle++) {
+		cycle_with(&none, &both, cycle);
+	}
+	cycle_with(&second, &both, 20);
+	cycle_with(&second, &both, 21);
+	CHECK_EQ(board.taken_sequence, 0);
+	cycle_with(&both, &both, 22);
+	CHECK_EQ(board.taken_sequence, 0);
+	cycle_with(&both, &both, 23);
+	CHECK_EQ(board.taken_sequence, sequence);
+	CHECK_EQ(board.taken_cycle, 23);
+}
+
+TEST(outputs, an_output_that_is_not_in_the_set_does_not_keep_its_answer_back)
+{
+	uint64_t sequence;
+
+	start_lamps();
+	light(0);
+	cycle_with(&both, &both, 10);
+	cycle_with(&both, &both, 11);
+	CHECK_EQ(board.taken_cycle, 11);
+	sequence = light(1); /* slave a has left OP meanwhile */
+	cycle_with(&second, &second, 12);
+	cycle_with(&second, &second, 13);
+	CHECK_EQ(board.taken_sequence, sequence);
+	CHECK_EQ(board.taken_cycle, 13);
+}
+
+TEST(outputs, a_withdrawn_set_is_answered_by_the_next_frame)
+{
+	uint64_t sequence;
+
+	start_lamps();
+	sequence = light(0);
+	cycle_with(&second, &second, 10);
+	cycle_with(&second, &second, 11);
+	CHECK_EQ(board.taken_sequence, 0);
+	board_withdraw(&board, sequence);
+	cycle_with(&second, &second, 12);
+	cycle_with(&second, &second, 13);
+	CHECK_EQ(board.taken_sequence, sequence + 2);
+	CHECK_EQ(outputs.set[CYCLE_WRITER_LOCAL].is_set[0], 0);
+}
