@@ -46,6 +46,7 @@ static const struct {
 	[EVENT_STRANGER_GONE] = { "stranger_gone", EVENT_NOTICE },
 	[EVENT_SLAVE_WRONG] = { "slave_wrong", EVENT_ERROR },
 	[EVENT_SLAVE_UNREADABLE] = { "slave_unreadable", EVENT_ERROR },
+	[EVENT_SLAVE_ABSENT] = { "slave_absent", EVENT_WARNING },
 	[EVENT_SLAVE_ALARM] = { "slave_alarm", EVENT_ERROR },
 	[EVENT_OP_LOST] = { "op_lost", EVENT_WARNING },
 	[EVENT_SLAVE_COUNT] = { "slave_count", EVENT_WARNING },
@@ -432,6 +433,8 @@ int event_format(const struct event *ev, char *buf, size_t buf_len)
 	case EVENT_SLAVE_WRONG:
 	case EVENT_SLAVE_UNREADABLE:
 		return format_stranger(ev, buf, buf_len);
+	case EVENT_SLAVE_ABSENT:
+		return snprintf(buf, buf_len, "slaves[%" PRId32 "] is optional and absent", a[0]);
 	case EVENT_SLAVE_ALARM:
 		return format_alarm(ev, buf, buf_len);
 	case EVENT_SDO_ABORT:

@@ -67,8 +67,9 @@ enum event_id {
 	EVENT_SLAVE_UNREADABLE, /* slave in whose place it is, or none; the same, value 0 */
 	EVENT_SLAVE_ALARM, /* slave that is not tried again; arg: AL status, attempts; value: AL
 			      status code, 0: it was late */
-	EVENT_OP_LOST,   /* value: cycle; arg: AL status of all slaves ORed, slaves that answered */
-	EVENT_SLAVE_COUNT, /* value: cycle; arg: slaves that answered, expected */
+	EVENT_OP_LOST, /* value: cycle; arg: AL status of all slaves ORed, slaves that answered */
+	EVENT_SLAVE_COUNT,  /* value: cycle; arg: slaves that answered, expected */
+	EVENT_SLAVE_ABSENT, /* arg: item of slaves[], optional, that was not found */
 	EVENT_COUNT,
 };
 

@@ -17,6 +17,7 @@ enum config_mode { CONFIG_MODE_UNSET, CONFIG_MODE_PERIODIC, CONFIG_MODE_ONESHOT 
 enum config_owner { CONFIG_OWNER_LOCAL, CONFIG_OWNER_PROGRAM, CONFIG_OWNER_REMOTE };
 enum config_edge_clock { CONFIG_EDGE_AUTO, CONFIG_EDGE_MONOTONIC, CONFIG_EDGE_HTE };
 enum config_presence { CONFIG_ANY_SLAVES, CONFIG_EXACT_SLAVES };
+enum config_revision { CONFIG_REVISION_EXACT, CONFIG_REVISION_AT_LEAST, CONFIG_REVISION_ANY };
 enum config_datagrams { CONFIG_DATAGRAMS_ONE, CONFIG_DATAGRAMS_PER_SLAVE };
 
 enum { CONFIG_LIMIT_SDOS = 256, CONFIG_LIMIT_OUTPUTS = 512, CONFIG_PATH_BYTES = 256 };
@@ -24,10 +25,14 @@ enum { CONFIG_OPTIONS_BYTES = 512 };
 
 /* slaves[]: what is expected at each position, and how it is set up. */
 struct config_slave {
-	char name[32];         /* "" = made from the device name and position */
-	uint32_t vendor;       /* 0 = any */
-	uint32_t product;      /* 0 = any */
-	uint32_t revision;     /* 0 = any */
+	char name[32];     /* "" = made from the device name and position */
+	uint32_t vendor;   /* 0 = any */
+	uint32_t product;  /* 0 = any */
+	uint32_t revision; /* 0 = any */
+	enum config_revision revision_policy;
+	uint32_t serial;         /* 0 = any */
+	uint32_t identification; /* explicit device identification; 0 = any */
+	uint32_t is_optional;
 	uint32_t alias;        /* 0 = any */
 	enum config_mode mode; /* FB1111-Piccolo: writes 0x8000:01 in PRE-OP */
 	int64_t sync0_shift_ns;

@@ -39,6 +39,7 @@ int bus_create(const struct config *cfg, struct line *line, struct bus **ret_bus
 	if (bus == NULL) {
 		return -ENOMEM;
 	}
+	bus->wanted = cfg;
 	bus->cfg = cfg;
 	bus->line = line;
 	bus->reference = -1;

@@ -43,7 +43,12 @@ void bus_listen(struct bus *bus, void (*emit)(void *ctx, const struct event *ev)
 
 /** Find the slaves, to PRE-OP, SYNC0 of an earlier run stopped first (T09); names them. */
 int bus_scan(struct bus *bus, char *error);
-/** Found against configured slaves: position, vendor, product, revision, alias, count. */
+/**
+ * The configuration by position: optional slaves that are absent are left out, with their start-up
+ * SDOs and outputs. After bus_scan(); the one given to bus_create() before, or if it does not fit.
+ */
+const struct config *bus_config(const struct bus *bus);
+/** Found against configured slaves: order, identity, count. */
 int bus_compare(const struct bus *bus, char *error);
 /** Start-up SDOs, SM and FMMU, PDO mapping (CoE or SII) into the channel table, watchdog (T08),
  * exchange plan. */
@@ -82,6 +87,7 @@ struct bus_watch_report {
 	int is_all_op;
 	char trouble[BUS_TROUBLE_BYTES]; /* the first thing that is wrong, in one line; "": nothing
 					  */
+	char notice[BUS_TROUBLE_BYTES];  /* what is not wrong, but is to be known: absent slaves */
 };
 
 /**

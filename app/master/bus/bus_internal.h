@@ -109,8 +109,13 @@ struct bus_emit {
 };
 
 struct bus {
-	const struct config *cfg;
-	struct bus_emit listener; /* of mailbox events */
+	const struct config *wanted; /* as configured */
+	const struct config *cfg;    /* by position: @bound, after a scan */
+	struct config bound;
+	uint16_t identification[LIMIT_SLAVES]; /* explicit; 0: not asked for, or it has none */
+	unsigned absent_count;                 /* optional slaves that were not found */
+	int absent;                            /* the first of them, in @wanted */
+	struct bus_emit listener;              /* of mailbox events */
 	struct line *line;
 	struct mailbox_engine *mailbox;
 	char *error;      /* of the public call that runs */

@@ -46,40 +46,214 @@ static void append_wanted(struct text *text, const struct config_slave *want)
 			append(text, "%s%s any", i > 0 ? " " : "", part[i].name);
 		}
 	}
+	if (want->revision != 0 && want->revision_policy == CONFIG_REVISION_AT_LEAST) {
+		append(text, " or newer");
+	}
+	if (want->serial != 0) {
+		append(text, " serial %u", want->serial);
+	}
 	if (want->alias != 0) {
 		append(text, " alias %u", want->alias);
 	}
+	if (want->identification != 0) {
+		append(text, " identification %u", want->identification);
+	}
 }
 
-static void append_found(struct text *text, const struct slave_info *found, int is_alias_wanted)
+static void append_found(struct text *text, const struct config_slave *want,
+			 const struct slave_info *found, unsigned id)
 {
 	append(text, "vendor 0x%08x product 0x%08x revision 0x%08x", found->vendor, found->product,
 	       found->revision);
-	if (is_alias_wanted) {
+	if (want->serial != 0) {
+		append(text, " serial %u", found->serial);
+	}
+	if (want->alias != 0) {
 		append(text, " alias %u", found->alias);
+	}
+	if (want->identification != 0) {
+		append(text, " identification %u", id);
 	}
 	if (found->device[0] != '\0') {
 		append(text, " (%s)", found->device);
 	}
 }
 
-static int is_wanted(const struct config_slave *want, const struct slave_info *found)
+static int is_revision_wanted(const struct config_slave *want, uint32_t revision)
+{
+	switch (want->revision_policy) {
+	case CONFIG_REVISION_ANY:
+		return 1;
+	case CONFIG_REVISION_AT_LEAST:
+		return revision >= want->revision;
+	case CONFIG_REVISION_EXACT:
+		break;
+	}
+	return want->revision == 0 || want->revision == revision;
+}
+
+static int is_wanted(const struct config_slave *want, const struct slave_info *found, unsigned id)
 {
 	return (want->vendor == 0 || want->vendor == found->vendor) &&
 	       (want->product == 0 || want->product == found->product) &&
-	       (want->revision == 0 || want->revision == found->revision) &&
-	       (want->alias == 0 || want->alias == found->alias);
+	       is_revision_wanted(want, found->revision) &&
+	       (want->serial == 0 || want->serial == found->serial) &&
+	       (want->alias == 0 || want->alias == found->alias) &&
+	       (want->identification == 0 || want->identification == id);
 }
 
-int compare_slaves(const struct config *cfg, const struct slave_info *found, size_t found_count,
-		   char *error, size_t error_bytes)
+static unsigned id_of(const uint16_t *id, size_t pos)
+{
+	return id != NULL ? id[pos] : 0;
+}
+
+/* --- binding --- */
+
+/* Row i: bit j, if the configured slaves from i on can be bound to the found ones from j on. */
+struct bindable {
+	uint8_t row[LIMIT_SLAVES + 1][LIMIT_SLAVES / 8 + 1];
+};
+
+static int is_bindable(const struct bindable *b, size_t i, size_t j)
+{
+	return b->row[i][j / 8] >> (j % 8) & 1;
+}
+
+static void fill_bindable(const struct config *cfg, const struct slave_info *found,
+			  const uint16_t *id, size_t count, struct bindable *b)
+{
+	memset(b, 0, sizeof(*b));
+	for (size_t i = cfg->slave_count + 1; i-- > 0;) {
+		for (size_t j = 0; j <= count; j++) {
+			int is_possible;
+
+			if (i == cfg->slave_count) {
+				is_possible =
+					j == count || cfg->bus_presence != CONFIG_EXACT_SLAVES;
+			} else {
+				const struct config_slave *want = &cfg->slave[i];
+
+				is_possible = (j < count && is_bindable(b, i + 1, j + 1) &&
+					       is_wanted(want, &found[j], id_of(id, j))) ||
+					      (want->is_optional && is_bindable(b, i + 1, j));
+			}
+			b->row[i][j / 8] |= (uint8_t)(is_possible << (j % 8));
+		}
+	}
+}
+
+int compare_bind(const struct config *cfg, const struct slave_info *found, const uint16_t *id,
+		 size_t found_count, int *ret_config)
+{
+	struct bindable b;
+	size_t j = 0;
+
+	fill_bindable(cfg, found, id, found_count, &b);
+	if (!is_bindable(&b, 0, 0)) {
+		return -ENXIO;
+	}
+	for (size_t k = 0; k < found_count; k++) {
+		ret_config[k] = -1;
+	}
+	for (size_t i = 0; i < cfg->slave_count; i++) {
+		if (j < found_count && is_bindable(&b, i + 1, j + 1) &&
+		    is_wanted(&cfg->slave[i], &found[j], id_of(id, j))) {
+			ret_config[j++] = (int)i;
+		}
+	}
+	return 0;
+}
+
+static int find_position(const int *config, size_t found_count, int slave)
+{
+	for (size_t j = 0; j < found_count; j++) {
+		if (config[j] == slave) {
+			return (int)j;
+		}
+	}
+	return -1;
+}
+
+/* "drive.position" of a slave "drive" that is absent. */
+static int is_of_absent(const struct config *cfg, const int *config, size_t found_count,
+			const char *channel)
+{
+	for (size_t i = 0; i < cfg->slave_count; i++) {
+		const char *name = cfg->slave[i].name;
+		size_t len = strlen(name);
+
+		if (len > 0 && strncmp(channel, name, len) == 0 && channel[len] == '.') {
+			return find_position(config, found_count, (int)i) < 0;
+		}
+	}
+	return 0;
+}
+
+void compare_apply(const struct config *cfg, const int *config, size_t found_count,
+		   struct config *bound)
+{
+	*bound = *cfg;
+	bound->slave_count = 0;
+	bound->sdo_count = 0;
+	bound->output_count = 0;
+	for (size_t j = 0; j < found_count && config[j] >= 0; j++) {
+		bound->slave[bound->slave_count++] = cfg->slave[config[j]];
+	}
+	for (size_t i = 0; i < cfg->sdo_count; i++) {
+		int pos = find_position(config, found_count, cfg->sdo[i].slave_pos);
+
+		if (pos >= 0) {
+			bound->sdo[bound->sdo_count] = cfg->sdo[i];
+			bound->sdo[bound->sdo_count++].slave_pos = (uint16_t)pos;
+		}
+	}
+	for (size_t i = 0; i < cfg->output_count; i++) {
+		if (!is_of_absent(cfg, config, found_count, cfg->output[i].channel)) {
+			bound->output[bound->output_count++] = cfg->output[i];
+		}
+	}
+}
+
+/* --- why it is not possible --- */
+
+/* The found one is another of the configured slaves: they were exchanged. */
+static void append_other(struct text *text, const struct config *cfg, size_t not_this,
+			 const struct slave_info *found, unsigned id)
+{
+	for (size_t i = 0; i < cfg->slave_count; i++) {
+		const struct config_slave *other = &cfg->slave[i];
+		int is_specific = other->serial != 0 || other->alias != 0 ||
+				  other->identification != 0 || other->product != 0;
+
+		if (i != not_this && is_specific && is_wanted(other, found, id)) {
+			append(text, ", which is slave %zu%s%s", i,
+			       other->name[0] != '\0' ? " " : "", other->name);
+			return;
+		}
+	}
+}
+
+int compare_slaves(const struct config *cfg, const struct slave_info *found, const uint16_t *id,
+		   size_t found_count, char *error, size_t error_bytes)
 {
 	struct text text = { .buf = error, .bytes = error_bytes };
+	int config[LIMIT_SLAVES];
+	size_t j = 0; /* position */
 
+	if (compare_bind(cfg, found, id, found_count, config) == 0) {
+		return 0;
+	}
 	for (size_t i = 0; i < cfg->slave_count; i++) {
 		const struct config_slave *want = &cfg->slave[i];
 
-		if (i >= found_count) {
+		if (j < found_count && is_wanted(want, &found[j], id_of(id, j))) {
+			j++;
+			continue;
+		}
+		if (want->is_optional) {
+			continue;
+		}
+		if (j >= found_count) {
 			append(&text,
 			       "slave %zu%s%s is missing: %zu found, %zu expected; expected ", i,
 			       want->name[0] != '\0' ? " " : "", want->name, found_count,
@@ -87,19 +261,17 @@ int compare_slaves(const struct config *cfg, const struct slave_info *found, siz
 			append_wanted(&text, want);
 			return -ENXIO;
 		}
-		if (!is_wanted(want, &found[i])) {
-			append(&text, "slave %zu: wrong identity: expected ", i);
-			append_wanted(&text, want);
-			append(&text, ", found ");
-			append_found(&text, &found[i], want->alias != 0);
-			return -ENXIO;
-		}
-	}
-	if (cfg->bus_presence == CONFIG_EXACT_SLAVES && found_count > cfg->slave_count) {
-		append(&text, "slave %zu is unexpected: %zu found, %zu expected; found ",
-		       cfg->slave_count, found_count, cfg->slave_count);
-		append_found(&text, &found[cfg->slave_count], 0);
+		append(&text, "slave %zu: wrong identity: expected ", i);
+		append_wanted(&text, want);
+		append(&text, ", found ");
+		append_found(&text, want, &found[j], id_of(id, j));
+		append_other(&text, cfg, i, &found[j], id_of(id, j));
 		return -ENXIO;
 	}
-	return 0;
+	if (j < found_count) {
+		append(&text, "slave %zu is unexpected: %zu found, %zu expected; found ", j,
+		       found_count, cfg->slave_count);
+		append_found(&text, &(struct config_slave){ 0 }, &found[j], 0);
+	}
+	return -ENXIO;
 }

@@ -4,12 +4,28 @@
 #define BUS_COMPARE_H
 
 #include <stddef.h>
+#include <stdint.h>
 
 #include "base/sample.h"
 #include "config/config.h"
 
+/**
+ * Bind the configured slaves to the found ones, in order; optional ones may be left out. @id: their
+ * explicit device identification, NULL: not read. @ret_config, of @found_count: the configured
+ * slave at each position, -1: none. 0, or -ENXIO: it is not possible; compare_slaves() says why.
+ */
+int compare_bind(const struct config *cfg, const struct slave_info *found, const uint16_t *id,
+		 size_t found_count, int *ret_config);
+
+/**
+ * Make @bound the configuration by position: slaves[] as bound in @config, start-up SDOs with them.
+ * What belongs to absent slaves, their outputs, too, is left out.
+ */
+void compare_apply(const struct config *cfg, const int *config, size_t found_count,
+		   struct config *bound);
+
 /** 0; or -ENXIO and one line: position, what is expected, what was found. */
-int compare_slaves(const struct config *cfg, const struct slave_info *found, size_t found_count,
-		   char *error, size_t error_bytes);
+int compare_slaves(const struct config *cfg, const struct slave_info *found, const uint16_t *id,
+		   size_t found_count, char *error, size_t error_bytes);
 
 #endif

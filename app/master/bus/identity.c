@@ -23,6 +23,8 @@ enum {
 	COMMAND_BYTES = 6,
 };
 
+#define IDENTIFICATION_NS (200 * NS_PER_MS)
+
 static int run_on(struct bus *bus, enum ecat_cmd cmd, uint16_t station, uint16_t reg, void *data,
 		  uint16_t len)
 {
@@ -115,5 +117,52 @@ int bus_identity_read(struct bus *bus, uint16_t station, struct bus_identity *re
 				      .revision = get_le32(words + 8),
 				      .serial = get_le32(words + 12),
 				      .alias = get_le16(alias) };
+	return 0;
+}
+
+static int read_al(struct bus *bus, size_t pos, uint16_t *ret_status, uint16_t *ret_code)
+{
+	uint8_t al[6] = { 0 };
+	int r = register_read(bus, pos, ESC_REG_AL_STATUS, al, sizeof(al));
+
+	*ret_status = get_le16(al);
+	*ret_code = get_le16(al + 4);
+	return r;
+}
+
+static int write_control(struct bus *bus, size_t pos, unsigned control)
+{
+	uint8_t word[2];
+
+	put_le16(word, (uint16_t)control);
+	return register_write(bus, pos, ESC_REG_AL_CONTROL, word, sizeof(word));
+}
+
+uint16_t bus_identification_read(struct bus *bus, size_t pos)
+{
+	mono_t give_up = mono_add(bus_now(bus), (span_t){ IDENTIFICATION_NS });
+	uint16_t status = 0;
+	uint16_t id = 0;
+	int is_asked = 0;
+
+	while (bus_now(bus).ns < give_up.ns) {
+		if (read_al(bus, pos, &status, &id) < 0 || (status & AL_ERROR) != 0) {
+			break;
+		}
+		if ((status & AL_ID_REQUEST) != 0) {
+			write_control(bus, pos, status & AL_STATE_MASK);
+			return id;
+		}
+		if (!is_asked) {
+			is_asked = write_control(bus, pos,
+						 (status & AL_STATE_MASK) | AL_ID_REQUEST) == 0;
+		}
+		if (line_sleep(bus->line, (span_t){ NS_PER_MS }) < 0) {
+			break;
+		}
+	}
+	if (is_asked) {
+		write_control(bus, pos, status & AL_STATE_MASK);
+	}
 	return 0;
 }

@@ -3,6 +3,7 @@
 #ifndef BUS_IDENTITY_H
 #define BUS_IDENTITY_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 struct bus;
@@ -22,5 +23,11 @@ struct bus_identity {
  * three to five reads.
  */
 int bus_identity_read(struct bus *bus, uint16_t station, struct bus_identity *ret);
+
+/**
+ * The explicit device identification of the slave at @pos: its number after a request in AL control
+ * (ETG.1020), the state kept. 0: it has none. Waits up to 200 ms.
+ */
+uint16_t bus_identification_read(struct bus *bus, size_t pos);
 
 #endif

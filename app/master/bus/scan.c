@@ -242,11 +242,66 @@ void bus_publish_slaves(struct bus *bus)
 	}
 }
 
+static int is_identification_wanted(const struct config *cfg)
+{
+	for (size_t i = 0; i < cfg->slave_count; i++) {
+		if (cfg->slave[i].identification != 0) {
+			return 1;
+		}
+	}
+	return 0;
+}
+
+static void note_absent(struct bus *bus, const int *config)
+{
+	bus->absent_count = 0;
+	for (size_t i = 0; i < bus->wanted->slave_count; i++) {
+		size_t j = 0;
+
+		while (j < bus->slave_count && config[j] != (int)i) {
+			j++;
+		}
+		if (j < bus->slave_count) {
+			continue;
+		}
+		bus->absent = bus->absent_count++ == 0 ? (int)i : bus->absent;
+		bus_emit_event(bus, &bus->listener,
+			       (struct event){ .id = EVENT_SLAVE_ABSENT,
+					       .slave_pos = EVENT_NO_SLAVE,
+					       .arg = { (int32_t)i, 0 } });
+	}
+}
+
+/* The configuration by position. Where it does not fit, bus_compare() reports it. */
+static void bind_slaves(struct bus *bus)
+{
+	struct slave_info info[LIMIT_SLAVES];
+	int config[LIMIT_SLAVES];
+
+	memset(bus->identification, 0, sizeof(bus->identification));
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		info[i] = bus->slave[i].info;
+	}
+	if (is_identification_wanted(bus->wanted)) {
+		for (size_t i = 0; i < bus->slave_count; i++) {
+			bus->identification[i] = bus_identification_read(bus, i);
+		}
+	}
+	bus->absent_count = 0;
+	if (compare_bind(bus->wanted, info, bus->identification, bus->slave_count, config) < 0) {
+		return;
+	}
+	compare_apply(bus->wanted, config, bus->slave_count, &bus->bound);
+	bus->cfg = &bus->bound;
+	note_absent(bus, config);
+}
+
 int bus_scan(struct bus *bus, char *error)
 {
 	int r;
 
 	bus->error = error;
+	bus->cfg = bus->wanted;
 	for (uint16_t i = 0; i < LIMIT_SLAVES; i++) {
 		mailbox_slave_set(bus->mailbox, i, NULL);
 	}
@@ -257,6 +312,7 @@ int bus_scan(struct bus *bus, char *error)
 	for (size_t i = 0; i < bus->slave_count; i++) {
 		take_over(bus, i);
 	}
+	bind_slaves(bus);
 	for (size_t i = 0; i < bus->slave_count && r >= 0; i++) {
 		free_sync(bus, i);
 		take_clock(bus, i);
@@ -281,5 +337,11 @@ int bus_scan(struct bus *bus, char *error)
 
 int bus_compare(const struct bus *bus, char *error)
 {
-	return compare_slaves(bus->cfg, bus->info, bus->slave_count, error, BUS_ERROR_BYTES);
+	return compare_slaves(bus->wanted, bus->info, bus->identification, bus->slave_count, error,
+			      BUS_ERROR_BYTES);
+}
+
+const struct config *bus_config(const struct bus *bus)
+{
+	return bus->cfg;
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Poll every slave a few times a second: states, error counters, clock difference; and one step of
  * recovery for those that need it. */
+#include <stdio.h>
 #include <string.h>
 
 #include "base/bytes.h"
@@ -279,10 +280,22 @@ static void take_look(struct bus *bus, size_t pos, const struct look *look,
 	}
 }
 
+static void describe_absent(const struct bus *bus, char *text, size_t text_bytes)
+{
+	const char *name = bus->wanted->slave[bus->absent].name;
+
+	snprintf(text, text_bytes, "slaves[%d]%s%s is optional and absent%s", bus->absent,
+		 name[0] != '\0' ? " " : "", name,
+		 bus->absent_count > 1 ? ", and it is not the only one" : "");
+}
+
 static void make_report(const struct bus *bus, struct bus_watch_report *ret_report)
 {
 	*ret_report = (struct bus_watch_report){ .strangers = bus_guests_known(bus) };
 	bus_guests_describe(bus, ret_report->trouble, sizeof(ret_report->trouble));
+	if (bus->absent_count > 0 && ret_report->trouble[0] == '\0') {
+		describe_absent(bus, ret_report->notice, sizeof(ret_report->notice));
+	}
 	for (size_t i = 0; i < bus->slave_count; i++) {
 		const struct bus_slave *sl = &bus->slave[i];
 

@@ -184,7 +184,7 @@ static int make_cycle(struct session *s, struct failure *failure)
 {
 	char error[FAILURE_TEXT_BYTES] = "";
 	struct cycle_spec spec = {
-		.cfg = s->spec.cfg,
+		.cfg = bus_config(s->bus),
 		.platform = session_cycle_platform(s),
 		.plan = bus_plan(s->bus),
 		.samples = s->samples,

@@ -47,7 +47,7 @@ struct session {
 	uint64_t doubled_seen;  /* with doubled_since: where the window began */
 	uint64_t doubled_since; /* cycles */
 	int has_reported_doubled;
-	int had_strangers;
+	int has_notice; /* in the message, while all slaves are in OP */
 };
 
 /** @ev goes to the event ring, stamped with the time now. */

@@ -60,6 +60,7 @@ static void serve_admin(struct session *s)
 	};
 
 	if (s->is_riding) {
+		target.cfg = bus_config(s->bus);
 		target.channels = bus_channels(s->bus, &target.channel_count);
 		target.slaves = bus_slaves(s->bus, &target.slave_count);
 		target.board = &s->board;
@@ -107,15 +108,15 @@ static void go_on_with(struct session *s, const struct slave_set *slaves)
 	cycle_phase_set(s->cycle, is_none ? CYCLE_SYNCED : CYCLE_OP);
 }
 
-/* What is wrong though all slaves are in OP: devices that are none of them. */
-static void follow_strangers(struct session *s, const struct bus_watch_report *report)
+/* What is to be known though all slaves are in OP: devices that are none of them, absent ones. */
+static void follow_notice(struct session *s, const struct bus_watch_report *report)
 {
-	if (report->strangers > 0) {
-		session_set_message(s, report->trouble);
-	} else if (s->had_strangers) {
-		session_set_message(s, "");
+	const char *text = report->trouble[0] != '\0' ? report->trouble : report->notice;
+
+	if (text[0] != '\0' || s->has_notice) {
+		session_set_message(s, text);
 	}
-	s->had_strangers = report->strangers > 0;
+	s->has_notice = text[0] != '\0';
 }
 
 static void follow_bus(struct session *s, const struct bus_watch_report *report)
@@ -147,7 +148,7 @@ static void follow_bus(struct session *s, const struct bus_watch_report *report)
 		session_set_message(s, text);
 	}
 	if (report->is_all_op && s->state == BUS_OP) {
-		follow_strangers(s, report);
+		follow_notice(s, report);
 	}
 	if (report->slaves_lost < count) {
 		s->lost_since = (mono_t){ 0 };

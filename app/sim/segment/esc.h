@@ -179,7 +179,8 @@ struct esc {
 	uint8_t is_pdi_expired;
 	int64_t mailbox_stuck_until_ns; /* a fault: the PDI's mailbox writes are lost */
 	struct esc_al_fault al_fault;
-	int64_t al_late_ns; /* when al_late_status shows; 0: nothing is late */
+	uint16_t identification; /* of its switch; 0: it has none */
+	int64_t al_late_ns;      /* when al_late_status shows; 0: nothing is late */
 	uint8_t al_late_status;
 	uint8_t is_al_refused;    /* the error in AL status is al_fault's */
 	uint8_t ports;            /* with a link */

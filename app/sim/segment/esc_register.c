@@ -123,6 +123,12 @@ static void al_control_written(struct esc *esc)
 	uint8_t *status = &esc->reg[ESC_REG_AL_STATUS];
 	uint8_t control = esc->reg[ESC_REG_AL_CONTROL] & (AL_STATE_MASK | AL_ERROR);
 
+	/* Explicit device identification (ETG.1020): the state stays, the number is in the code. */
+	if ((esc->reg[ESC_REG_AL_CONTROL] & AL_ID_REQUEST) != 0 && esc->identification != 0) {
+		*status |= AL_ID_REQUEST;
+		put_le16(esc->reg + ESC_REG_AL_STATUS_CODE, esc->identification);
+		return;
+	}
 	if (!(esc->reg[ESC_REG_ESC_CONFIG] & CONFIG_DEVICE_EMULATION)) {
 		esc->al_event |= ESC_AL_EVENT_CONTROL;
 		return;

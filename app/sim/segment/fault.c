@@ -203,6 +203,7 @@ static void apply_to_frame(struct fault_plan *plan, const struct fault *f, struc
 	case FAULT_SLOW:
 	case FAULT_REFUSE:
 	case FAULT_OBEY:
+	case FAULT_SWITCH:
 		break;
 	}
 }
@@ -272,6 +273,9 @@ static void apply_to_slave(const struct fault *f, struct segment *segment, int64
 	case FAULT_REFUSE:
 		esc->al_fault.refused_state = f->state;
 		esc->al_fault.refused_code = f->code;
+		break;
+	case FAULT_SWITCH:
+		esc->identification = f->id;
 		break;
 	case FAULT_OBEY:
 		esc->al_fault = (struct esc_al_fault){ 0 };

@@ -27,6 +27,7 @@
  *                                      the one it has)
  *   at=3s slow slave=1 state=safeop by=3s its changes to SAFE-OP take 3 s
  *   at=3s refuse slave=1 state=safeop code=0x0018 it refuses SAFE-OP with that code
+ *   at=0s switch slave=1 id=5          its identification switch (AL control bit 5) is at 5
  *   at=3s obey slave=1                 neither slow nor refusing any more
  */
 #ifndef SIM_SEGMENT_FAULT_H
@@ -65,6 +66,7 @@ enum fault_action {
 	FAULT_SLOW,
 	FAULT_REFUSE,
 	FAULT_OBEY,
+	FAULT_SWITCH,
 };
 
 enum fault_trigger { FAULT_AT, FAULT_FRAME, FAULT_EVERY, FAULT_PROBABLY };
@@ -85,6 +87,7 @@ struct fault {
 	uint32_t count;
 	uint16_t address; /* 0: as it is */
 	uint8_t state;    /* AL state */
+	uint16_t id;      /* of the identification switch */
 	int is_done;
 };
 

@@ -44,6 +44,7 @@ static const struct {
 	{ "slow", FAULT_SLOW, 0, "by" },
 	{ "refuse", FAULT_REFUSE, 0, "code" },
 	{ "obey", FAULT_OBEY, 0, "slave" },
+	{ "switch", FAULT_SWITCH, 0, "id" },
 };
 
 enum { ACTIONS = sizeof(actions) / sizeof(actions[0]), KEYS_MAX = 16 };
@@ -187,6 +188,11 @@ static int set_key(struct fault *f, const char *key, const char *value, size_t s
 	}
 	if (strcmp(key, "state") == 0) {
 		return parse_state(value, &f->state);
+	}
+	if (strcmp(key, "id") == 0) {
+		r = parse_small(value, UINT16_MAX, &small);
+		f->id = r == 0 ? (uint16_t)small : f->id;
+		return r;
 	}
 	if (strcmp(key, "address") == 0) {
 		r = parse_small(value, UINT16_MAX, &small);

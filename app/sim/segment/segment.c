@@ -204,12 +204,14 @@ int segment_close_ring(struct segment *segment, size_t slave, unsigned port, int
 void segment_start_node(struct node *n, int64_t t_ns, uint64_t clock_ns)
 {
 	const struct esc_al_fault al_fault = n->esc.al_fault;
+	uint16_t identification = n->esc.identification;
 	uint8_t links = n->esc.ports;
 
 	n->has_power = 1;
 	esc_init(&n->esc, &n->features, n->sii, n->sii_bytes, t_ns);
 	esc_clock_start(&n->esc, t_ns, clock_ns, n->ppm + n->wandered_ppm);
 	n->esc.al_fault = al_fault;
+	n->esc.identification = identification;
 	esc_sync0_to(&n->esc, sync0_edge, n);
 	esc_set_links(&n->esc, links);
 	n->next_wander_ns = n->wander_ppm > 0 ? t_ns + WANDER_STEP_NS : INT64_MAX;

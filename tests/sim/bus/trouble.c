@@ -129,6 +129,7 @@ TEST(trouble, refused_startup_sdo_is_an_error_with_line_and_abort_code)
 {
 	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 1, .seed = 19 });
 
+	b->cfg.slave_count = 1;
 	b->cfg.sdo_count = 1;
 	b->cfg.sdo[0] = (struct config_sdo){
 		.index = 0x8000, .subindex = 1, .bytes = 1, .value = 7, .line = 12

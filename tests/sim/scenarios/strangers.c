@@ -139,3 +139,56 @@ TEST(sim_strangers, a_device_with_a_used_address_between_the_slaves)
 {
 	check_stranger(1, 0x1002, "slave 1 (b)");
 }
+
+/* --- slaves that may be absent, and such that only their number tells apart --- */
+
+static void open_with(const char *const *settings, const char *fault)
+{
+	virtual_bench_init(
+		&b, &(struct virtual_spec){ .slaves = SLAVES, .seed = 5, .ppm = { 30, -40, 15 } });
+	if (fault != NULL) {
+		virtual_bench_fault(&b, fault);
+	}
+	virtual_master_init(&vm, &b, settings);
+}
+
+TEST(sim_strangers, an_absent_optional_slave_is_reported_and_the_others_work)
+{
+	static const char *const settings[] = {
+		"slaves[0].name=a",           "slaves[1].name=b",
+		"slaves[1].identification=7", "slaves[1].optional=true",
+		"slaves[2].name=c",           "outputs[0].channel=b.led",
+		"outputs[1].channel=c.led",   NULL
+	};
+
+	open_with(settings, "at=0s unplug slave=1");
+	virtual_master_settle(&vm);
+	virtual_master_run(&vm, 500);
+	CHECK_EQ(state(), BUS_OP);
+	CHECK_EQ(atomic_load(&page()->slave_count), 2);
+	CHECK_STR(page()->slave[1].info.name, "c");
+	CHECK_STR(page()->message, "slaves[1] b is optional and absent");
+	/* It comes later: for this session it is a stranger. */
+	virtual_bench_fault(&b, "at=0s plug slave=1");
+	virtual_master_run(&vm, 1000);
+	CHECK_EQ(state(), BUS_OP);
+	CHECK(strstr(page()->message, "position 1: a device that is not configured") != NULL);
+	close_all();
+}
+
+TEST(sim_strangers, slaves_are_told_apart_by_their_identification_switch)
+{
+	static const char *const settings[] = { "slaves[0].name=a", "slaves[0].identification=5",
+						"slaves[1].name=b", "slaves[2].name=c", NULL };
+
+	open_with(settings, "at=0s switch slave=0 id=5");
+	virtual_master_settle(&vm);
+	CHECK_EQ(state(), BUS_OP);
+	close_all();
+	open_with(settings, "at=0s switch slave=0 id=6");
+	CHECK(virtual_master_bring_up(&vm) < 0);
+	CHECK(strstr(vm.failure.text, "expected vendor any product any revision any "
+				      "identification 5") != NULL);
+	CHECK(strstr(vm.failure.text, "identification 6") != NULL);
+	close_all();
+}

@@ -128,7 +128,7 @@ struct transport fake_transport(void)
 /* --- bus/bus.h --- */
 
 struct bus {
-	int unused;
+	const struct config *cfg;
 };
 
 static int step(enum fake_step which, const char *name, char *error)
@@ -145,10 +145,18 @@ static int step(enum fake_step which, const char *name, char *error)
 
 int bus_create(const struct config *cfg, struct line *line, struct bus **ret_bus)
 {
-	(void)cfg;
 	(void)line;
 	*ret_bus = calloc(1, sizeof(struct bus));
+	if (*ret_bus == NULL) {
+		return -ENOMEM;
+	}
+	(*ret_bus)->cfg = cfg;
 	return 0;
+}
+
+const struct config *bus_config(const struct bus *bus)
+{
+	return bus->cfg;
 }
 
 void bus_listen(struct bus *bus, void (*emit)(void *ctx, const struct event *ev), void *emit_ctx)
