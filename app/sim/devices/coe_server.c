@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "devices/coe_server.h"
 
+#include <errno.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "base/bytes.h"
@@ -12,6 +14,8 @@ enum sdo_command {
 	SDO_SPECIFIER = 0xe0, /* the three bits that say which command it is */
 	SDO_DOWNLOAD = 0x20,
 	SDO_DOWNLOADED = 0x60,
+	SDO_DOWNLOAD_SEGMENT = 0x00,
+	SDO_SEGMENT_DOWNLOADED = 0x20,
 	SDO_UPLOAD = 0x40,
 	SDO_UPLOAD_SEGMENT = 0x60,
 	SDO_ABORT = 0x80,
@@ -69,6 +73,7 @@ static enum coe_abort gather(struct coe_server *server, const struct sdo *sdo)
 	uint8_t last = v.bytes[0];
 
 	server->upload_len = 0;
+	server->source = server->upload;
 	if (code != COE_OK) {
 		return code;
 	}
@@ -93,11 +98,23 @@ static enum coe_abort gather(struct coe_server *server, const struct sdo *sdo)
 	return COE_OK;
 }
 
+static int is_memory(const struct coe_server *server, uint16_t index, uint8_t subindex)
+{
+	return server->memory != NULL && index == COE_MEMORY_INDEX &&
+	       subindex == COE_MEMORY_SUBINDEX;
+}
+
 static enum coe_abort fetch(struct coe_server *server, const struct sdo *sdo)
 {
 	struct coe_value v;
 	enum coe_abort code;
 
+	if (is_memory(server, sdo->index, sdo->subindex)) {
+		server->source = server->memory;
+		server->upload_len = server->memory_len;
+		return COE_OK;
+	}
+	server->source = server->upload;
 	if (sdo->command & SDO_COMPLETE_ACCESS) {
 		return gather(server, sdo);
 	}
@@ -127,14 +144,14 @@ static size_t upload(struct coe_server *server, const struct sdo *sdo, uint8_t *
 			   (uint8_t)(SDO_UPLOAD | access | SDO_EXPEDITED | SDO_SIZE_INDICATED |
 				     (4 - server->upload_len) << 2),
 			   sdo);
-		memcpy(answer + DATA_AT, server->upload, server->upload_len);
+		memcpy(answer + DATA_AT, server->source, server->upload_len);
 		server->upload_pos = server->upload_len;
 		return SDO_BYTES;
 	}
 	put_header(answer, (uint8_t)(SDO_UPLOAD | access | SDO_SIZE_INDICATED), sdo);
 	put_le32(answer + DATA_AT, (uint32_t)server->upload_len);
 	now = server->upload_len < capacity - SDO_BYTES ? server->upload_len : capacity - SDO_BYTES;
-	memcpy(answer + SDO_BYTES, server->upload, now);
+	memcpy(answer + SDO_BYTES, server->source, now);
 	server->upload_pos = now;
 	return SDO_BYTES + now;
 }
@@ -155,7 +172,7 @@ static size_t upload_segment(struct coe_server *server, const struct sdo *sdo, u
 	server->toggle ^= SDO_TOGGLE;
 	memset(answer, 0, SEGMENT_AT + SEGMENT_MIN);
 	put_le16(answer, COE_SDO_RESPONSE << 12);
-	memcpy(answer + SEGMENT_AT, server->upload + server->upload_pos, now);
+	memcpy(answer + SEGMENT_AT, server->source + server->upload_pos, now);
 	server->upload_pos += now;
 	command |= server->upload_pos == server->upload_len ? SDO_LAST_SEGMENT : 0;
 	/* A short segment is filled up, and says by how much. */
@@ -189,6 +206,81 @@ static enum coe_abort write_all(struct coe_dictionary *d, const struct sdo *sdo,
 	return code == COE_OK ? coe_dictionary_write(d, sdo->index, 0, &count, 1) : code;
 }
 
+static enum coe_abort write_whole(struct coe_server *server, const struct sdo *sdo,
+				  const uint8_t *bytes, size_t len)
+{
+	server->downloads++;
+	if (is_memory(server, sdo->index, sdo->subindex)) {
+		memmove(server->memory, bytes, len);
+		server->memory_len = len;
+		return COE_OK;
+	}
+	if (sdo->command & SDO_COMPLETE_ACCESS) {
+		return write_all(&server->dictionary, sdo, bytes, len);
+	}
+	return coe_dictionary_write(&server->dictionary, sdo->index, sdo->subindex, bytes, len);
+}
+
+/* What does not fit into one mail: the rest comes in segments. */
+static size_t begin_segments(struct coe_server *server, const struct sdo *sdo, const uint8_t *bytes,
+			     size_t len, uint8_t *answer)
+{
+	int is_large = is_memory(server, sdo->index, sdo->subindex);
+	size_t now = sdo->data_len - 4;
+
+	if (len > (is_large ? (size_t)COE_MEMORY_BYTES : sizeof(server->download))) {
+		return answer_abort(answer, sdo, COE_ABORT_LENGTH);
+	}
+	server->target = is_large ? server->memory : server->download;
+	memcpy(server->target, bytes, now);
+	server->download_len = len;
+	server->download_pos = now;
+	server->download_command = sdo->command;
+	server->toggle = 0;
+	put_header(answer, SDO_DOWNLOADED | (sdo->command & SDO_COMPLETE_ACCESS), sdo);
+	return SDO_BYTES;
+}
+
+static size_t download_segment(struct coe_server *server, const uint8_t *request,
+			       size_t request_len, uint8_t *answer)
+{
+	struct sdo sdo = { .command = server->download_command,
+			   .index = server->index,
+			   .subindex = server->subindex };
+	uint8_t command = request[COMMAND_AT];
+	size_t left = server->download_len - server->download_pos;
+	size_t now = request_len - SEGMENT_AT;
+	enum coe_abort code;
+
+	if (now == SEGMENT_MIN) {
+		now -= command >> 1 & 7u;
+	}
+	if (server->target == NULL) {
+		return answer_abort(answer, &sdo, COE_ABORT_COMMAND);
+	}
+	if ((command & SDO_TOGGLE) != server->toggle || now > left ||
+	    (now == left) != (command & SDO_LAST_SEGMENT)) {
+		server->target = NULL;
+		return answer_abort(answer, &sdo,
+				    (command & SDO_TOGGLE) != server->toggle ? COE_ABORT_TOGGLE
+									     : COE_ABORT_LENGTH);
+	}
+	memcpy(server->target + server->download_pos, request + SEGMENT_AT, now);
+	server->download_pos += now;
+	server->toggle ^= SDO_TOGGLE;
+	if (now == left) {
+		code = write_whole(server, &sdo, server->target, server->download_len);
+		server->target = NULL;
+		if (code != COE_OK) {
+			return answer_abort(answer, &sdo, code);
+		}
+	}
+	memset(answer, 0, SDO_BYTES);
+	put_le16(answer, COE_SDO_RESPONSE << 12);
+	answer[COMMAND_AT] = (uint8_t)(SDO_SEGMENT_DOWNLOADED | (command & SDO_TOGGLE));
+	return SDO_BYTES;
+}
+
 static size_t download(struct coe_server *server, const struct sdo *sdo, uint8_t *answer)
 {
 	const uint8_t *bytes = sdo->data;
@@ -201,21 +293,59 @@ static size_t download(struct coe_server *server, const struct sdo *sdo, uint8_t
 		len = get_le32(bytes);
 		bytes += 4;
 		if (len > sdo->data_len - 4) {
-			/* What does not fit one mailbox would come in segments. */
-			return answer_abort(answer, sdo, COE_ABORT_COMMAND);
+			return begin_segments(server, sdo, bytes, len, answer);
 		}
 	}
-	if (sdo->command & SDO_COMPLETE_ACCESS) {
-		code = write_all(&server->dictionary, sdo, bytes, len);
-	} else {
-		code = coe_dictionary_write(&server->dictionary, sdo->index, sdo->subindex, bytes,
-					    len);
-	}
+	code = write_whole(server, sdo, bytes, len);
 	if (code != COE_OK) {
 		return answer_abort(answer, sdo, code);
 	}
 	put_header(answer, SDO_DOWNLOADED | (sdo->command & SDO_COMPLETE_ACCESS), sdo);
 	return SDO_BYTES;
+}
+
+/* A new transfer ends the one before. */
+static void begin(struct coe_server *server, const struct sdo *sdo)
+{
+	server->index = sdo->index;
+	server->subindex = sdo->subindex;
+	server->target = NULL;
+}
+
+size_t coe_server_abort(struct coe_server *server, uint8_t *answer)
+{
+	const struct sdo sdo = { .index = server->index, .subindex = server->subindex };
+
+	server->target = NULL;
+	server->upload_len = server->upload_pos = 0;
+	return answer_abort(answer, &sdo, COE_ABORT_GENERAL);
+}
+
+int coe_server_set(struct coe_server *server, const char *key, const char *value)
+{
+	char *end;
+	unsigned long bytes = strtoul(value, &end, 0);
+
+	if (strcmp(key, "memory") != 0 || *end != '\0' || bytes == 0 || bytes > COE_MEMORY_BYTES) {
+		return -EINVAL;
+	}
+	if (server->memory == NULL) {
+		server->memory = malloc(COE_MEMORY_BYTES);
+		if (server->memory == NULL) {
+			return -ENOMEM;
+		}
+	}
+	server->memory_len = bytes;
+	for (size_t i = 0; i < bytes; i++) {
+		server->memory[i] = (uint8_t)(i ^ i >> 8 ^ i >> 16);
+	}
+	return 0;
+}
+
+void coe_server_done(struct coe_server *server)
+{
+	free(server->memory);
+	server->memory = NULL;
 }
 
 size_t coe_server_answer(struct coe_server *server, const uint8_t *request, size_t request_len,
@@ -241,14 +371,19 @@ size_t coe_server_answer(struct coe_server *server, const uint8_t *request, size
 	sdo.data = request + DATA_AT;
 	sdo.data_len = request_len - DATA_AT;
 	switch (sdo.command & SDO_SPECIFIER) {
+	case SDO_DOWNLOAD_SEGMENT:
+		return download_segment(server, request, request_len, answer);
 	case SDO_DOWNLOAD:
+		begin(server, &sdo);
 		return download(server, &sdo, answer);
 	case SDO_UPLOAD:
+		begin(server, &sdo);
 		return upload(server, &sdo, answer, capacity);
 	case SDO_UPLOAD_SEGMENT:
 		return upload_segment(server, &sdo, answer, capacity);
 	case SDO_ABORT:
 		server->upload_len = server->upload_pos = 0;
+		server->target = NULL;
 		return 0;
 	default: /* three bits of the wire */
 		return answer_abort(answer, &sdo, COE_ABORT_COMMAND);

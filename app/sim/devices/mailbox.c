@@ -13,6 +13,7 @@ enum {
 	ACTIVATE_ON = 0x01,
 	ACTIVATE_REPEAT = 0x02,
 	PDI_REPEAT_DONE = 0x02,
+	EOE_FRAGMENT_BYTES = 36,
 };
 
 struct sm_view {
@@ -123,6 +124,53 @@ static void take_unasked(struct mailbox *m, const struct mailbox_call *call,
 	}
 }
 
+/* The answer that was just made is changed as the fault of the ESC says. */
+static void misbehave(struct mailbox *m, struct esc *esc, int64_t t_ns)
+{
+	struct esc_mailbox_fault *fault = &esc->mailbox_fault;
+
+	if (fault->count == 0 || fault->kind == ESC_MAILBOX_ABORT) {
+		return;
+	}
+	fault->count--;
+	switch (fault->kind) {
+	case ESC_MAILBOX_LATE:
+		m->not_before_ns = t_ns + fault->by_ns;
+		break;
+	case ESC_MAILBOX_DOUBLE:
+		m->copies = 1;
+		break;
+	case ESC_MAILBOX_COUNTER:
+		m->answer_counter = (uint8_t)((m->answer_counter + 3) % MAILBOX_COUNTER_MAX + 1);
+		m->answer[5] = (uint8_t)((m->answer[5] & 0x0f) | m->answer_counter << 4);
+		break;
+	case ESC_MAILBOX_LENGTH:
+		put_le16(m->answer, UINT16_MAX);
+		break;
+	case ESC_MAILBOX_SILENT:
+		m->is_waiting = 0;
+		break;
+	case ESC_MAILBOX_EOE:
+		m->has_fragment = 1;
+		break;
+	case ESC_MAILBOX_GOOD:
+	case ESC_MAILBOX_ABORT: /* the CoE server's */
+	case ESC_MAILBOX_BUSY:
+		break;
+	}
+}
+
+static int is_busy(struct esc *esc)
+{
+	struct esc_mailbox_fault *fault = &esc->mailbox_fault;
+
+	if (fault->kind != ESC_MAILBOX_BUSY || fault->count == 0) {
+		return 0;
+	}
+	fault->count--;
+	return 1;
+}
+
 static int is_box(const struct sm_view *sm)
 {
 	return (sm->activate & ACTIVATE_ON) &&
@@ -135,9 +183,16 @@ static void put_answer(struct mailbox *m, struct esc *esc, int64_t t_ns, const s
 	size_t len = m->answer_len < sm->len ? m->answer_len : sm->len;
 
 	/* The box must be written to its last byte, or it is not full. */
-	memcpy(box, m->answer, len);
+	if (m->has_fragment) {
+		m->has_fragment = 0;
+		mailbox_header_put(box, &(struct mailbox_header){ .data_len = EOE_FRAGMENT_BYTES,
+								  .type = MAILBOX_TYPE_EOE });
+	} else {
+		memcpy(box, m->answer, len);
+		m->is_waiting = m->copies > 0;
+		m->copies = 0;
+	}
 	esc_pdi_write(esc, t_ns, sm->start, box, sm->len);
-	m->is_waiting = 0;
 }
 
 void mailbox_run(struct mailbox *m, struct esc *esc, int64_t t_ns,
@@ -161,15 +216,18 @@ void mailbox_run(struct mailbox *m, struct esc *esc, int64_t t_ns,
 		answer_again(m, &answer);
 		esc_pdi_write(esc, t_ns, ESC_REG_SM + SM_ANSWER * ESC_SM_BYTES + 7, &done, 1);
 	}
-	if (!m->is_waiting && (request.status & STATUS_FULL)) {
+	if (!m->is_waiting && (request.status & STATUS_FULL) && !is_busy(esc)) {
 		esc_pdi_read(esc, t_ns, request.start, box, request.len);
 		call.request_len = get_le16(box);
 		execute(m, &call, &answer, server, server_count);
+		if (m->is_waiting) {
+			misbehave(m, esc, t_ns);
+		}
 	}
 	if (!m->is_waiting && !(answer.status & STATUS_FULL)) {
 		take_unasked(m, &call, server, server_count);
 	}
-	if (m->is_waiting && !(answer.status & STATUS_FULL)) {
+	if (m->is_waiting && !(answer.status & STATUS_FULL) && t_ns >= m->not_before_ns) {
 		put_answer(m, esc, t_ns, &answer);
 	}
 }

@@ -41,6 +41,10 @@ struct mailbox {
 	uint8_t is_reply;   /* the answer is that of the last request */
 	uint8_t request_counter;
 	uint8_t answer_counter;
+	/* Misbehaving, as the ESC's mailbox_fault says. */
+	int64_t not_before_ns; /* the answer is late */
+	uint8_t copies;        /* it comes so often again */
+	uint8_t has_fragment;  /* an EoE fragment goes out before it */
 };
 
 /** Both counters start anew. */

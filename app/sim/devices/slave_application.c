@@ -181,7 +181,16 @@ static int is_watchdog_down(struct slave_application *app, int64_t t_ns)
 
 static size_t answer_coe(void *ctx, const struct mailbox_call *call)
 {
-	return coe_server_answer(ctx, call->request, call->request_len, call->answer,
+	struct slave_application *app = ctx;
+	struct esc_mailbox_fault *fault = &app->esc->mailbox_fault;
+
+	/* In the middle of a segmented transfer. */
+	if (fault->kind == ESC_MAILBOX_ABORT && fault->count > 0 &&
+	    (app->coe.target != NULL || app->coe.upload_pos < app->coe.upload_len)) {
+		fault->count = 0;
+		return coe_server_abort(&app->coe, call->answer);
+	}
+	return coe_server_answer(&app->coe, call->request, call->request_len, call->answer,
 				 call->capacity);
 }
 
@@ -192,7 +201,7 @@ static void run_mailbox(struct slave_application *app, int64_t t_ns, uint8_t sta
 		uint16_t protocol;
 		struct mailbox_server server;
 	} all[] = {
-		{ SII_MAILBOX_COE, { MAILBOX_TYPE_COE, answer_coe, NULL, &app->coe } },
+		{ SII_MAILBOX_COE, { MAILBOX_TYPE_COE, answer_coe, NULL, app } },
 		{ SII_MAILBOX_FOE, { MAILBOX_TYPE_FOE, foe_server_answer, NULL, &app->foe } },
 		{ SII_MAILBOX_SOE,
 		  { MAILBOX_TYPE_SOE, soe_server_answer, soe_server_next, &app->soe } },
@@ -247,12 +256,16 @@ void slave_application_init(struct slave_application *app, const struct sii *sii
 void slave_application_done(struct slave_application *app)
 {
 	foe_server_done(&app->foe);
+	coe_server_done(&app->coe);
 }
 
 int slave_application_set(struct slave_application *app, const char *key, const char *value)
 {
 	if (strncmp(key, "foe.", 4) == 0) {
 		return foe_server_set(&app->foe, key + 4, value);
+	}
+	if (strncmp(key, "coe.", 4) == 0) {
+		return coe_server_set(&app->coe, key + 4, value);
 	}
 	return -EINVAL;
 }

@@ -91,6 +91,25 @@ struct esc_sm {
 	uint8_t activate; /* 0x0806 as last seen */
 };
 
+/* How the application's mailbox misbehaves; it looks here itself (devices/mailbox.c). */
+enum esc_mailbox_fault_kind {
+	ESC_MAILBOX_GOOD,
+	ESC_MAILBOX_LATE,    /* the answer comes after by_ns */
+	ESC_MAILBOX_DOUBLE,  /* twice */
+	ESC_MAILBOX_COUNTER, /* its counter jumps */
+	ESC_MAILBOX_LENGTH,  /* its length is beyond the mailbox */
+	ESC_MAILBOX_SILENT,  /* there is none */
+	ESC_MAILBOX_EOE,     /* an EoE fragment comes before it */
+	ESC_MAILBOX_ABORT,   /* it is an SDO abort */
+	ESC_MAILBOX_BUSY,    /* requests are not read */
+};
+
+struct esc_mailbox_fault {
+	enum esc_mailbox_fault_kind kind;
+	unsigned count; /* answers that it is for; BUSY: passes of the main loop */
+	int64_t by_ns;
+};
+
 struct esc_fmmu {
 	uint32_t logical_start;
 	uint16_t len;
@@ -178,6 +197,7 @@ struct esc {
 	int64_t pdi_watchdog_deadline_ns; /* INT64_MAX: not running, or expired */
 	uint8_t is_pdi_expired;
 	int64_t mailbox_stuck_until_ns; /* a fault: the PDI's mailbox writes are lost */
+	struct esc_mailbox_fault mailbox_fault;
 	struct esc_al_fault al_fault;
 	uint16_t identification; /* of its switch; 0: it has none */
 	int64_t al_late_ns;      /* when al_late_status shows; 0: nothing is late */

@@ -196,6 +196,7 @@ static void apply_to_frame(struct fault_plan *plan, const struct fault *f, struc
 	case FAULT_PORT_ERROR:
 	case FAULT_WATCHDOG:
 	case FAULT_MAILBOX_STUCK:
+	case FAULT_MAILBOX:
 	case FAULT_IDENTITY:
 	case FAULT_SYNC0_LOST:
 	case FAULT_UNPLUG:
@@ -250,6 +251,11 @@ static void apply_to_slave(const struct fault *f, struct segment *segment, int64
 		break;
 	case FAULT_MAILBOX_STUCK:
 		esc->mailbox_stuck_until_ns = f->for_ns > 0 ? t_ns + f->for_ns : INT64_MAX;
+		break;
+	case FAULT_MAILBOX:
+		esc->mailbox_fault = (struct esc_mailbox_fault){
+			.kind = f->kind, .count = f->count > 0 ? f->count : 1, .by_ns = f->by_ns
+		};
 		break;
 	case FAULT_IDENTITY:
 		change_identity(esc, f->product);

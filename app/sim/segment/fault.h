@@ -20,6 +20,8 @@
  *   at=3s port-error slave=1 port=0
  *   at=3s watchdog slave=1             its process data watchdog expires
  *   at=3s mailbox-stuck slave=1 for=1s its answers are lost, for ever without for=
+ *   at=3s mailbox kind=late slave=1 by=1s  its next answer: late, double, counter, length, silent,
+ *                                      eoe, abort; count=N: the next N; busy: it reads no request
  *   at=3s sync0-lost slave=1 count=3   its next SYNC0 pulses do not come out of the chip
  *   at=3s identity slave=1 product=0x1 its EEPROM names another product from now on
  *   at=0s unplug slave=1               out of the line, with power; its neighbours are connected
@@ -59,6 +61,7 @@ enum fault_action {
 	FAULT_PORT_ERROR,
 	FAULT_WATCHDOG,
 	FAULT_MAILBOX_STUCK,
+	FAULT_MAILBOX,
 	FAULT_IDENTITY,
 	FAULT_SYNC0_LOST,
 	FAULT_UNPLUG,
@@ -85,6 +88,7 @@ struct fault {
 	uint16_t code;
 	uint32_t product;
 	uint32_t count;
+	enum esc_mailbox_fault_kind kind;
 	uint16_t address; /* 0: as it is */
 	uint8_t state;    /* AL state */
 	uint16_t id;      /* of the identification switch */

@@ -37,6 +37,7 @@ static const struct {
 	{ "port-error", FAULT_PORT_ERROR, 0, "slave" },
 	{ "watchdog", FAULT_WATCHDOG, 0, "slave" },
 	{ "mailbox-stuck", FAULT_MAILBOX_STUCK, 0, "slave" },
+	{ "mailbox", FAULT_MAILBOX, 0, "kind" },
 	{ "identity", FAULT_IDENTITY, 0, "product" },
 	{ "sync0-lost", FAULT_SYNC0_LOST, 0, "slave" },
 	{ "unplug", FAULT_UNPLUG, 0, "slave" },
@@ -129,6 +130,26 @@ static int parse_state(const char *text, uint8_t *ret)
 	return -EINVAL;
 }
 
+static int parse_kind(const char *text, enum esc_mailbox_fault_kind *ret)
+{
+	static const struct {
+		const char *name;
+		enum esc_mailbox_fault_kind kind;
+	} kinds[] = { { "good", ESC_MAILBOX_GOOD },     { "late", ESC_MAILBOX_LATE },
+		      { "double", ESC_MAILBOX_DOUBLE }, { "counter", ESC_MAILBOX_COUNTER },
+		      { "length", ESC_MAILBOX_LENGTH }, { "silent", ESC_MAILBOX_SILENT },
+		      { "eoe", ESC_MAILBOX_EOE },       { "abort", ESC_MAILBOX_ABORT },
+		      { "busy", ESC_MAILBOX_BUSY } };
+
+	for (size_t i = 0; i < sizeof(kinds) / sizeof(kinds[0]); i++) {
+		if (strcmp(kinds[i].name, text) == 0) {
+			*ret = kinds[i].kind;
+			return 0;
+		}
+	}
+	return -EINVAL;
+}
+
 /* --- keys --- */
 
 /* 1: it was one, 0: it was none, -EINVAL. */
@@ -185,6 +206,9 @@ static int set_key(struct fault *f, const char *key, const char *value, size_t s
 		r = parse_small(value, 3, &small);
 		f->port = r == 0 ? small : f->port;
 		return r;
+	}
+	if (strcmp(key, "kind") == 0) {
+		return parse_kind(value, &f->kind);
 	}
 	if (strcmp(key, "state") == 0) {
 		return parse_state(value, &f->state);
