@@ -12,9 +12,9 @@
  * - Those who are gone are known if the image is split (bus.datagrams: per_slave), all that answer
  *   are in OP, and the data is missing of just as many as did not answer, the reference clock not
  *   being one of them: the others stay live.
- * - One that is not ours on the wire: it powers up in INIT. That bit is accepted as long as the
- *   process data is complete, which it would not be if one of ours were in INIT. With any other
- *   state of it, the slaves are live again after the service thread has looked.
+ * - One that is not ours on the wire: what the OR shows more in the frame in which it came is its
+ *   own, as long as that bit is seen and the process data is complete. INIT is accepted at any
+ * time: the service thread leads it there, and the data of one of ours in INIT would be missing.
  * - With a slave out of OP (per_slave), the OR shows its way back and nothing else: the service
  *   thread decides then, and always without bus.monitor.
  */
@@ -97,19 +97,33 @@ static struct slave_set who_left(const struct cycle *cy, const struct exchange_r
 	return slave_set_all(cy->spec.slave_count);
 }
 
-static void note_count(struct cycle *cy, uint16_t found)
+/* State bits of those that have just joined: one frame before, all of ours were as expected. */
+static uint16_t newcomers_al(const struct cycle *cy, const struct exchange_result *res)
+{
+	struct slave_set all = slave_set_all(cy->spec.slave_count);
+
+	if (res->status != EXCHANGE_OK || res->al_wkc <= cy->slaves_found ||
+	    cy->slaves_found < cy->spec.plan->slave_count || !slave_set_is_equal(&cy->live, &all)) {
+		return 0;
+	}
+	return cy->al_status;
+}
+
+static void note_count(struct cycle *cy, const struct exchange_result *res)
 {
 	uint16_t expected = cy->spec.plan->slave_count;
+	uint16_t found = res->al_wkc;
 
 	SET(cy->spec.stats->slaves_found, found);
 	if (found > expected) {
 		ADD(cy->spec.stats->cycles_with_stranger, 1);
 	}
+	cy->strangers_al &= cy->al_status;
 	if (found == cy->slaves_found) {
 		return;
 	}
+	cy->strangers_al = newcomers_al(cy, res);
 	cy->slaves_found = found;
-	cy->strangers_al = 0;
 	alert(cy);
 	cycle_note(cy, EVENT_SLAVE_COUNT, (int64_t)cy->sample.cycle, found, expected);
 }
@@ -123,7 +137,7 @@ void cycle_watch_slaves(struct cycle *cy, const struct exchange_result *res)
 	}
 	cy->al_status = res->al_status & AL_SHOWN;
 	SET(cy->spec.stats->al_status, cy->al_status);
-	note_count(cy, res->al_wkc);
+	note_count(cy, res);
 	left = slave_set_all(cy->spec.slave_count);
 	if (!slave_set_is_equal(&cy->live, &left) || is_as_expected(cy, res)) {
 		return;

@@ -10,7 +10,7 @@
 #include "wire/al.h"
 #include "wire/esc_reg.h"
 
-enum { SLAVES = 3, FMMU_ACTIVE = 12 };
+enum { SLAVES = 3, FMMU_ACTIVE = 12, PARKING_FIRST = 0x7e00 };
 
 static struct virtual_bench b;
 static struct virtual_master vm;
@@ -50,21 +50,52 @@ static void close_all(void)
 	virtual_bench_done(&b);
 }
 
-/* Its clock's offset is of another master. */
+/* Another master has set its clock and its FMMU and led it to SAFE-OP. */
 static void plug_in(uint16_t address)
 {
 	struct esc *esc = stranger_esc();
 
 	put_le16(esc->reg + ESC_REG_STATION_ADDRESS, address);
 	put_le64(esc->reg + ESC_REG_DC_SYSTEM_TIME_OFFSET, UINT64_C(0x123456789abc));
+	esc->reg[ESC_REG_FMMU + FMMU_ACTIVE] = 1;
+	esc_force_al_status(esc, AL_SAFEOP, 0);
 	CHECK_EQ(segment_plug(b.segment, stranger, virtual_bench_now_ns(&b)), 0);
 }
 
 static int was_fail_safe;
+static unsigned cycles_since;
+static unsigned isolated_after; /* cycles until its address was taken away; 0: not yet */
 
-static void note_fail_safe(struct virtual_master *master)
+static void note_cycle(struct virtual_master *master)
 {
+	uint16_t address = get_le16(stranger_esc()->reg + ESC_REG_STATION_ADDRESS);
+
 	was_fail_safe += (int)atomic_load(&session_page(master->session)->cycle.is_fail_safe);
+	cycles_since++;
+	if (isolated_after == 0 && address >= PARKING_FIRST) {
+		isolated_after = cycles_since;
+	}
+}
+
+/* How many cycles after cycle @from the frames showed that another number answers. */
+static int64_t noticed_after(uint64_t from)
+{
+	struct ring_reader *reader;
+	struct event ev;
+	uint64_t lost;
+	char path[200];
+	int64_t cycle = INT64_MAX;
+
+	snprintf(path, sizeof(path), "%s/" CONFIG_RUN_EVENTS, vm.dir);
+	CHECK_EQ(ring_reader_open(path, &reader), 0);
+	ring_seek(reader, ring_oldest(reader));
+	while (ring_read(reader, &ev, sizeof(ev), &lost) == RING_OK) {
+		if (ev.id == EVENT_SLAVE_COUNT && ev.value >= (int64_t)from && cycle == INT64_MAX) {
+			cycle = ev.value;
+		}
+	}
+	ring_reader_destroy(reader);
+	return cycle - (int64_t)from;
 }
 
 static void check_isolated(uint16_t address)
@@ -81,15 +112,24 @@ static void check_isolated(uint16_t address)
 static void check_stranger(unsigned position, uint16_t address, const char *owner)
 {
 	int64_t offset_ns;
+	uint64_t from;
 
 	open_without(position);
 	virtual_master_forget(&vm);
 	was_fail_safe = 0;
-	vm.each_cycle = note_fail_safe;
+	cycles_since = 0;
+	isolated_after = 0;
+	vm.each_cycle = note_cycle;
+	from = virtual_master_sample(&vm)->cycle;
 	plug_in(address);
 	CHECK_EQ(virtual_master_run(&vm, 3000), SESSION_GOES_ON);
-	printf("position %u, address 0x%04x: %d cycles fail-safe, %llu bad samples: %s\n", position,
-	       address, was_fail_safe, (unsigned long long)vm.result.bad, page()->message);
+	printf("position %u, address 0x%04x: noticed after %lld cycles, isolated after %u, %d "
+	       "fail-safe, %llu bad samples: %s\n",
+	       position, address, (long long)noticed_after(from), isolated_after, was_fail_safe,
+	       (unsigned long long)vm.result.bad, page()->message);
+	CHECK(noticed_after(from) <= 2);
+	CHECK(isolated_after > 0);
+	CHECK(isolated_after <= 12);
 	check_isolated(address);
 	CHECK_EQ(state(), BUS_OP);
 	CHECK(strstr(page()->message, "not configured") != NULL);
