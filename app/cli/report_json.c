@@ -61,6 +61,7 @@ static void write_clocks(struct json *js, const struct cycle_stats *st)
 	json_u64(js, "dc_unlocks", GET(st->dc_unlocks));
 	json_i64(js, "dc_time_ns", GET(st->dc_time_ns));
 	json_i64(js, "dc_diff_max_ns", GET(st->dc_diff_max_ns));
+	json_u64(js, "cycles_dc_diff_high", GET(st->cycles_dc_diff_high));
 	json_i64(js, "correction_ppb", GET(st->correction_ppb));
 }
 

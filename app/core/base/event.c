@@ -48,6 +48,7 @@ static const struct {
 	[EVENT_SLAVE_UNREADABLE] = { "slave_unreadable", EVENT_ERROR },
 	[EVENT_SLAVE_ABSENT] = { "slave_absent", EVENT_WARNING },
 	[EVENT_SLAVE_ALARM] = { "slave_alarm", EVENT_ERROR },
+	[EVENT_DC_DIFF_HIGH] = { "dc_diff_high", EVENT_WARNING },
 	[EVENT_OP_LOST] = { "op_lost", EVENT_WARNING },
 	[EVENT_SLAVE_COUNT] = { "slave_count", EVENT_WARNING },
 	[EVENT_CONTROL_OVERRUN] = { "control_overrun", EVENT_WARNING },
@@ -374,6 +375,12 @@ int event_format(const struct event *ev, char *buf, size_t buf_len)
 		return snprintf(buf, buf_len, "DC locked, phase error %" PRId32 " ns", a[0]);
 	case EVENT_DC_UNLOCKED:
 		return snprintf(buf, buf_len, "DC lock lost, phase error %" PRId32 " ns", a[0]);
+	case EVENT_DC_DIFF_HIGH:
+		return snprintf(buf, buf_len,
+				"cycle %" PRId64
+				": system time difference of a slave up to %" PRId32
+				" ns, limit %" PRId32 " ns",
+				ev->value, a[0], a[1]);
 	case EVENT_COUNTER_BAD:
 		return snprintf(buf, buf_len,
 				"slave %u: cycle %" PRId64 ": counter %" PRId32

@@ -55,8 +55,9 @@ struct cycle_stats {
 	_Atomic int64_t correction_ppb;        /* what the servo does to the host's period */
 	_Atomic int64_t dc_lock_ns;  /* time from the servo's start to its first lock; 0: not yet */
 	_Atomic uint64_t dc_unlocks; /* times that lock was lost */
-	_Atomic int64_t dc_diff_max_ns; /* largest |0x092C| since lock */
-	_Atomic uint32_t dc_state;      /* enum dc_state */
+	_Atomic uint64_t cycles_dc_diff_high; /* in OP, with |0x092C| above dc.diff_limit */
+	_Atomic int64_t dc_diff_max_ns;       /* largest |0x092C| since lock */
+	_Atomic uint32_t dc_state;            /* enum dc_state */
 	_Atomic uint32_t is_fail_safe;
 	_Atomic uint32_t al_status;    /* of all slaves ORed, in the newest frame; 0: not read */
 	_Atomic uint32_t slaves_found; /* how many answered it */

@@ -12,6 +12,7 @@
 #include "base/limits.h"
 
 enum config_poll { CONFIG_POLL_AUTO, CONFIG_POLL_SPIN, CONFIG_POLL_SLEEP };
+enum config_unlock { CONFIG_UNLOCK_REPORT, CONFIG_UNLOCK_FAIL_SAFE, CONFIG_UNLOCK_STOP };
 enum config_overrun { CONFIG_OVERRUN_COUNT, CONFIG_OVERRUN_FAIL_SAFE, CONFIG_OVERRUN_STOP };
 enum config_mode { CONFIG_MODE_UNSET, CONFIG_MODE_PERIODIC, CONFIG_MODE_ONESHOT };
 enum config_owner { CONFIG_OWNER_LOCAL, CONFIG_OWNER_PROGRAM, CONFIG_OWNER_REMOTE };
@@ -99,6 +100,7 @@ struct config {
 	int64_t dc_lock_limit_ns; /* |filtered phase error| below this */
 	uint32_t dc_lock_cycles;  /* for so many cycles */
 	int64_t dc_unlock_limit_ns;
+	enum config_unlock dc_unlock_policy;
 	int64_t dc_slew_ns; /* largest correction a cycle */
 	double dc_kp;
 	double dc_ki;

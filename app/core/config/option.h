@@ -33,7 +33,7 @@ struct option {
 	const char *default_value; /* NULL: required (in lists only) */
 	const char *min;           /* numbers: inclusive bounds; else NULL */
 	const char *max;
-	const char *unit;      /* of a plain number; "" for none */
+	char unit[12];         /* of a plain number; "" for none */
 	const char *otherwise; /* when the default is another one, for the pages; mostly NULL */
 	const char *words;     /* OPTION_WORD: "auto|spin|sleep", in the order of the enum */
 	const char *prose;

@@ -24,7 +24,7 @@ enum exit_code {
 	EXIT_CODE_CLOCKS = 11,    /* distributed clocks or the servo did not lock */
 	EXIT_CODE_STATE = 12,     /* an AL error, or a state was not reached */
 	EXIT_CODE_WIRE = 13,      /* frames are lost or damaged */
-	EXIT_CODE_OVERRUN = 14,   /* an overrun, and cycle.overrun is stop */
+	EXIT_CODE_OVERRUN = 14,   /* an overrun or a lost clock, and the policy for it is stop */
 	EXIT_CODE_CONTROL = 15,   /* the control program crashed, hung, or was too slow for stop */
 	EXIT_CODE_NO_DAEMON = 16, /* no ecdaqd, or nothing of it to read, or more than one */
 	EXIT_CODE_REFUSED = 17,   /* by ecdaqd or by a slave */

@@ -146,7 +146,7 @@ static mono_t receive_deadline(const struct cycle *cy, mono_t now)
 
 static void choose_outputs(struct cycle *cy, uint8_t *image)
 {
-	struct slave_set live = cy->is_latched_safe ? slave_set_empty() : cy->live;
+	struct slave_set live = cycle_outputs_live(cy);
 	int is_live = !slave_set_is_empty(&live);
 	unsigned timed_out = outputs_choose(&cy->outputs, image, &live, cy->sample.cycle);
 	int is_fail_safe = !is_live || timed_out > 0 || cycle_is_control_safe(cy);

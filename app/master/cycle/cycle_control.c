@@ -55,10 +55,12 @@ static void run(struct cycle *cy)
 
 void cycle_control(struct cycle *cy)
 {
+	struct slave_set live = cycle_outputs_live(cy);
+
 	if (cy->spec.control == NULL) {
 		return;
 	}
-	if (slave_set_is_empty(&cy->live) || cy->is_latched_safe) {
+	if (slave_set_is_empty(&live)) {
 		control_pause(cy->spec.control);
 	} else {
 		run(cy);

@@ -85,6 +85,66 @@ int cycle_dc_now(const struct cycle *cycle, int64_t *ret_dc_ns)
 	return -EAGAIN;
 }
 
+static void note_locked(struct cycle *cy, enum dc_state before, int64_t error_ns)
+{
+	struct cycle_stats *st = cy->spec.stats;
+
+	if (before != DC_LOCKED) {
+		cycle_note(cy, EVENT_DC_LOCKED, (int64_t)cy->sample.cycle, error_ns, 0);
+	}
+	if (st->dc_lock_ns == 0) {
+		SET(st->dc_lock_ns, mono_sub((mono_t){ cy->sample.wake_mono_ns }, cy->start).ns);
+	}
+	if (cy->sample.frame_dc_ns != 0) {
+		histogram_add(&st->phase, error_ns);
+	}
+}
+
+static void lose_lock(struct cycle *cy, int64_t error_ns)
+{
+	ADD(cy->spec.stats->dc_unlocks, 1);
+	cycle_note(cy, EVENT_DC_UNLOCKED, (int64_t)cy->sample.cycle, error_ns, 0);
+	if (cy->phase == CYCLE_OP && cy->spec.cfg->dc_unlock_policy == CONFIG_UNLOCK_STOP) {
+		cycle_end_safely(cy, -ENOLCK);
+	}
+}
+
+int cycle_is_unlocked_safe(const struct cycle *cy)
+{
+	return cy->spec.cfg->dc_unlock_policy == CONFIG_UNLOCK_FAIL_SAFE &&
+	       (cy->servo.state == DC_ACQUIRING || cy->servo.state == DC_LOST);
+}
+
+/*
+ * The difference is that of all slaves ORed: only a bit above all those of the limit proves that
+ * one slave is above it.
+ */
+static void watch_difference(struct cycle *cy, const struct exchange_result *res)
+{
+	struct cycle_stats *st = cy->spec.stats;
+	int64_t limit_ns = cy->spec.cfg->dc_diff_limit_ns;
+	int64_t proof_ns = 1;
+	int was_high = cy->is_diff_high;
+
+	if (cy->phase != CYCLE_OP || res->dc_diff_ns < 0) {
+		return;
+	}
+	if (cy->servo.state == DC_LOCKED && res->dc_diff_ns > st->dc_diff_max_ns) {
+		SET(st->dc_diff_max_ns, res->dc_diff_ns);
+	}
+	while (proof_ns <= limit_ns) {
+		proof_ns *= 2;
+	}
+	cy->is_diff_high = res->dc_diff_ns >= proof_ns;
+	if (cy->is_diff_high) {
+		ADD(st->cycles_dc_diff_high, 1);
+	}
+	if (cy->is_diff_high && !was_high) {
+		cycle_note(cy, EVENT_DC_DIFF_HIGH, (int64_t)cy->sample.cycle, res->dc_diff_ns,
+			   limit_ns);
+	}
+}
+
 int64_t cycle_follow(struct cycle *cy, const struct exchange_result *res)
 {
 	struct cycle_stats *st = cy->spec.stats;
@@ -104,28 +164,14 @@ int64_t cycle_follow(struct cycle *cy, const struct exchange_result *res)
 		cy->sample.phase_error_ns = (int32_t)servo.error_ns;
 	}
 	if (cy->servo.state == DC_LOCKED) {
-		if (before != DC_LOCKED) {
-			cycle_note(cy, EVENT_DC_LOCKED, (int64_t)cy->sample.cycle, servo.error_ns,
-				   0);
-		}
-		if (st->dc_lock_ns == 0) {
-			SET(st->dc_lock_ns,
-			    mono_sub((mono_t){ cy->sample.wake_mono_ns }, cy->start).ns);
-		}
-		if (cy->sample.frame_dc_ns != 0) {
-			histogram_add(&st->phase, servo.error_ns);
-		}
-		if (cy->phase == CYCLE_OP && res->dc_diff_ns > st->dc_diff_max_ns) {
-			SET(st->dc_diff_max_ns, res->dc_diff_ns);
-		}
+		note_locked(cy, before, servo.error_ns);
 	} else {
 		cy->sample.flags |= SAMPLE_DC_UNLOCKED;
 		if (before == DC_LOCKED) {
-			ADD(st->dc_unlocks, 1);
-			cycle_note(cy, EVENT_DC_UNLOCKED, (int64_t)cy->sample.cycle, servo.error_ns,
-				   0);
+			lose_lock(cy, servo.error_ns);
 		}
 	}
+	watch_difference(cy, res);
 	SET(st->dc_state, cy->servo.state);
 	SET(st->correction_ppb, (int64_t)(cy->servo.integral_ns * 1e9 / (double)cy->period.ns));
 	return servo.correction_ns;

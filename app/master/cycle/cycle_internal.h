@@ -64,6 +64,7 @@ struct cycle {
 	uint64_t alerts;
 	int has_started;
 	int was_fail_safe;
+	int is_diff_high;    /* 0x092C, in the newest frame */
 	int is_latched_safe; /* overrun policy fail_safe, or the cycle is about to end */
 	unsigned last_steps; /* steps left until it stops; 0: no limit */
 	unsigned lost_in_row;
@@ -91,6 +92,9 @@ const struct cycle_named *cycle_named_take(struct cycle *cy);
 
 /** At the start of a step, after the phase. */
 void cycle_update_live(struct cycle *cy);
+/** The slaves whose next outputs are real: the live ones, unless something keeps all at fail-safe.
+ */
+struct slave_set cycle_outputs_live(const struct cycle *cy);
 /** After the exchange: what the frame shows of the slaves' states and number. */
 void cycle_watch_slaves(struct cycle *cy, const struct exchange_result *res);
 
@@ -107,6 +111,8 @@ void cycle_note(struct cycle *cy, enum event_id id, int64_t value, int64_t arg0,
 void cycle_count_frames(struct cycle *cy, const struct exchange_result *res);
 /** Correction of the next deadline from the frame's DC time, ns. */
 int64_t cycle_follow(struct cycle *cy, const struct exchange_result *res);
+/** 1 if outputs are at fail-safe because lock is lost (dc.unlock_policy). */
+int cycle_is_unlocked_safe(const struct cycle *cy);
 
 /* --- cycle_control.c: the control program --- */
 

@@ -59,6 +59,11 @@ void cycle_update_live(struct cycle *cy)
 	cy->live = live;
 }
 
+struct slave_set cycle_outputs_live(const struct cycle *cy)
+{
+	return cy->is_latched_safe || cycle_is_unlocked_safe(cy) ? slave_set_empty() : cy->live;
+}
+
 static int is_as_expected(const struct cycle *cy, const struct exchange_result *res)
 {
 	uint16_t expected = cy->spec.plan->slave_count;

@@ -58,6 +58,7 @@ static void clear_stats(struct cycle_stats *st)
 	ZERO(st->cycles_with_stranger);
 	ZERO(st->rides);
 	ZERO(st->dc_unlocks);
+	ZERO(st->cycles_dc_diff_high);
 	ZERO(st->dc_diff_max_ns);
 	for (size_t i = 0; i < LIMIT_SLAVES; i++) {
 		ZERO(st->slave_good[i]);

@@ -294,6 +294,10 @@ int session_report_ended(struct session *s, struct failure *failure)
 				   (unsigned long long)atomic_load_explicit(
 					   &s->run.page->cycle.cycle_number, memory_order_relaxed));
 	}
+	if (r == -ENOLCK) {
+		return failure_set(failure, EXIT_CODE_OVERRUN, r,
+				   "dc: lock lost in OP, and dc.unlock_policy is stop");
+	}
 	return failure_set(failure, EXIT_CODE_FAILED, r < 0 ? r : -EIO,
 			   "cycle: thread ended unexpectedly: error %d", -r);
 }

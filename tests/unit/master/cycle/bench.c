@@ -160,6 +160,7 @@ void start(void)
 	cfg.dc_slew_ns = 20000;
 	cfg.dc_kp = 0.02;
 	cfg.dc_ki = 0.0001;
+	cfg.dc_diff_limit_ns = 1000;
 	plan = (struct exchange_plan){ .image_bytes = IMAGE_BYTES,
 				       .output_bytes = OUTPUT_BYTES,
 				       .chunk_count = 1,

@@ -2,6 +2,7 @@
 /* The whole cycle: its reaction to what the bus returns. */
 #include "cycle/cycle.h"
 
+#include <errno.h>
 #include <pthread.h>
 #include <sched.h>
 #include <stdatomic.h>
@@ -277,6 +278,69 @@ TEST(cycle, going_to_fail_safe_is_an_event_only_when_outputs_were_live)
 	cycle_phase_set(cy, CYCLE_SAFE);
 	steps(3);
 	CHECK_EQ(count_events(EVENT_OUTPUT_FAIL_SAFE), 1);
+}
+
+/* The reference steps away: lock is lost some hundred cycles later. The outputs are as the policy
+ * says, and live again when lock is back. Returns cycle_run()'s result, 1: it goes on. */
+static int lose_lock(enum config_unlock policy, unsigned *ret_safe, unsigned *ret_live)
+{
+	unsigned n = 0;
+	int r = 1;
+
+	start_in_op();
+	cfg.dc_unlock_policy = policy;
+	set_led(1);
+	steps(3);
+	world.dc_offset_ns += PERIOD_NS / 3;
+	*ret_safe = 0;
+	*ret_live = 0;
+	for (; n < 2000 && !cycle_has_stopped(cy, &r); n++) {
+		steps(1);
+		if (stats.dc_unlocks > 0) {
+			*ret_live += world.seen_output & 1;
+			*ret_safe += !(world.seen_output & 1);
+		}
+	}
+	CHECK_EQ(stats.dc_unlocks, 1);
+	return r;
+}
+
+TEST(cycle, loss_of_lock_in_op_is_reported_or_fail_safe_or_the_end)
+{
+	unsigned safe;
+	unsigned live;
+
+	CHECK_EQ(lose_lock(CONFIG_UNLOCK_REPORT, &safe, &live), 1);
+	CHECK_EQ(safe, 0);
+	CHECK(live > 1000);
+	CHECK_EQ(lose_lock(CONFIG_UNLOCK_FAIL_SAFE, &safe, &live), 1);
+	CHECK(safe > 100);
+	CHECK(live > 100); /* again */
+	CHECK_EQ(stats.dc_state, DC_LOCKED);
+	CHECK_EQ(stats.is_fail_safe, 0);
+	CHECK_EQ(lose_lock(CONFIG_UNLOCK_STOP, &safe, &live), -ENOLCK);
+	CHECK_EQ(live, 1);
+	CHECK_EQ(safe, 4);
+	cfg.dc_unlock_policy = CONFIG_UNLOCK_REPORT;
+}
+
+TEST(cycle, a_clock_difference_that_no_set_of_good_ones_can_make_is_an_event)
+{
+	start_in_op();
+	cfg.dc_diff_limit_ns = 1000;
+	world.dc_diff_ns = 1023; /* 1000 and 23, ORed */
+	steps(10);
+	CHECK_EQ(stats.cycles_dc_diff_high, 0);
+	CHECK_EQ(stats.dc_diff_max_ns, 1023);
+	world.dc_diff_ns = 1024;
+	steps(10);
+	CHECK_EQ(stats.cycles_dc_diff_high, 10);
+	check_event(next_event(EVENT_DC_DIFF_HIGH), EVENT_NO_SLAVE, (int64_t)stats.cycle_number - 9,
+		    1024, 1000);
+	CHECK_EQ(count_events(EVENT_DC_DIFF_HIGH), 0);
+	world.dc_diff_ns = 5;
+	steps(10);
+	CHECK_EQ(stats.cycles_dc_diff_high, 10);
 }
 
 enum { DC_READS = 2000 };
