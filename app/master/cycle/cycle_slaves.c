@@ -13,8 +13,10 @@
  *   are in OP, and the data is missing of just as many as did not answer, the reference clock not
  *   being one of them: the others stay live.
  * - One that is not ours on the wire: what the OR shows more in the frame in which it came is its
- *   own, as long as that bit is seen and the process data is complete. INIT is accepted at any
- * time: the service thread leads it there, and the data of one of ours in INIT would be missing.
+ *   own, as long as that bit is seen and the process data is complete, if the frame before it was
+ *   not lost. INIT is accepted at any time: the service thread leads it there, and the data of one
+ *   of ours in INIT would be missing. After a look that finds all of ours in OP, the rest of what
+ *   the OR shows is not theirs.
  * - With a slave out of OP (per_slave), the OR shows its way back and nothing else: the service
  *   thread decides then, and always without bus.monitor.
  */
@@ -102,13 +104,14 @@ static struct slave_set who_left(const struct cycle *cy, const struct exchange_r
 	return slave_set_all(cy->spec.slave_count);
 }
 
-/* State bits of those that have just joined: one frame before, all of ours were as expected. */
+/* State bits of those that have just joined: in the cycle before, all of ours were as expected. */
 static uint16_t newcomers_al(const struct cycle *cy, const struct exchange_result *res)
 {
 	struct slave_set all = slave_set_all(cy->spec.slave_count);
 
 	if (res->status != EXCHANGE_OK || res->al_wkc <= cy->slaves_found ||
-	    cy->slaves_found < cy->spec.plan->slave_count || !slave_set_is_equal(&cy->live, &all)) {
+	    cy->steps != cy->al_step + 1 || cy->slaves_found < cy->spec.plan->slave_count ||
+	    !slave_set_is_equal(&cy->live, &all)) {
 		return 0;
 	}
 	return cy->al_status;
@@ -143,6 +146,7 @@ void cycle_watch_slaves(struct cycle *cy, const struct exchange_result *res)
 	cy->al_status = res->al_status & AL_SHOWN;
 	SET(cy->spec.stats->al_status, cy->al_status);
 	note_count(cy, res);
+	cy->al_step = cy->steps;
 	left = slave_set_all(cy->spec.slave_count);
 	if (!slave_set_is_equal(&cy->live, &left) || is_as_expected(cy, res)) {
 		return;
