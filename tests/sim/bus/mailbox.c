@@ -177,3 +177,141 @@ TEST(mailbox, sdo_that_a_slave_aborts_is_an_event_with_object_and_code)
 	CHECK_EQ(ev->value, abort);
 	bench_destroy(b);
 }
+
+/* --- a storm --- */
+
+enum { STORM_SLAVES = 64, STORM_TRANSFERS = 10, STORM_CYCLES = 1500 };
+
+struct storm {
+	struct bus *bus;
+	struct mailbox_request request[STORM_SLAVES];
+	uint8_t data[STORM_SLAVES][64];
+	unsigned left[STORM_SLAVES];
+	unsigned good;
+};
+
+static void submit_one(struct storm *st, unsigned slave)
+{
+	struct mailbox_request *rq = &st->request[slave];
+
+	rq->buffer = st->data[slave];
+	rq->capacity = sizeof(st->data[slave]);
+	CHECK_EQ(bus_sdo_submit(st->bus, rq), 0);
+}
+
+static void storm_done(void *ctx, struct mailbox_request *rq)
+{
+	struct storm *st = ctx;
+
+	st->good += rq->result == 0 && rq->len == strlen("FB1111-Piccolo");
+	if (--st->left[rq->slave_pos] > 0) {
+		submit_one(st, rq->slave_pos);
+	}
+}
+
+/* Phases of STORM_CYCLES cycles in OP; cycles until the storm is over into @ret_cycles. */
+static void run_storm(int is_stormy, int64_t *ret_phase_ns, unsigned *ret_cycles)
+{
+	static struct storm st;
+	struct bus_bench *b = start(STORM_SLAVES, 116);
+	uint64_t bad = b->cycles - b->ok;
+
+	memset(&st, 0, sizeof(st));
+	st.bus = b->bus;
+	for (unsigned i = 0; i < STORM_SLAVES && is_stormy; i++) {
+		st.left[i] = STORM_TRANSFERS;
+		st.request[i] = (struct mailbox_request){ .slave_pos = (uint16_t)i,
+							  .with.coe = { .operation = COE_UPLOAD,
+									.index = 0x1008 },
+							  .done = storm_done,
+							  .ctx = &st };
+		submit_one(&st, i);
+	}
+	for (unsigned i = 0; i < STORM_CYCLES; i++) {
+		bench_run(b, 1);
+		ret_phase_ns[i] = b->phase_error_ns;
+		if (st.good < STORM_SLAVES * STORM_TRANSFERS) {
+			*ret_cycles = i + 1;
+		}
+	}
+	CHECK_EQ(st.good, is_stormy ? STORM_SLAVES * STORM_TRANSFERS : 0);
+	CHECK_EQ(b->cycles - b->ok, bad);
+	bench_destroy(b);
+}
+
+/* T02, with all slaves at the same time. */
+TEST(mailbox, sdo_storm_to_64_slaves_changes_no_cycle_s_phase)
+{
+	static int64_t stormy[STORM_CYCLES];
+	static int64_t calm[STORM_CYCLES];
+	unsigned cycles = 0;
+	unsigned changed = 0;
+
+	run_storm(0, calm, &cycles);
+	run_storm(1, stormy, &cycles);
+	for (unsigned i = 0; i < STORM_CYCLES; i++) {
+		changed += stormy[i] != calm[i];
+	}
+	printf("%u SDO transfers to %u slaves at once: %u cycles of 1 ms, %.0f transfers/s; "
+	       "%u cycles with another phase\n",
+	       STORM_SLAVES * STORM_TRANSFERS, STORM_SLAVES, cycles,
+	       STORM_SLAVES * STORM_TRANSFERS * 1000.0 / cycles, changed);
+	CHECK_EQ(changed, 0);
+}
+
+TEST(mailbox, sdo_transfers_to_64_slaves_at_once_are_20_times_as_many_as_one_at_a_time)
+{
+	static int64_t phase[STORM_CYCLES];
+	struct bus_bench *b = start(STORM_SLAVES, 117);
+	uint64_t from = b->cycles;
+	unsigned at_once = 0;
+	double single;
+	double all;
+
+	for (uint16_t i = 0; i < STORM_SLAVES; i++) {
+		uint8_t data[64];
+		size_t len = sizeof(data);
+		uint32_t abort;
+
+		CHECK_EQ(bus_sdo_read(b->bus, i, 0x1008, 0, data, &len, &abort), 0);
+	}
+	single = STORM_SLAVES * 1000.0 / (double)(b->cycles - from);
+	bench_destroy(b);
+	run_storm(1, phase, &at_once);
+	all = STORM_SLAVES * STORM_TRANSFERS * 1000.0 / at_once;
+	printf("SDO transfers/s: %.0f one at a time, %.0f to 64 slaves at once: %.1f times\n",
+	       single, all, all / single);
+	CHECK(all >= 20 * single);
+}
+
+/* D2 */
+TEST(mailbox, dead_mailbox_delays_neither_supervision_nor_other_slaves)
+{
+	struct bus_bench *b = start(3, 118);
+	uint8_t data[64];
+	struct mailbox_request dead = { .slave_pos = 1,
+					.with.coe = { .operation = COE_UPLOAD, .index = 0x1008 },
+					.buffer = data,
+					.capacity = sizeof(data) };
+	uint8_t other[64];
+	size_t len = sizeof(other);
+	uint32_t abort = 0;
+	uint64_t from;
+
+	bench_fault(b, "at=0s mailbox-stuck slave=1");
+	CHECK_EQ(bus_sdo_submit(b->bus, &dead), 0);
+	bench_run(b, 100);
+	CHECK(mailbox_is_running(&dead));
+	bench_fault(b, "at=0s al-error slave=0 code=0x001b");
+	bench_run(b, 1);
+	from = b->cycles;
+	CHECK_EQ(bench_watch(b).slaves_op, 2);
+	CHECK(b->cycles - from <= 10);
+	from = b->cycles;
+	CHECK_EQ(bus_sdo_read(b->bus, 2, 0x1008, 0, other, &len, &abort), 0);
+	CHECK(b->cycles - from <= 10);
+	CHECK(mailbox_is_running(&dead));
+	bench_run(b, 2000);
+	CHECK_EQ(dead.result, -ETIMEDOUT);
+	bench_destroy(b);
+}
