@@ -59,6 +59,7 @@ struct cycle {
 	struct slave_set live; /* in OP: real outputs, judged samples; none unless in CYCLE_OP */
 	struct slave_set gone; /* as frames have shown since the service thread named the live */
 	uint16_t al_status;    /* of all slaves ORed, newest frame */
+	uint64_t al_step;      /* in which it was read */
 	uint16_t strangers_al; /* bits of it that are not of our slaves */
 	uint16_t slaves_found; /* how many answered, newest frame */
 	uint64_t alerts;

@@ -228,12 +228,34 @@ TEST(cycle_slaves, a_slave_of_ours_that_falls_beside_a_stranger_ends_live_output
 	CHECK_EQ(world.seen_output & 1, 0);
 }
 
+TEST(cycle_slaves, the_state_of_a_device_that_joins_is_its_own)
+{
+	start_in_op();
+	set_led(1);
+	steps(3);
+	world.al_wkc = 3;
+	world.al_status = AL_OP | AL_SAFEOP | AL_ERROR;
+	steps(20);
+	CHECK_EQ(stats.op_lost, 0);
+	CHECK_EQ(world.seen_output & 1, 1);
+	/* It goes, and one of ours falls. */
+	world.al_wkc = 2;
+	steps(2);
+	CHECK_EQ(stats.op_lost, 1);
+	CHECK_EQ(world.seen_output & 1, 0);
+}
+
 TEST(cycle_slaves, the_state_of_a_stranger_is_accepted_once_ours_were_found_in_op)
 {
 	struct slave_set all = slave_set_all(2);
 
 	start_in_op();
 	set_led(1);
+	steps(3);
+	/* It came while a frame was lost: one of ours may have fallen then. */
+	world.status = EXCHANGE_NO_FRAME;
+	steps(1);
+	world.status = EXCHANGE_OK;
 	world.al_wkc = 3;
 	world.al_status = AL_OP | AL_SAFEOP | AL_ERROR;
 	steps(2);
