@@ -13,9 +13,9 @@
  *   are in OP, and the data is missing of just as many as did not answer, the reference clock not
  *   being one of them: the others stay live.
  * - One that is not ours on the wire: what the OR shows more in the frame in which it came is its
- *   own, as long as that bit is seen and the process data is complete, if the frame before it was
- *   not lost. INIT is accepted at any time: the service thread leads it there, and the data of one
- *   of ours in INIT would be missing. After a look that finds all of ours in OP, the rest of what
+ *   own as long as that bit is seen, if the frame before it was not lost. INIT is accepted at any
+ *   time while the process data is complete, which it would not be if one of ours were in INIT: the
+ *   service thread leads it there. After a look that finds all of ours in OP, the rest of what
  *   the OR shows is not theirs.
  * - With a slave out of OP (per_slave), the OR shows its way back and nothing else: the service
  *   thread decides then, and always without bus.monitor.
@@ -75,7 +75,9 @@ static int is_as_expected(const struct cycle *cy, const struct exchange_result *
 		return 0;
 	}
 	if (res->al_wkc > expected) {
-		strangers = cy->strangers_al | (res->status == EXCHANGE_OK ? AL_INIT : 0u);
+		/* One of ours in INIT would be missing in the process data. */
+		strangers = cy->strangers_al & ~(unsigned)AL_INIT;
+		strangers |= res->status == EXCHANGE_OK ? AL_INIT : 0u;
 	}
 	return (cy->al_status & ~(strangers & ~(unsigned)AL_OP)) == AL_OP;
 }
