@@ -28,6 +28,8 @@ static const char notes_text[] =
 	"         truncate, corrupt, damage slave=N\n"
 	"         to slaves (slave=N): cut, heal, power-off, power-on, reset, drift ppm=X,\n"
 	"         al-error code=X, port-error port=N, watchdog, mailbox-stuck [for=TIME],\n"
+	"         mailbox kind=late|double|counter|length|silent|eoe|abort|busy [count=N]\n"
+	"         [by=TIME],\n"
 	"         identity product=X, sync0-lost [count=N], unplug, plug [address=X],\n"
 	"         slow [state=safeop] by=TIME, refuse [state=safeop] code=X, obey,\n"
 	"         switch id=N\n"
