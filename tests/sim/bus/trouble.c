@@ -149,7 +149,8 @@ TEST(trouble, stop_before_any_slave_was_found_is_no_error)
 	unsigned frames = bench_frames_sent(b);
 
 	CHECK_EQ(bus_stop(b->bus, b->error), 0);
-	CHECK_EQ(bench_frames_sent(b), frames);
+	/* INIT by broadcast: a scan that was interrupted may have left slaves in PRE-OP. */
+	CHECK_EQ(bench_frames_sent(b), frames + 1);
 	bench_destroy(b);
 }
 

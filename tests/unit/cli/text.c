@@ -67,7 +67,8 @@ TEST(text, flags_of_a_sample_are_words)
 	CHECK_STR(buf, "lost dc_unlocked doubled");
 	samples_flags_format(UINT32_MAX, buf, 8);
 	CHECK_STR(buf, "lost la");
-	CHECK(samples_flag_name(9) == NULL);
+	CHECK_STR(samples_flag_name(9), "unchecked");
+	CHECK(samples_flag_name(10) == NULL);
 }
 
 TEST(text, abort_codes_have_words)
