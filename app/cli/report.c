@@ -140,9 +140,10 @@ static void write_cycle(const struct report *report, FILE *out)
 		text_ns(GET(st->dc_diff_max_ns), buf));
 	fprintf(out,
 		"frames     sent %" PRIu64 "   lost %" PRIu64 "   late %" PRIu64
-		"   doubled %" PRIu64 "   foreign %" PRIu64 "\n",
+		"   doubled %" PRIu64 "   foreign %" PRIu64 "   computed time %s\n",
 		GET(st->frames_sent), GET(st->frames_lost), GET(st->frames_late),
-		GET(st->frames_doubled), GET(st->frames_foreign));
+		GET(st->frames_doubled), GET(st->frames_foreign),
+		text_ns(GET(st->frames_need_ns), buf));
 	fprintf(out,
 		"cycles     %" PRIu64 "   overruns %" PRIu64 "   skipped %" PRIu64
 		"   WKC low %" PRIu64 "   page faults %" PRIu64 "   rides %" PRIu64 "\n",

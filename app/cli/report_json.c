@@ -42,6 +42,7 @@ static void write_counters(struct json *js, const struct cycle_stats *st)
 	json_u64(js, "samples_bad_unexplained", GET(st->samples_bad_unexplained));
 	json_u64(js, "page_faults", GET(st->page_faults));
 	json_u64(js, "rides", GET(st->rides));
+	json_i64(js, "frames_need_ns", GET(st->frames_need_ns));
 	json_u64(js, "op_lost", GET(st->op_lost));
 	json_u64(js, "cycles_with_stranger", GET(st->cycles_with_stranger));
 	json_u64(js, "slaves_answering", GET(st->slaves_found));

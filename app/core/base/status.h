@@ -59,8 +59,9 @@ struct cycle_stats {
 	_Atomic int64_t dc_diff_max_ns;       /* largest |0x092C| since lock */
 	_Atomic uint32_t dc_state;            /* enum dc_state */
 	_Atomic uint32_t is_fail_safe;
-	_Atomic uint32_t al_status;    /* of all slaves ORed, in the newest frame; 0: not read */
-	_Atomic uint32_t slaves_found; /* how many answered it */
+	_Atomic int64_t frames_need_ns; /* computed: first cyclic frame out to last one back */
+	_Atomic uint32_t al_status;     /* of all slaves ORed, in the newest frame; 0: not read */
+	_Atomic uint32_t slaves_found;  /* how many answered it */
 	_Atomic uint64_t slave_good[LIMIT_SLAVES];
 	_Atomic uint64_t slave_bad[LIMIT_SLAVES];
 	struct histogram wake_latency;

@@ -128,6 +128,11 @@ const struct channel *bus_channels(const struct bus *bus, size_t *ret_count)
 	return bus->channel;
 }
 
+const struct schedule *bus_schedule(const struct bus *bus)
+{
+	return &bus->schedule;
+}
+
 const struct exchange_plan *bus_plan(const struct bus *bus)
 {
 	return &bus->plan;

@@ -22,6 +22,7 @@
 #include "base/slave_set.h"
 #include "base/status.h"
 #include "bus/exchange.h"
+#include "bus/schedule.h"
 #include "config/config.h"
 #include "link/line.h"
 #include "wire/al.h"
@@ -53,7 +54,8 @@ int bus_compare(const struct bus *bus, char *error);
 /** Start-up SDOs, SM and FMMU, PDO mapping (CoE or SII) into the channel table, watchdog (T08),
  * exchange plan. */
 int bus_map(struct bus *bus, char *error);
-/** Filters, latch, delays, offsets, burst, check of 0x092C. Nothing to do without DC slaves. */
+/** Filters, latch, delays, the schedule check (-EINVAL: cycle.period is too short), offsets, burst,
+ * check of 0x092C. Without DC slaves only the schedule check. */
 int bus_dc_setup(struct bus *bus, char *error);
 
 /* The cycle runs from here on (line_ride_begin), FRMW and LRW go every period. */
@@ -122,6 +124,8 @@ void bus_clear_alarms(struct bus *bus);
 const struct slave_info *bus_slaves(const struct bus *bus, size_t *ret_count);
 const struct channel *bus_channels(const struct bus *bus, size_t *ret_count);
 const struct exchange_plan *bus_plan(const struct bus *bus);
+/** What the cyclic frames need of the period; valid after bus_dc_setup(). */
+const struct schedule *bus_schedule(const struct bus *bus);
 
 /* --- mailbox and registers, in any state from PRE-OP on --- */
 

@@ -132,6 +132,7 @@ struct bus {
 	struct channel channel[LIMIT_CHANNELS];
 	size_t channel_count;
 	struct exchange_plan plan;
+	struct schedule schedule;
 	int reference;        /* position of the reference clock; -1: none */
 	int64_t reference_ns; /* its time as last read, and when */
 	mono_t reference_at;

@@ -271,6 +271,31 @@ static int has_clocks(const struct bus *bus)
 	return 0;
 }
 
+/* Delays are known, and the burst, which takes seconds, has not begun. */
+static int check_schedule(struct bus *bus)
+{
+	struct schedule *sc = &bus->schedule;
+	struct dc_node node[LIMIT_SLAVES];
+
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		node[i] = bus->slave[i].clock;
+	}
+	*sc = schedule_compute(&bus->plan, node, bus->slave_count, bus->cfg->cycle_period_ns,
+			       bus->cfg->cycle_receive_percent);
+	line_frame_limit_set(bus->line, sc->service_frame_bytes);
+	if (bus->cfg->cycle_period_ns >= sc->smallest_period_ns) {
+		return 0;
+	}
+	return bus_fail(bus, -EINVAL,
+			"cycle.period %" PRId64
+			" us is too short: the frames of %zu slaves with %u "
+			"bytes of process data need %" PRId64 " us, cycle.receive allows %" PRId64
+			" us: set cycle.period to %" PRId64 "us or more",
+			bus->cfg->cycle_period_ns / NS_PER_US, bus->slave_count,
+			bus->plan.image_bytes, sc->need_ns / NS_PER_US, sc->allowed_ns / NS_PER_US,
+			sc->smallest_period_ns / NS_PER_US);
+}
+
 int bus_dc_setup(struct bus *bus, char *error)
 {
 	int r;
@@ -279,7 +304,7 @@ int bus_dc_setup(struct bus *bus, char *error)
 	bus->reference = -1;
 	bus->plan.dc_reference = 0;
 	if (!bus->cfg->dc_enable || !has_clocks(bus)) {
-		return 0;
+		return check_schedule(bus);
 	}
 	r = clear_clocks(bus);
 	if (r >= 0) {
@@ -293,11 +318,14 @@ int bus_dc_setup(struct bus *bus, char *error)
 			bus, (size_t)bus->reference, -ENOTSUP,
 			"the first clock on the bus has 32 bits only and cannot be the reference");
 	}
-	r = settle(bus);
+	bus->plan.dc_reference = bus->slave[bus->reference].info.station_addr;
+	r = check_schedule(bus);
+	if (r >= 0) {
+		r = settle(bus);
+	}
 	if (r < 0) {
 		return r;
 	}
-	bus->plan.dc_reference = bus->slave[bus->reference].info.station_addr;
 	bus_publish_slaves(bus);
 	return bus_reference_time(bus, &bus->reference_ns) < 0
 		       ? bus_fail_slave(bus, (size_t)bus->reference, -EIO,

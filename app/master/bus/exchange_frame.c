@@ -109,6 +109,24 @@ static uint32_t list_parts(const struct exchange_plan *plan, unsigned number,
 	return taken;
 }
 
+size_t exchange_frame_bytes(const struct exchange_plan *plan, unsigned number)
+{
+	/* What is not capacity is there anyway; no process data at all: nor is its datagram. */
+	size_t bytes = ECAT_FRAME_MAX_BYTES - exchange_frame_capacity(plan, number) - OVERHEAD;
+	unsigned parts = 0;
+
+	for (unsigned i = 0; i < plan->chunk_count; i++) {
+		if (plan->chunk_frame[i] == number) {
+			bytes += OVERHEAD + plan->chunk_bytes[i];
+			parts++;
+		}
+	}
+	if (parts > 1 && needs_nop(plan, number)) {
+		bytes -= OVERHEAD + EXCHANGE_NOP_BYTES;
+	}
+	return bytes < ECAT_FRAME_MIN_BYTES ? ECAT_FRAME_MIN_BYTES : bytes;
+}
+
 int exchange_frame_build(const struct exchange_plan *plan, unsigned number,
 			 struct exchange_frame *ret)
 {

@@ -48,6 +48,9 @@ struct exchange_frame {
  * takes EXCHANGE_OVERHEAD of them. */
 uint32_t exchange_frame_capacity(const struct exchange_plan *plan, unsigned number);
 
+/** Length of frame @number, from its Ethernet header on, without FCS. */
+size_t exchange_frame_bytes(const struct exchange_plan *plan, unsigned number);
+
 /** Build frame @number. 0, or -E2BIG if the plan's chunk does not fit. */
 int exchange_frame_build(const struct exchange_plan *plan, unsigned number,
 			 struct exchange_frame *ret);

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/bytes.h"
+#include "bus/exchange_frame.h"
 
 enum { LOOK_TRIES = 2, ACCESSES_PER_FRAME = 128 };
 
@@ -23,15 +24,20 @@ static int is_single(enum ecat_cmd cmd)
 }
 
 /* As many of @access as fit into one frame. Returns how many. */
-static size_t pack(struct ecat_frame_builder *fb, uint8_t *buf, const struct access *access,
-		   size_t count, uint8_t idx)
+static size_t pack(struct ecat_frame_builder *fb, uint8_t *buf, size_t limit,
+		   const struct access *access, size_t count, uint8_t idx)
 {
 	size_t n;
 
 	ecat_frame_begin(fb, buf, source);
 	for (n = 0; n < count && n < ACCESSES_PER_FRAME; n++) {
 		const struct access *ac = &access[n];
-		uint8_t *data = ecat_frame_add(fb, ac->cmd, idx, ac->adp, ac->reg, ac->len);
+		uint8_t *data;
+
+		if (n > 0 && fb->len + EXCHANGE_OVERHEAD + ac->len > limit) {
+			break;
+		}
+		data = ecat_frame_add(fb, ac->cmd, idx, ac->adp, ac->reg, ac->len);
 
 		if (data == NULL) {
 			break;
@@ -69,7 +75,8 @@ int registers_run(struct bus *bus, struct access *access, size_t count)
 		int r = -EMSGSIZE;
 
 		for (unsigned i = 0; i < tries && r < 0 && r != -ECANCELED; i++) {
-			packed = pack(&fb, frame, access, count, bus->sequence++);
+			packed = pack(&fb, frame, line_frame_limit(bus->line), access, count,
+				      bus->sequence++);
 			if (packed == 0) {
 				return -EMSGSIZE;
 			}

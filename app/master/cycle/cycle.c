@@ -15,7 +15,6 @@ enum {
 	FAULT_CHECK_CYCLES = 64, /* how often the thread's page faults are read */
 	SETTLE_SHARE = 20,       /* slaves have a 20th of the period to put their inputs in place */
 	RIDE_PERCENT = 85,       /* answers to service frames are looked for until then */
-	WIRE_PERCENT = 95,       /* and they are off the wire by then: the next wake may be early */
 };
 
 int cycle_create(const struct cycle_spec *spec, struct cycle **ret_cycle, char *error,
@@ -188,8 +187,8 @@ static void give_ride(struct cycle *cy)
 {
 	struct exchange_window window = {
 		.period = cy->period,
-		.wire_needed =
-			mono_add(cy->deadline, (span_t){ cy->period.ns * WIRE_PERCENT / 100 }),
+		.wire_needed = mono_add(cy->deadline,
+					(span_t){ cy->period.ns * LINE_WINDOW_PERCENT / 100 }),
 		.listen_until =
 			mono_add(cy->deadline, (span_t){ cy->period.ns * RIDE_PERCENT / 100 }),
 	};

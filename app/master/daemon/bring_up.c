@@ -3,6 +3,7 @@
  * delays, offsets, burst; then the cyclic frame and the servo's lock; then one common SYNC0; then
  * SAFE-OP, OP). */
 #include <errno.h>
+#include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -180,6 +181,24 @@ static int make_samples(struct session *s, struct failure *failure)
 	return 0;
 }
 
+static void show_schedule(struct session *s)
+{
+	const struct schedule *sc = bus_schedule(s->bus);
+	char text[FAILURE_TEXT_BYTES];
+
+	atomic_store_explicit(&s->run.page->cycle.frames_need_ns, sc->need_ns,
+			      memory_order_relaxed);
+	if (sc->need_ns * 2 > sc->allowed_ns && s->spec.hooks.warn != NULL) {
+		snprintf(text, sizeof(text),
+			 "the cyclic frames need %" PRId64 " us of the %" PRId64
+			 " us that cycle.receive allows: late wake-ups will lose frames; the "
+			 "smallest cycle.period that works is %" PRId64 "us",
+			 sc->need_ns / NS_PER_US, sc->allowed_ns / NS_PER_US,
+			 sc->smallest_period_ns / NS_PER_US);
+		s->spec.hooks.warn(s->spec.hooks.ctx, text);
+	}
+}
+
 static int make_cycle(struct session *s, struct failure *failure)
 {
 	char error[FAILURE_TEXT_BYTES] = "";
@@ -209,6 +228,7 @@ static int make_cycle(struct session *s, struct failure *failure)
 		spec.boards[CYCLE_WRITER_PROGRAM] = control_board(s->control);
 	}
 	memset(&s->run.page->cycle, 0, sizeof(s->run.page->cycle));
+	show_schedule(s);
 	r = cycle_create(&spec, &s->cycle, error, sizeof(error));
 	if (r < 0) {
 		return failure_set(failure, r == -ENOMEM ? EXIT_CODE_RESOURCES : EXIT_CODE_CONFIG,

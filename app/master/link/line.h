@@ -37,8 +37,9 @@ struct line_waiter {
 
 enum {
 	LINE_TRIES = 3,
-	LINE_LOST_CYCLES = 2,    /* a frame whose answer is not back then, counted from its own */
-	LINE_SHARE_PERCENT = 25, /* of the period, for service frames of both slots, on average */
+	LINE_LOST_CYCLES = 2,     /* a frame whose answer is not back then, counted from its own */
+	LINE_WINDOW_PERCENT = 95, /* of the period: service frames are off the wire by then */
+	LINE_SHARE_PERCENT = 25,  /* of the period, for service frames of both slots, on average */
 };
 
 /** Takes over @transport (destroyed with the line). Free with line_destroy(). */

@@ -268,6 +268,14 @@ const struct channel *bus_channels(const struct bus *bus, size_t *ret_count)
 	return channels;
 }
 
+const struct schedule *bus_schedule(const struct bus *bus)
+{
+	static const struct schedule schedule = { .need_ns = 50000, .allowed_ns = 400000 };
+
+	(void)bus;
+	return &schedule;
+}
+
 const struct exchange_plan *bus_plan(const struct bus *bus)
 {
 	(void)bus;
