@@ -47,6 +47,7 @@ enum soe_length {
 };
 
 enum soe_error {
+	SOE_ERROR_NONE = 0,
 	SOE_ERROR_NO_IDN = 0x1001,
 	SOE_ERROR_NO_ELEMENT = 0x1009,
 	SOE_ERROR_TOO_SHORT = 0x7002,

@@ -27,7 +27,7 @@ static int compose(struct mailbox_request *rq, uint8_t *data, size_t capacity)
 {
 	const struct soe_parameters *with = &rq->with.soe;
 	size_t left = with->operation == SOE_WRITE ? rq->capacity - rq->len : 0;
-	size_t room = capacity - SOE_HEADER_BYTES;
+	size_t room = capacity > SOE_HEADER_BYTES ? capacity - SOE_HEADER_BYTES : 1;
 	size_t now = left < room ? left : room;
 	size_t mails_left = (left - now + room - 1) / room;
 

@@ -155,15 +155,16 @@ static void gather(struct soe_server *s, int i, uint8_t elements)
 
 static size_t give_fragment(struct soe_server *s, const struct mailbox_call *call)
 {
-	size_t room = call->capacity - SOE_HEADER_BYTES;
+	size_t room = call->capacity > SOE_HEADER_BYTES ? call->capacity - SOE_HEADER_BYTES : 1;
 	size_t left = s->outgoing_len - s->outgoing_pos;
 	size_t now = left < room ? left : room;
+	size_t mails_left = (left - now) / room + ((left - now) % room > 0);
 	struct soe_message m = { .operation = SOE_READ_RESPONSE,
 				 .drive = s->drive,
 				 .has_more = left > room,
 				 .elements = s->outgoing_elements,
 				 .idn = s->outgoing_idn,
-				 .fragments_left = (uint16_t)((left - now + room - 1) / room),
+				 .fragments_left = (uint16_t)mails_left,
 				 .body = s->outgoing + s->outgoing_pos,
 				 .body_len = now };
 
@@ -196,7 +197,7 @@ static enum soe_error check_list(const struct soe_server *s)
 	return s->incoming_len < SOE_LIST_HEADER_BYTES ||
 			       get_le16(s->incoming) != s->incoming_len - SOE_LIST_HEADER_BYTES
 		       ? SOE_ERROR_INVALID
-		       : 0;
+		       : SOE_ERROR_NONE;
 }
 
 static enum soe_error check_number(const struct soe_server *s, const struct idn *idn)
@@ -213,7 +214,7 @@ static enum soe_error check_number(const struct soe_server *s, const struct idn 
 	if (idn->max > idn->min && number < idn->min) {
 		return SOE_ERROR_BELOW_MIN;
 	}
-	return idn->max > idn->min && number > idn->max ? SOE_ERROR_ABOVE_MAX : 0;
+	return idn->max > idn->min && number > idn->max ? SOE_ERROR_ABOVE_MAX : SOE_ERROR_NONE;
 }
 
 static enum soe_error check_write(const struct soe_server *s, const struct soe_message *m, int i)
@@ -249,17 +250,17 @@ static size_t answer_write(struct soe_server *s, const struct mailbox_call *call
 		return 0;
 	}
 	error = check_write(s, m, i);
-	if (error == 0) {
+	if (error == SOE_ERROR_NONE) {
 		memcpy(s->value[i].bytes, s->incoming, s->incoming_len);
 		s->value[i].len = s->incoming_len;
 	}
-	if (error == 0 && idns[i].is_command && get_le16(s->incoming) == COMMAND_SET) {
+	if (error == SOE_ERROR_NONE && idns[i].is_command && get_le16(s->incoming) == COMMAND_SET) {
 		s->state[i] = STATE_RUNS;
 		s->command_until_ns = call->t_ns + SOE_COMMAND_NS;
 	}
 	s->incoming_len = 0;
 	s->is_too_long = 0;
-	if (error != 0) {
+	if (error != SOE_ERROR_NONE) {
 		return answer_error(s, call, m, error);
 	}
 	return soe_format(&(struct soe_message){ .operation = SOE_WRITE_RESPONSE,
