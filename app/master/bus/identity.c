@@ -50,7 +50,7 @@ static int take_interface(struct bus *bus, uint16_t station, uint16_t *ret_statu
 {
 	uint8_t force = 2;
 	uint8_t own = 0;
-	uint8_t status[2];
+	uint8_t status[2] = { 0 };
 	int r = run_on(bus, ECAT_CMD_FPWR, station, ESC_REG_EEPROM_CONFIG, &force, 1);
 
 	if (r == 0) {
@@ -91,8 +91,8 @@ static int read_words(struct bus *bus, uint16_t station, uint16_t word, uint8_t 
 
 int bus_identity_read(struct bus *bus, uint16_t station, struct bus_identity *ret)
 {
-	uint8_t words[IDENTITY_BYTES];
-	uint8_t alias[4];
+	uint8_t words[IDENTITY_BYTES] = { 0 };
+	uint8_t alias[4] = { 0 };
 	uint16_t status = 0;
 	size_t len = 4;
 	int r = take_interface(bus, station, &status);

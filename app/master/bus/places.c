@@ -162,6 +162,19 @@ int bus_is_same_device(const struct bus_slave *sl, const struct bus_identity *fo
 	       sl->info.alias == found->alias;
 }
 
+void bus_places_release(struct bus *bus)
+{
+	const uint8_t by_itself = 0;
+
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		if (bus->slave[i].closed_ports != 0) {
+			register_write(bus, i, ESC_REG_DL_CONTROL + 1, &by_itself,
+				       sizeof(by_itself));
+			bus->slave[i].closed_ports = 0;
+		}
+	}
+}
+
 int bus_reference_is_itself(struct bus *bus)
 {
 	const uint8_t to_pdi = 1;

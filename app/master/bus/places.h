@@ -49,6 +49,9 @@ struct bus_guest {
 int bus_places_follow(struct bus *bus, unsigned answering, int is_doubtful,
 		      const struct bus_emit *emit);
 
+/** The way down: ports that were closed towards strangers are open again. */
+void bus_places_release(struct bus *bus);
+
 /** Guests on the wire now. Those behind a closed port do not count. */
 unsigned bus_guests_answering(const struct bus *bus);
 /** Guests that are none of our slaves, wherever they are. */

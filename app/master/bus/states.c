@@ -135,7 +135,6 @@ void bus_describe_refusal(uint16_t al_status, uint16_t code, enum al_state wante
 static int say_why(struct bus *bus, size_t pos, const struct al_reading *al, enum al_state state)
 {
 	char why[128];
-
 	const char *wanted = al_state_to_str((uint16_t)state);
 
 	if (al->wkc == 0) {
@@ -306,5 +305,6 @@ int bus_stop(struct bus *bus, char *error)
 		r = step_down(bus, AL_PREOP, r, error);
 	}
 	bus_sync0_stop(bus);
+	bus_places_release(bus);
 	return step_down(bus, AL_INIT, r, error);
 }

@@ -180,6 +180,20 @@ TEST(sim_strangers, a_device_with_a_used_address_between_the_slaves)
 	check_stranger(1, 0x1002, "slave 1 (b)");
 }
 
+TEST(sim_strangers, the_port_towards_a_stranger_is_open_again_after_a_stop)
+{
+	const uint8_t *loop_control = NULL;
+
+	open_without(2);
+	plug_in(0x1001);
+	virtual_master_run(&vm, 1000);
+	loop_control = segment_esc(b.segment, 1)->reg + ESC_REG_DL_CONTROL + 1;
+	CHECK(*loop_control != 0);
+	CHECK_EQ(virtual_master_stop(&vm), 0);
+	CHECK_EQ(*loop_control, 0);
+	close_all();
+}
+
 /* --- slaves that may be absent, and such that only their number tells apart --- */
 
 static void open_with(const char *const *settings, const char *fault)
