@@ -347,6 +347,26 @@ TEST(recovery, watching_costs_no_cycle)
 	bench_destroy(b);
 }
 
+/* AL states, counters of some, the reference's time: one frame each, however many slaves. */
+TEST(recovery, one_poll_of_sixty_four_slaves_takes_three_frames)
+{
+	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 64, .seed = 96 });
+
+	bench_bring_up(b);
+	bench_run(b, 100);
+	bench_watch(b);
+	for (unsigned poll = 0; poll < 10; poll++) {
+		uint64_t cycles = b->cycles;
+		unsigned frames = bench_frames_sent(b);
+		unsigned service;
+
+		CHECK_EQ(bench_watch(b).slaves_op, 64);
+		service = bench_frames_sent(b) - frames - (unsigned)(b->cycles - cycles);
+		CHECK_EQ(service, 3);
+	}
+	bench_destroy(b);
+}
+
 TEST(recovery, slave_that_missed_one_poll_is_neither_lost_nor_in_op)
 {
 	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 2, .seed = 96 });

@@ -338,6 +338,25 @@ TEST(sim_stubborn, another_revision_in_the_place_is_a_wrong_device)
 	close_all();
 }
 
+/* D22: such a number was ignored for ever. */
+TEST(sim_stubborn, a_slave_in_a_state_that_does_not_exist_is_named_and_started_over)
+{
+	static const uint8_t number[] = { 5, 7, 9, 0 };
+
+	for (size_t i = 0; i < sizeof(number); i++) {
+		open_with("bus.recovery_attempts=10");
+		virtual_bench_fault(&b, "at=0s slow slave=1 state=preop by=500ms");
+		esc_force_al_status(segment_esc(b.segment, 1), number[i], 0);
+		virtual_master_run(&vm, 15);
+		CHECK_EQ(state(), BUS_RECOVERING);
+		printf("%u: %s\n", number[i], page()->message);
+		CHECK(strstr(page()->message, "slave 1 (b): is in an AL state that does not exist") !=
+		      NULL);
+		CHECK(run_to_op(5) <= 2);
+		close_all();
+	}
+}
+
 /* Row 4: nobody loses a link, the address is gone. */
 TEST(sim_stubborn, a_slave_that_restarts_by_itself_is_back_soon)
 {
