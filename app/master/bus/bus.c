@@ -5,7 +5,9 @@
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
+#include "base/bytes.h"
 #include "bus/bus_internal.h"
 
 static void bind_soem(struct bus *bus)
@@ -32,6 +34,68 @@ static void bind_soem(struct bus *bus)
 	};
 }
 
+/* --- the mailbox engine: its wire is the mailbox slot of the line --- */
+
+static int submit(void *ctx, const uint8_t *frame, size_t frame_len)
+{
+	return line_submit(ctx, LINE_MAILBOX, frame, frame_len);
+}
+
+static int collect(void *ctx, uint8_t *ret_answer, size_t capacity)
+{
+	return line_collect(ctx, LINE_MAILBOX, ret_answer, capacity);
+}
+
+static size_t frame_limit(void *ctx)
+{
+	return line_frame_limit(ctx);
+}
+
+static mono_t now(void *ctx)
+{
+	const struct platform *platform = line_platform(ctx);
+
+	return platform->now(platform->ctx);
+}
+
+static int sleep_for(void *ctx, span_t span)
+{
+	return line_sleep(ctx, span);
+}
+
+static void take_coe(void *ctx, uint16_t slave_pos, const uint8_t *data, size_t len)
+{
+	struct bus *bus = ctx;
+	struct coe_emergency em;
+
+	if (coe_emergency_get(data, len, &em)) {
+		uint8_t bytes[8] = { 0 };
+
+		memcpy(bytes, em.data, sizeof(em.data));
+		bus_emit_event(bus, &bus->listener,
+			       (struct event){ .id = EVENT_EMERGENCY,
+					       .slave_pos = slave_pos,
+					       .value = (int64_t)get_le64(bytes),
+					       .arg = { em.code, em.error_register } });
+	}
+}
+
+static int create_mailbox(struct bus *bus)
+{
+	const struct mailbox_wire wire = { .submit = submit,
+					   .collect = collect,
+					   .frame_limit = frame_limit,
+					   .now = now,
+					   .sleep = sleep_for,
+					   .ctx = bus->line };
+	int r = mailbox_create(&wire, &bus->mailbox);
+
+	if (r >= 0) {
+		mailbox_sink_set(bus->mailbox, MAILBOX_TYPE_COE, take_coe, bus);
+	}
+	return r;
+}
+
 int bus_create(const struct config *cfg, struct line *line, struct bus **ret_bus)
 {
 	struct bus *bus = calloc(1, sizeof(*bus));
@@ -44,7 +108,7 @@ int bus_create(const struct config *cfg, struct line *line, struct bus **ret_bus
 	bus->line = line;
 	bus->reference = -1;
 	bind_soem(bus);
-	if (bus_mailbox_create(bus) < 0) {
+	if (create_mailbox(bus) < 0) {
 		free(bus);
 		return -ENOMEM;
 	}

@@ -219,7 +219,6 @@ int bus_sdo_value(struct bus *bus, size_t pos, uint16_t index, uint8_t subindex,
 int bus_sdo_entry(struct bus *bus, size_t pos, uint16_t index, uint8_t subindex,
 		  struct coe_entry *ret_entry);
 
-int bus_mailbox_create(struct bus *bus);
 /** The slave's mailbox SyncManagers were programmed, as SOEM has them. */
 void bus_mailbox_set(struct bus *bus, size_t pos);
 

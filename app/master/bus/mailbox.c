@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The bus's mailbox engine: its wire is the mailbox slot of the line; blocking SDO transfers for
- * bring-up; start-up SDOs, of all slaves at the same time; emergencies.
+ * The bus's mailboxes: blocking SDO transfers for bring-up, others that are begun, and start-up
+ * SDOs, of all slaves at the same time.
  */
 #include <errno.h>
 #include <inttypes.h>
@@ -10,68 +10,6 @@
 #include "base/bytes.h"
 #include "bus/bus_internal.h"
 #include "wire/sdo_abort.h"
-
-/* --- the wire --- */
-
-static int submit(void *ctx, const uint8_t *frame, size_t frame_len)
-{
-	return line_submit(ctx, LINE_MAILBOX, frame, frame_len);
-}
-
-static int collect(void *ctx, uint8_t *ret_answer, size_t capacity)
-{
-	return line_collect(ctx, LINE_MAILBOX, ret_answer, capacity);
-}
-
-static size_t frame_limit(void *ctx)
-{
-	return line_frame_limit(ctx);
-}
-
-static mono_t now(void *ctx)
-{
-	const struct platform *platform = line_platform(ctx);
-
-	return platform->now(platform->ctx);
-}
-
-static int sleep_for(void *ctx, span_t span)
-{
-	return line_sleep(ctx, span);
-}
-
-static void take_coe(void *ctx, uint16_t slave_pos, const uint8_t *data, size_t len)
-{
-	struct bus *bus = ctx;
-	struct coe_emergency em;
-
-	if (coe_emergency_get(data, len, &em)) {
-		uint8_t bytes[8] = { 0 };
-
-		memcpy(bytes, em.data, sizeof(em.data));
-		bus_emit_event(bus, &bus->listener,
-			       (struct event){ .id = EVENT_EMERGENCY,
-					       .slave_pos = slave_pos,
-					       .value = (int64_t)get_le64(bytes),
-					       .arg = { em.code, em.error_register } });
-	}
-}
-
-int bus_mailbox_create(struct bus *bus)
-{
-	const struct mailbox_wire wire = { .submit = submit,
-					   .collect = collect,
-					   .frame_limit = frame_limit,
-					   .now = now,
-					   .sleep = sleep_for,
-					   .ctx = bus->line };
-	int r = mailbox_create(&wire, &bus->mailbox);
-
-	if (r >= 0) {
-		mailbox_sink_set(bus->mailbox, MAILBOX_TYPE_COE, take_coe, bus);
-	}
-	return r;
-}
 
 void bus_mailbox_set(struct bus *bus, size_t pos)
 {

@@ -211,7 +211,7 @@ static void take_mail(struct mailbox_engine *mb, uint16_t pos, mono_t now)
 	rd->is_repeated = 0;
 	if (len > sl->spec.in_bytes) {
 		sl->counters.malformed++;
-		engine_malformed(mb, pos, header.type);
+		mb->hooks.malformed(mb, pos, header.type);
 		return;
 	}
 	if (is_seen(rd, header.counter, len)) {
@@ -223,7 +223,7 @@ static void take_mail(struct mailbox_engine *mb, uint16_t pos, mono_t now)
 		sl->counters.dropped++;
 		return;
 	}
-	engine_received(mb, pos, &header, rd->mail + MAILBOX_HEADER_BYTES, now);
+	mb->hooks.received(mb, pos, &header, rd->mail + MAILBOX_HEADER_BYTES, now);
 }
 
 static void read_done(struct mailbox_engine *mb, uint16_t pos, const struct flight *fl,
@@ -393,7 +393,7 @@ static int add_writer(struct mailbox_engine *mb, uint16_t pos, mono_t now)
 		wr->step = WRITER_IDLE;
 	}
 	if (wr->step == WRITER_IDLE && sl->drain == 0) {
-		engine_feed(mb, pos, now);
+		mb->hooks.feed(mb, pos, now);
 	}
 	if (wr->step == WRITER_IDLE || now.ns < wr->not_before.ns) {
 		return 0;
@@ -439,7 +439,7 @@ static void writer_result(struct mailbox_engine *mb, const struct flight *fl, en
 		wr->step = WRITER_IDLE;
 		mb->slave[fl->slave_pos]->sent_at = now;
 		mb->slave[fl->slave_pos]->reader.poll_at = now;
-		engine_sent(mb, fl->slave_pos, now);
+		mb->hooks.sent(mb, fl->slave_pos, now);
 		return;
 	}
 	if (outcome == OUTCOME_DENIED) {

@@ -162,7 +162,7 @@ static int feed_request(struct mailbox_engine *mb, struct box_slave *sl, struct 
 	return 1;
 }
 
-void engine_feed(struct mailbox_engine *mb, uint16_t pos, mono_t now)
+static void feed(struct mailbox_engine *mb, uint16_t pos, mono_t now)
 {
 	struct box_slave *sl = mb->slave[pos];
 
@@ -182,7 +182,7 @@ void engine_feed(struct mailbox_engine *mb, uint16_t pos, mono_t now)
 	}
 }
 
-void engine_sent(struct mailbox_engine *mb, uint16_t pos, mono_t now)
+static void sent(struct mailbox_engine *mb, uint16_t pos, mono_t now)
 {
 	struct box_slave *sl = mb->slave[pos];
 	struct mailbox_request *rq = sl->writer.owner;
@@ -211,7 +211,7 @@ static struct mailbox_request *find_refused(struct box_slave *sl)
 	return oldest;
 }
 
-void engine_received(struct mailbox_engine *mb, uint16_t pos, const struct mailbox_header *header,
+static void received(struct mailbox_engine *mb, uint16_t pos, const struct mailbox_header *header,
 		     const uint8_t *data, mono_t now)
 {
 	struct box_slave *sl = mb->slave[pos];
@@ -241,7 +241,7 @@ void engine_received(struct mailbox_engine *mb, uint16_t pos, const struct mailb
 	}
 }
 
-void engine_malformed(struct mailbox_engine *mb, uint16_t pos, uint8_t type)
+static void malformed(struct mailbox_engine *mb, uint16_t pos, uint8_t type)
 {
 	struct box_slave *sl = mb->slave[pos];
 	struct mailbox_request *rq = sl->active[type];
@@ -354,6 +354,9 @@ int mailbox_create(const struct mailbox_wire *wire, struct mailbox_engine **ret_
 		return -ENOMEM;
 	}
 	mb->wire = *wire;
+	mb->hooks = (struct box_hooks){
+		.feed = feed, .sent = sent, .received = received, .malformed = malformed
+	};
 	*ret_mb = mb;
 	return 0;
 }

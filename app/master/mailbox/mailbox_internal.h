@@ -102,6 +102,19 @@ struct flight {
 
 enum { FLIGHTS = 128 };
 
+/* What the boxes ask of the requests, and tell them. */
+struct box_hooks {
+	/** The writer is free: compose the next mail, if there is one. */
+	void (*feed)(struct mailbox_engine *mb, uint16_t pos, mono_t now);
+	/** The mail in the writer is in the slave's box. */
+	void (*sent)(struct mailbox_engine *mb, uint16_t pos, mono_t now);
+	/** A whole mail of the slave. */
+	void (*received)(struct mailbox_engine *mb, uint16_t pos,
+			 const struct mailbox_header *header, const uint8_t *data, mono_t now);
+	/** A mail whose length is beyond its box. */
+	void (*malformed)(struct mailbox_engine *mb, uint16_t pos, uint8_t type);
+};
+
 struct mailbox_sink {
 	void (*take)(void *ctx, uint16_t slave_pos, const uint8_t *data, size_t len);
 	void *ctx;
@@ -109,6 +122,7 @@ struct mailbox_sink {
 
 struct mailbox_engine {
 	struct mailbox_wire wire;
+	struct box_hooks hooks;
 	struct mailbox_sink sink[MAILBOX_TYPES];
 	struct box_slave *slave[LIMIT_SLAVES]; /* NULL: none was ever set */
 	uint16_t slave_end;                    /* positions from here on have none */
@@ -135,17 +149,5 @@ void box_result(struct mailbox_engine *mb, const struct flight *flight, enum out
 /** @data_len bytes behind the header in writer.mail become the mail that is written next. */
 void box_post(struct mailbox_engine *mb, struct box_slave *sl, uint8_t type, size_t data_len,
 	      mono_t now);
-
-/* --- engine.c --- */
-
-/** The writer is free: compose the next mail, if there is one. */
-void engine_feed(struct mailbox_engine *mb, uint16_t pos, mono_t now);
-/** The mail in the writer is in the slave's box. */
-void engine_sent(struct mailbox_engine *mb, uint16_t pos, mono_t now);
-/** A whole mail of the slave. */
-void engine_received(struct mailbox_engine *mb, uint16_t pos, const struct mailbox_header *header,
-		     const uint8_t *data, mono_t now);
-/** A mail whose length is beyond its box. */
-void engine_malformed(struct mailbox_engine *mb, uint16_t pos, uint8_t type);
 
 #endif
