@@ -183,12 +183,13 @@ static int is_reachable(const struct bus *bus, const struct walk *walk, size_t p
 }
 
 /*
- * The lost slave that @guest is: the first in its gap of this identity. -1: none; -EAGAIN: one that
- * cannot be told from another of its kind yet, the first of them is not certain to be here.
+ * The lost slave that @guest is: the first in its gap of this identity that can be reached. -1: no
+ * slave there has this identity; -EAGAIN: some have, none can be reached.
  */
 static int find_returned(const struct bus *bus, const struct walk *walk,
 			 const struct bus_guest *guest, int *ret_expected)
 {
+	int result = -1;
 	int before;
 	int behind;
 
@@ -203,11 +204,15 @@ static int find_returned(const struct bus *bus, const struct walk *walk,
 		if (*ret_expected < 0) {
 			*ret_expected = pos;
 		}
-		if (bus_is_same_device(sl, &guest->identity)) {
-			return is_reachable(bus, walk, (size_t)pos) ? pos : -EAGAIN;
+		if (!bus_is_same_device(sl, &guest->identity)) {
+			continue;
 		}
+		if (is_reachable(bus, walk, (size_t)pos)) {
+			return pos;
+		}
+		result = -EAGAIN;
 	}
-	return -1;
+	return result;
 }
 
 static int give_address(struct bus *bus, struct bus_guest *guest, size_t pos)

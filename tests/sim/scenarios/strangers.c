@@ -5,6 +5,7 @@
  * when they leave, all is as before.
  */
 #include "base/bytes.h"
+#include "devices/fb1111_piccolo.h"
 #include "harness/test.h"
 #include "sim/harness/virtual_master.h"
 #include "wire/al.h"
@@ -178,6 +179,79 @@ TEST(sim_strangers, a_device_with_a_used_address_in_front_of_its_owner)
 TEST(sim_strangers, a_device_with_a_used_address_between_the_slaves)
 {
 	check_stranger(1, 0x1002, "slave 1 (b)");
+}
+
+/* It has even what this session has written to slave b: neither is believed, b is found again by
+ * its place. */
+TEST(sim_strangers, a_device_with_all_the_marks_of_a_slave_is_not_taken_for_it)
+{
+	const struct esc *original;
+	struct esc *copy;
+	int ms = 0;
+
+	open_without(2);
+	original = segment_esc(b.segment, 1);
+	copy = stranger_esc();
+	memcpy(copy->reg + ESC_REG_FMMU, original->reg + ESC_REG_FMMU, 8 * ESC_FMMU_BYTES);
+	memcpy(copy->reg + ESC_REG_DC_SYSTEM_TIME_OFFSET,
+	       original->reg + ESC_REG_DC_SYSTEM_TIME_OFFSET, 8);
+	put_le16(copy->reg + ESC_REG_STATION_ADDRESS, 0x1002);
+	CHECK_EQ(segment_plug(b.segment, 2, virtual_bench_now_ns(&b)), 0);
+	virtual_master_run(&vm, 30);
+	CHECK(get_le16(copy->reg + ESC_REG_STATION_ADDRESS) != 0x1002);
+	CHECK(get_le16(original->reg + ESC_REG_STATION_ADDRESS) != 0x1002);
+	while ((state() != BUS_OP || ms < 100) && ms < 5000) {
+		virtual_master_run(&vm, 10);
+		ms += 10;
+	}
+	CHECK_EQ(state(), BUS_OP);
+	CHECK_EQ(get_le16(original->reg + ESC_REG_STATION_ADDRESS), 0x1002);
+	CHECK(strstr(page()->message, "position 2: a device that is not configured") != NULL);
+	close_all();
+}
+
+/* --- two equal slaves on two ports of one --- */
+
+static int tree_slave(int position, struct segment_slave_spec *ret_spec)
+{
+	int r = fb1111_piccolo_slave(position, ret_spec);
+
+	if (position > 0) {
+		ret_spec->parent = 0;
+		ret_spec->parent_port = position == 1 ? 3 : 1;
+	}
+	return r;
+}
+
+/* Both are lost; whichever returns first is itself, not the first of the two. */
+TEST(sim_strangers, equal_slaves_that_return_in_any_order_are_told_apart_by_their_ports)
+{
+	static const char *const settings[] = { "slaves[0].name=a", "slaves[1].name=b",
+						"slaves[2].name=c", NULL };
+
+	for (unsigned first = 1; first <= 2; first++) {
+		char fault[48];
+
+		virtual_bench_init(
+			&b, &(struct virtual_spec){ .slaves = 3, .make = tree_slave, .seed = 8 });
+		virtual_master_init(&vm, &b, settings);
+		virtual_master_settle(&vm);
+		virtual_bench_fault(&b, "at=0s power-off slave=1");
+		virtual_bench_fault(&b, "at=0s power-off slave=2");
+		virtual_master_run(&vm, 500);
+		snprintf(fault, sizeof(fault), "at=0s power-on slave=%u", first);
+		virtual_bench_fault(&b, fault);
+		virtual_master_run(&vm, 1500);
+		CHECK_EQ(get_le16(segment_esc(b.segment, first)->reg + ESC_REG_STATION_ADDRESS),
+			 0x1001 + first);
+		snprintf(fault, sizeof(fault), "at=0s power-on slave=%u", 3 - first);
+		virtual_bench_fault(&b, fault);
+		virtual_master_run(&vm, 2000);
+		CHECK_EQ(state(), BUS_OP);
+		CHECK_EQ(get_le16(segment_esc(b.segment, 3 - first)->reg + ESC_REG_STATION_ADDRESS),
+			 0x1001 + 3 - first);
+		close_all();
+	}
 }
 
 TEST(sim_strangers, the_port_towards_a_stranger_is_open_again_after_a_stop)
