@@ -81,8 +81,9 @@ TEST(images, a_drive_has_three_protocols_and_24_pdos_and_two_dc_modes)
 	CHECK_EQ(sii.fmmu[0], 1);
 	CHECK_EQ(sii.fmmu[1], 2);
 	CHECK_EQ(sii.fmmu[2], 3);
-	CHECK_EQ(sii.has_dc, 1);
-	CHECK(sii.dc_assign_activate != 0);
+	CHECK_EQ(sii.dc_mode_count, 2);
+	CHECK_EQ(sii.dc_mode[0].assign_activate, 0x0300);
+	CHECK_EQ(sii.dc_mode[1].assign_activate, 0x0000);
 }
 
 TEST(images, a_damaged_drive_is_refused_with_its_reason_and_keeps_what_stood_before)

@@ -21,6 +21,10 @@ enum config_presence { CONFIG_ANY_SLAVES, CONFIG_EXACT_SLAVES };
 enum config_revision { CONFIG_REVISION_EXACT, CONFIG_REVISION_AT_LEAST, CONFIG_REVISION_ANY };
 enum config_datagrams { CONFIG_DATAGRAMS_ONE, CONFIG_DATAGRAMS_PER_SLAVE };
 
+enum config_sync_type { CONFIG_SYNC_TYPE_SHOW, CONFIG_SYNC_TYPE_WRITE };
+/* slaves[].assign_activate, besides words of 1 to 0xffff */
+enum { CONFIG_ASSIGN_SII = 0, CONFIG_ASSIGN_NONE = 0x10000 };
+
 enum { CONFIG_LIMIT_SDOS = 256, CONFIG_LIMIT_OUTPUTS = 512, CONFIG_PATH_BYTES = 256 };
 enum { CONFIG_OPTIONS_BYTES = 512 };
 
@@ -38,7 +42,8 @@ struct config_slave {
 	enum config_mode mode; /* FB1111-Piccolo: writes 0x8000:01 in PRE-OP */
 	int64_t sync0_shift_ns;
 	char sync0_line[96];      /* GPIO line its SYNC0 is wired to; "" = none */
-	uint32_t assign_activate; /* 0 = from what the slave is: DC slaves 0x0300 */
+	uint32_t assign_activate; /* or CONFIG_ASSIGN_SII, CONFIG_ASSIGN_NONE */
+	enum config_sync_type sync_type;
 	int64_t preop_timeout_ns;
 	int64_t op_timeout_ns; /* 0: bus_op_timeout_ns */
 	int line;              /* in the file, for messages */

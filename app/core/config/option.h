@@ -35,7 +35,9 @@ struct option {
 	const char *max;
 	char unit[12];         /* of a plain number; "" for none */
 	const char *otherwise; /* when the default is another one, for the pages; mostly NULL */
-	const char *words;     /* OPTION_WORD: "auto|spin|sleep", in the order of the enum */
+	/* OPTION_WORD: "auto|spin|sleep", in the order of the enum. OPTION_HEX: words beside the
+	 * numbers; the first one is 0 (below @min), the others are @max + 1, @max + 2 ... */
+	const char *words;
 	const char *prose;
 };
 

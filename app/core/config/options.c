@@ -705,11 +705,23 @@ const struct option option_table[] = {
 	{ .name = "slaves[].assign_activate",
 	  .type = OPTION_HEX,
 	  SLAVE(assign_activate),
-	  .default_value = "0",
-	  .min = "0",
+	  .default_value = "sii",
+	  .min = "0x0001",
 	  .max = "0xffff",
-	  .prose = "AssignActivate word of the vendor's ESI (0x0980, 0x0981). 0: 0x0300 for "
-		   "slaves with DC, SYNC0 on." },
+	  .words = "sii|none",
+	  .prose = "SYNC signals of this slave. sii: the first operation mode of its SII, which "
+		   "is the vendor's default; without such a mode none. none: SYNC off. A number: "
+		   "AssignActivate word of the vendor's ESI (0x0980 in the low byte, 0x0981 in "
+		   "the high byte), with cycles and shifts of the SII's mode of that word. An "
+		   "FB1111-Piccolo has 0x0300, or 0x0001 in mode oneshot." },
+	{ .name = "slaves[].sync_type",
+	  .type = OPTION_WORD,
+	  SLAVE(sync_type),
+	  .default_value = "show",
+	  .words = "show|write",
+	  .prose = "Synchronization type of a CoE slave, 0x1C32:01 and 0x1C33:01. show: read "
+		   "only. write: written in PRE-OP to fit the SYNC signals (SYNC0 2, SYNC1 3, "
+		   "none 1 or, for inputs beside outputs, 0x22) and read back." },
 	{ .name = "slaves[].preop_timeout",
 	  .type = OPTION_DURATION,
 	  SLAVE(preop_timeout_ns),

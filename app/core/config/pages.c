@@ -32,6 +32,9 @@ static void write_range(const struct option *option, FILE *out)
 				fputc(*p, out);
 			}
 		}
+		if (is_number(option)) {
+			fprintf(out, ", %s to %s", option->min, option->max);
+		}
 	} else if (is_number(option)) {
 		fprintf(out, "%s to %s", option->min, option->max);
 	} else if (option->type == OPTION_SWITCH) {

@@ -4,6 +4,7 @@
 #include <errno.h>
 #include <stdint.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
@@ -51,21 +52,45 @@ static int parse_switch(const struct option *option, const char *text, void *bas
 	return -EINVAL;
 }
 
-static int parse_word(const struct option *option, const char *text, void *base, char *reason)
+/* Which of the option's words @text is; -1. */
+static int word_number(const struct option *option, const char *text)
 {
 	size_t text_len = strlen(text);
 	const char *word = option->words;
-	unsigned value = 0;
+	int number = 0;
 
 	while (*word != '\0') {
 		size_t len = strcspn(word, "|");
 
 		if (len == text_len && strncasecmp(word, text, len) == 0) {
-			option_store(option, value, base);
-			return 0;
+			return number;
 		}
 		word += len + (word[len] == '|');
-		value++;
+		number++;
+	}
+	return -1;
+}
+
+/* A number, or one of the words beside them. */
+static int parse_hex(const struct option *option, const char *text, void *base, char *reason)
+{
+	int word = option->words != NULL ? word_number(option, text) : -1;
+	uint64_t behind = option->max != NULL ? strtoull(option->max, NULL, 0) : 0;
+
+	if (word < 0) {
+		return number_parse_whole(option, text, base, reason);
+	}
+	option_store(option, word == 0 ? 0 : behind + (unsigned)word, base);
+	return 0;
+}
+
+static int parse_word(const struct option *option, const char *text, void *base, char *reason)
+{
+	int word = word_number(option, text);
+
+	if (word >= 0) {
+		option_store(option, (unsigned)word, base);
+		return 0;
 	}
 	snprintf(reason, OPTION_WHY_BYTES, "expected one of %s, not \"%.32s\"", option->words,
 		 text);
@@ -104,8 +129,9 @@ int option_parse(const struct option *option, const char *text, void *base, char
 	case OPTION_SIZE:
 	case OPTION_INT:
 	case OPTION_UINT:
-	case OPTION_HEX:
 		return number_parse_whole(option, text, base, reason);
+	case OPTION_HEX:
+		return parse_hex(option, text, base, reason);
 	case OPTION_NUMBER:
 		return number_parse_real(option, text, base, reason);
 	case OPTION_SWITCH:

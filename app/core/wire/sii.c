@@ -9,6 +9,9 @@
 
 enum {
 	CHECKSUM_BYTES = 14,
+	CHECKSUM_OFF = 0x88a4,
+	KBIT_BYTES = 128,
+	GENERAL_BYTES = 14,
 	CATEGORY_HEADER_BYTES = 4,
 	PDO_HEADER_BYTES = 8,
 	PDO_ENTRY_BYTES = 8,
@@ -29,6 +32,23 @@ uint8_t sii_checksum(const uint8_t *image)
 		}
 	}
 	return crc;
+}
+
+int sii_is_checksum_right(const uint8_t *image)
+{
+	return image[SII_CHECKSUM_BYTE] == sii_checksum(image) ||
+	       get_le16(image + SII_CHECKSUM_BYTE) == CHECKSUM_OFF;
+}
+
+size_t sii_stated_bytes(const uint8_t *image)
+{
+	uint16_t kbit = get_le16(image + SII_SIZE_BYTE);
+	size_t bytes = ((size_t)kbit + 1) * KBIT_BYTES;
+
+	if (kbit == UINT16_MAX || bytes <= SII_CATEGORIES_BYTE) {
+		return SII_UNSTATED_BYTES;
+	}
+	return bytes < SII_LIMIT_BYTES ? bytes : SII_LIMIT_BYTES;
 }
 
 /* One step of the walk: 1 with a category, 0 at the end, -EBADMSG. */
@@ -117,7 +137,13 @@ static void parse_general(const uint8_t *p, size_t bytes, struct sii *sii)
 	sii->device_name = p[3];
 	sii->coe_details = p[5];
 	sii->general_flags = bytes > GENERAL_FLAGS ? p[GENERAL_FLAGS] : 0;
+	sii->foe_details = p[6];
+	sii->eoe_details = p[7];
 	sii->has_general = 1;
+	if (bytes >= GENERAL_BYTES) {
+		sii->soe_channels = p[8];
+		sii->ebus_ma = (int16_t)get_le16(p + 12);
+	}
 }
 
 static void parse_sm(const uint8_t *p, size_t bytes, struct sii *sii)
@@ -179,14 +205,17 @@ static int parse_pdo(const uint8_t *p, size_t bytes, int is_tx, struct sii *sii)
 
 static void parse_dc(const uint8_t *p, size_t bytes, struct sii *sii)
 {
-	/* ETG.2010 table 16: SYNC0 cycle (4), shift (4), SYNC1 shift (4), ..., AssignActivate
-	 * at 14. */
-	for (; bytes >= DC_MODE_BYTES; bytes -= DC_MODE_BYTES, p += DC_MODE_BYTES) {
-		sii->has_dc = 1;
-		if (get_le16(p + 14) != 0 && sii->dc_assign_activate == 0) {
-			sii->dc_sync0_cycle_ns = get_le32(p);
-			sii->dc_assign_activate = get_le16(p + 14);
-		}
+	for (; bytes >= DC_MODE_BYTES && sii->dc_mode_count < SII_LIMIT_DC_MODES;
+	     bytes -= DC_MODE_BYTES, p += DC_MODE_BYTES) {
+		sii->dc_mode[sii->dc_mode_count++] = (struct sii_dc_mode){
+			.sync0_cycle_ns = get_le32(p),
+			.sync0_shift_ns = (int32_t)get_le32(p + 4),
+			.sync1_shift_ns = (int32_t)get_le32(p + 8),
+			.sync1_factor = (int16_t)get_le16(p + 12),
+			.assign_activate = get_le16(p + 14),
+			.sync0_factor = (int16_t)get_le16(p + 16),
+			.name = p[18],
+		};
 	}
 }
 
@@ -217,11 +246,11 @@ static int parse_category(uint16_t type, const uint8_t *p, size_t bytes, struct 
 static void parse_words(const uint8_t *image, struct sii *sii)
 {
 	sii->pdi_control = get_le16(image);
-	sii->alias = get_le16(image + 8);
-	sii->vendor = get_le32(image + 0x10);
-	sii->product = get_le32(image + 0x14);
-	sii->revision = get_le32(image + 0x18);
-	sii->serial = get_le32(image + 0x1c);
+	sii->alias = get_le16(image + SII_ALIAS_BYTE);
+	sii->vendor = get_le32(image + SII_VENDOR_BYTE);
+	sii->product = get_le32(image + SII_PRODUCT_BYTE);
+	sii->revision = get_le32(image + SII_REVISION_BYTE);
+	sii->serial = get_le32(image + SII_SERIAL_BYTE);
 	sii->boot_out_start = get_le16(image + 0x28);
 	sii->boot_out_len = get_le16(image + 0x2a);
 	sii->boot_in_start = get_le16(image + 0x2c);
@@ -231,7 +260,7 @@ static void parse_words(const uint8_t *image, struct sii *sii)
 	sii->mailbox_in_start = get_le16(image + 0x34);
 	sii->mailbox_in_len = get_le16(image + 0x36);
 	sii->mailbox_protocols = get_le16(image + 0x38);
-	sii->size_bytes = ((uint32_t)get_le16(image + 0x7c) + 1) * 128;
+	sii->size_bytes = ((uint32_t)get_le16(image + SII_SIZE_BYTE) + 1) * KBIT_BYTES;
 }
 
 int sii_parse(const uint8_t *image, size_t image_bytes, struct sii *ret, char *error,

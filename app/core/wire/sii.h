@@ -22,11 +22,21 @@ enum sii_category {
 };
 
 enum sii_limits {
-	SII_CATEGORIES_BYTE = 0x80, /* offset of the first category header */
+	SII_ALIAS_BYTE = 0x08,
+	SII_CHECKSUM_BYTE = 0x0e, /* word 7, low byte */
+	SII_VENDOR_BYTE = 0x10,
+	SII_PRODUCT_BYTE = 0x14,
+	SII_REVISION_BYTE = 0x18,
+	SII_SERIAL_BYTE = 0x1c,
+	SII_SIZE_BYTE = 0x7c,
+	SII_CATEGORIES_BYTE = 0x80,   /* offset of the first category header */
+	SII_UNSTATED_BYTES = 4096,    /* read where the size word gives no size */
+	SII_LIMIT_BYTES = 512 * 1024, /* the largest EEPROM that an ESC addresses: 4 Mbit */
 	SII_LIMIT_SM = 16,
 	SII_LIMIT_FMMU = 16,
 	SII_LIMIT_PDO = 128,
 	SII_LIMIT_ENTRIES = 1024,
+	SII_LIMIT_DC_MODES = 8,
 	SII_NAME_BYTES = 64,
 };
 
@@ -70,6 +80,20 @@ struct sii_pdo {
 	uint32_t bits;
 };
 
+/*
+ * An operation mode of the DC category (ETG.2010 table 16). The first one is the default of the
+ * vendor's description.
+ */
+struct sii_dc_mode {
+	uint32_t sync0_cycle_ns; /* 0: from the master's cycle, by sync0_factor */
+	int32_t sync0_shift_ns;
+	int32_t sync1_shift_ns;
+	int16_t sync1_factor;     /* SYNC1 cycle in SYNC0 cycles; 0: after each SYNC0 */
+	uint16_t assign_activate; /* 0x0980 in the low byte, 0x0981 in the high byte */
+	int16_t sync0_factor;     /* > 0: times the master's cycle; < 0: a fraction of it */
+	uint8_t name;             /* string number */
+};
+
 /* All of an image that anybody here needs. */
 struct sii {
 	uint16_t pdi_control;
@@ -90,12 +114,15 @@ struct sii {
 	uint16_t boot_in_len;
 	uint32_t size_bytes;
 	uint8_t coe_details;
+	uint8_t foe_details;
+	uint8_t eoe_details;
+	uint8_t soe_channels;
+	int16_t ebus_ma;
 	uint8_t general_flags; /* enum sii_general_flag */
 	uint8_t group_name;    /* string numbers */
 	uint8_t order_name;
 	uint8_t device_name;
 	uint8_t has_general;
-	uint8_t has_dc;
 	struct sii_sm sm[SII_LIMIT_SM];
 	size_t sm_count;
 	uint8_t fmmu[SII_LIMIT_FMMU]; /* 1 outputs, 2 inputs, 3 mailbox state */
@@ -104,8 +131,8 @@ struct sii {
 	size_t pdo_count;
 	struct sii_entry entry[SII_LIMIT_ENTRIES];
 	size_t entry_count;
-	uint16_t dc_assign_activate; /* of the first DC mode that activates something */
-	uint32_t dc_sync0_cycle_ns;  /* 0: the master's cycle */
+	struct sii_dc_mode dc_mode[SII_LIMIT_DC_MODES];
+	size_t dc_mode_count;
 };
 
 /**
@@ -129,5 +156,14 @@ void sii_text(const uint8_t *image, size_t image_bytes, unsigned number,
 
 /** CRC-8 over words 0 to 6, which is stored in word 7 (ETG.2010). */
 uint8_t sii_checksum(const uint8_t *image);
+/** 1 if word 7 is that checksum, or 0x88a4, which switches the check off in the ESC (ET1100 data
+ * sheet). */
+int sii_is_checksum_right(const uint8_t *image);
+
+/**
+ * Bytes that the size word (0x3e) of the header @image gives to the EEPROM. SII_UNSTATED_BYTES
+ * where it is blank or leaves no room for categories; at most SII_LIMIT_BYTES.
+ */
+size_t sii_stated_bytes(const uint8_t *image);
 
 #endif

@@ -19,8 +19,6 @@ static void bind_soem(struct bus *bus)
 		.maxslave = LIMIT_SLAVES + 1,
 		.grouplist = bus->group,
 		.maxgroup = EC_MAXGROUP,
-		.esibuf = bus->sii_cache,
-		.esimap = bus->sii_map,
 		.elist = &bus->errors,
 		.idxstack = &bus->index_stack,
 		.ecaterror = &bus->has_error,
@@ -127,6 +125,7 @@ void bus_destroy(struct bus *bus)
 {
 	if (bus != NULL) {
 		mailbox_destroy(bus->mailbox);
+		bus_sii_free(bus);
 		free(bus);
 	}
 }

@@ -31,7 +31,6 @@ enum {
 	PICCOLO_SUBINDEX_COUNTER = 2,
 	PICCOLO_OBJECT_MODE = 0x8000,
 	PICCOLO_SUBINDEX_MODE = 1,
-	SII_IMAGE_BYTES = 4096,
 };
 
 /* Way of a slave back to the bus (bus/recover.c); one step a call. */
@@ -46,6 +45,13 @@ enum recovery_step {
 	RECOVERY_SYNC0,
 	RECOVERY_SAFEOP,
 	RECOVERY_OP,
+};
+
+/* 0x0981 */
+enum sync_activation {
+	SYNC_ACTIVATE_UNIT = 0x01,
+	SYNC_ACTIVATE_SYNC0 = 0x02,
+	SYNC_ACTIVATE_SYNC1 = 0x04,
 };
 
 /* Contents of 0x1C32 or 0x1C33; 0: not given. */
@@ -72,14 +78,17 @@ struct bus_slave {
 	uint8_t is_clock_64bit;
 	uint8_t is_lrw_forbidden;
 	uint16_t assign_activate; /* low byte 0x0980, high byte 0x0981; 0: no SYNC0 */
-	int64_t sync0_shift_ns;
-	size_t pdo_first; /* its entries in bus->pdo */
+	int64_t sync0_cycle_ns;   /* multiple or fraction of the master's */
+	int64_t sync0_shift_ns;   /* of its mode and as configured */
+	uint32_t sync1_after_ns;  /* 0x09a4 */
+	size_t pdo_first;         /* its entries in bus->pdo */
 	size_t pdo_count;
 	enum config_mode mode;
 	struct sync_limits output_sync;
 	struct sync_limits input_sync;
-	uint8_t *sii; /* in bus->sii; shared by slaves of one type and revision */
+	uint8_t *sii; /* its own, on the heap: bus/sii_read.c */
 	size_t sii_len;
+	uint16_t eeprom_status; /* 0x0502 when it was read */
 	/* bus/watch.c */
 	uint16_t al_status; /* as last seen */
 	uint16_t al_code;
@@ -126,7 +135,6 @@ struct bus {
 	struct bus_slave slave[LIMIT_SLAVES];
 	size_t slave_count;
 	struct slave_info info[LIMIT_SLAVES]; /* what bus_slaves() shows */
-	uint8_t sii[LIMIT_SLAVES][SII_IMAGE_BYTES];
 	struct pdo_entry pdo[PDO_LIMIT];
 	size_t pdo_count;
 	struct channel channel[LIMIT_CHANNELS];
@@ -147,8 +155,6 @@ struct bus {
 	ec_slavet soem_slave[LIMIT_SLAVES + 1];
 	int soem_slave_count;
 	ec_groupt group[EC_MAXGROUP];
-	uint8_t sii_cache[(EC_MAXEEPBUF) + 8]; /* SOEM stores the last 8 bytes past the end */
-	uint32_t sii_map[EC_MAXEEPBITMAP + 1];
 	ec_eringt errors;
 	ec_idxstackT index_stack;
 	boolean has_error;
@@ -188,13 +194,35 @@ int bus_fail(struct bus *bus, int code, const char *format, ...)
 int bus_fail_slave(struct bus *bus, size_t pos, int code, const char *format, ...)
 	__attribute__((format(printf, 4, 5)));
 
+/* --- enumerate.c --- */
+
+/**
+ * Count the slaves; all in INIT with defaults and station addresses; identity, alias and ports in
+ * bus->slave. Returns how many, 0 for none, -E2BIG, -EIO with a line, or -errno of the line.
+ */
+int bus_enumerate(struct bus *bus);
+
 /* --- sii_read.c --- */
 
-/** Read the SII of a slave to its sii, sii_len: the categories that matter, the rest zero. 0 or
- * -EIO. */
-int bus_sii_load(struct bus *bus, size_t pos);
-/** Its mapped entries, outputs first; how many, or -errno with a line. */
+/**
+ * Read the SII of all slaves, at the same time, to their sii, sii_len, eeprom_status: the
+ * categories that matter, the rest zero. 0 or -errno with a line. Where words 0 to 63 are blank or
+ * damaged, only these.
+ */
+int bus_sii_load(struct bus *bus);
+void bus_sii_free(struct bus *bus);
+
+/* --- sii_entries.c --- */
+
+/** Mapped entries of a slave by its SII, outputs first; how many, or -errno with a line. */
 int bus_sii_entries(struct bus *bus, size_t pos, struct pdo_entry *ret, size_t capacity);
+
+/* --- soem_slave.c --- */
+
+/** SOEM's entry of a slave from bus->parsed. */
+void bus_soem_describe(struct bus *bus, size_t pos);
+/** Program the mailbox SyncManagers of all slaves and give them their EEPROMs. */
+int bus_mailboxes_open(struct bus *bus);
 
 /* --- scan.c --- */
 
@@ -238,6 +266,14 @@ int bus_startup_all(struct bus *bus);
 /** Set SOEM's SyncManagers and bit counts from a slave's entries; *total_bytes counts the image. 0
  * or -errno with a line. */
 int bus_map_sm(struct bus *bus, size_t pos, uint32_t *total_bytes);
+
+/* --- sync_mode.c --- */
+
+/**
+ * AssignActivate word, SYNC cycles and shifts of a slave from its settings and bus->parsed.
+ * @damage: why the SII could not be parsed to its end, "". 0 or -errno with a line.
+ */
+int bus_sync_mode(struct bus *bus, size_t pos, const char *damage);
 
 /* --- sync_limits.c --- */
 

@@ -47,7 +47,7 @@ struct eeprom_command {
 	/* eeprom.c */
 	mono_t give_up;
 	uint8_t step;
-	uint8_t owner[2];
+	int problem; /* -errno that the end of the time would give now */
 	uint8_t frame[16];
 };
 

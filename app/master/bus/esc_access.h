@@ -18,6 +18,7 @@
 #include "bus/bus.h"
 #include "bus/eeprom.h"
 #include "wire/esc_reg.h"
+#include "wire/sii.h"
 
 enum { ESC_ACCESS_BYTES = 256 }; /* of one register access */
 
@@ -91,10 +92,7 @@ int esc_errors_reset(struct bus *bus, size_t pos, char *error);
 
 /* --- SII (sii_job.c) --- */
 
-enum {
-	SII_LIMIT_BYTES = 512 * 1024, /* the largest EEPROM that an ESC addresses: 4 Mbit */
-	SII_HEADER_WORDS = 8,
-};
+enum { SII_HEADER_WORDS = 8 };
 
 enum sii_job_kind { SII_JOB_READ, SII_JOB_WRITE, SII_JOB_ALIAS };
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Finds the slaves. SOEM does the work; around it: stop what an earlier master left running (T09),
- * notice blank and unreadable EEPROMs before anything is built on them (T31), bring all to PRE-OP,
- * name them.
+ * Finds the slaves: stops what an earlier master left running (T09), reads every slave's own
+ * description, notices blank and unreadable EEPROMs before anything is built on them (T31), names
+ * them, brings all to PRE-OP.
  */
 #include <errno.h>
 #include <stdio.h>
@@ -11,16 +11,9 @@
 #include "base/bytes.h"
 #include "bus/bus_internal.h"
 #include "bus/compare.h"
+#include "bus/eeprom.h"
 #include "bus/names.h"
 #include "bus/registers.h"
-
-enum {
-	EEPROM_CHECKSUM_ERROR = 1 << 11,
-	EEPROM_NOT_LOADED = 1 << 12,
-	EEPROM_NO_ANSWER = 1 << 13,
-	ASSIGN_DC = 0x0300,
-	ASSIGN_ONE_SHOT = 0x0001, /* 0x0980 bit 0: the SYNC unit is the slave's own */
-};
 
 /* SYNC pulses of a master that was killed; a slave whose SYNC unit its PDI owns is freed in
  * free_sync(). */
@@ -65,50 +58,51 @@ static int find_slaves(struct bus *bus)
 
 	for (;;) {
 		silence(bus);
-		found = ecx_config_init(&bus->context, FALSE);
-		if (found > 0 || found == EC_SLAVECOUNTEXCEEDED || bus_now(bus).ns >= give_up.ns) {
+		found = bus_enumerate(bus);
+		if (found > 0 || found == -E2BIG || bus_now(bus).ns >= give_up.ns) {
 			break;
 		}
 		if (line_sleep(bus->line, (span_t){ 100 * NS_PER_MS }) < 0) {
 			return bus_fail(bus, -ECANCELED, "cancelled during the scan");
 		}
 	}
-	if (found == EC_SLAVECOUNTEXCEEDED) {
+	if (found == -E2BIG) {
 		return bus_fail(bus, -E2BIG, "more slaves on the bus than LIMIT_SLAVES (%d)",
 				LIMIT_SLAVES);
+	}
+	if (found == -EIO) {
+		return found;
 	}
 	if (found <= 0) {
 		return bus_fail(bus, -ENODEV, "no slave answers on %s: %s",
 				bus->cfg->interface[0] != '\0' ? bus->cfg->interface : "the line",
 				why_none(bus->line, line_unchanged(bus->line) > unchanged));
 	}
-	bus->slave_count = (size_t)found;
 	return 0;
 }
 
 static int check_eeprom(struct bus *bus, size_t pos)
 {
-	const struct slave_info *info = &bus->slave[pos].info;
-	uint8_t status[2] = { 0 };
+	const struct bus_slave *sl = &bus->slave[pos];
+	const uint8_t *sii = sl->sii;
+	uint32_t vendor = get_le32(sii + SII_VENDOR_BYTE);
+	int is_refused = (sl->eeprom_status & (EEPROM_CHECKSUM_ERROR | EEPROM_NOT_LOADED)) != 0;
 
-	register_read(bus, pos, ESC_REG_EEPROM_CONTROL, status, sizeof(status));
-	if ((get_le16(status) & EEPROM_NO_ANSWER) != 0) {
-		return bus_fail_slave(bus, pos, -EPROTO,
-				      "its EEPROM does not answer (0x0502 is 0x%04x)",
-				      get_le16(status));
-	}
-	if (info->vendor == 0 || info->vendor == UINT32_MAX) {
+	if (vendor == 0 || vendor == UINT32_MAX) {
 		return bus_fail_slave(
 			bus, pos, -EPROTO,
 			"its EEPROM is blank or unreadable (vendor 0x%08x, 0x0502 is 0x%04x): "
 			"write its SII first",
-			info->vendor, get_le16(status));
+			vendor, sl->eeprom_status);
 	}
-	if ((get_le16(status) & (EEPROM_CHECKSUM_ERROR | EEPROM_NOT_LOADED)) != 0) {
+	/* A controller that emulates its EEPROM need not keep a checksum. */
+	if (is_refused ||
+	    (!sii_is_checksum_right(sii) && (sl->eeprom_status & EEPROM_EMULATED) == 0)) {
 		return bus_fail_slave(
 			bus, pos, -EPROTO,
-			"its EEPROM is damaged: checksum of words 0 to 7 (0x0502 is 0x%04x)",
-			get_le16(status));
+			"its EEPROM is damaged: checksum of words 0 to 7 (0x%02x, expected 0x%02x, "
+			"0x0502 is 0x%04x): write its SII again",
+			sii[SII_CHECKSUM_BYTE], sii_checksum(sii), sl->eeprom_status);
 	}
 	return 0;
 }
@@ -123,41 +117,15 @@ static void name_device(struct bus *bus, size_t pos)
 	}
 }
 
-/* As configured; else by the kind of slave or its SII; else SYNC0 for every slave with a clock.
- */
-static uint16_t choose_assign_activate(const struct bus *bus, size_t pos)
+static void take_identity(struct bus *bus, size_t pos)
 {
-	const struct config_slave *want =
-		pos < bus->cfg->slave_count ? &bus->cfg->slave[pos] : NULL;
-	const struct bus_slave *sl = &bus->slave[pos];
+	struct slave_info *info = &bus->slave[pos].info;
+	const uint8_t *sii = bus->slave[pos].sii;
 
-	if (want != NULL && want->assign_activate != 0) {
-		return (uint16_t)want->assign_activate;
-	}
-	if (is_piccolo(&sl->info)) {
-		return sl->mode == CONFIG_MODE_ONESHOT ? ASSIGN_ONE_SHOT : ASSIGN_DC;
-	}
-	if (bus->parsed.has_dc) {
-		return bus->parsed.dc_assign_activate;
-	}
-	return ASSIGN_DC;
-}
-
-static void take_over(struct bus *bus, size_t pos)
-{
-	const ec_slavet *soem = &bus->soem_slave[soem_index(pos)];
-	struct bus_slave *sl = &bus->slave[pos];
-
-	memset(sl, 0, sizeof(*sl));
-	sl->info.slave_pos = (uint16_t)pos;
-	sl->info.station_addr = soem->configadr;
-	sl->info.alias = soem->aliasadr;
-	sl->info.vendor = soem->eep_man;
-	sl->info.product = soem->eep_id;
-	sl->info.revision = soem->eep_rev;
-	sl->info.serial = soem->eep_sn;
-	sl->info.counter_channel = -1;
-	sl->clock.ports = soem->activeports;
+	info->vendor = get_le32(sii + SII_VENDOR_BYTE);
+	info->product = get_le32(sii + SII_PRODUCT_BYTE);
+	info->revision = get_le32(sii + SII_REVISION_BYTE);
+	info->serial = get_le32(sii + SII_SERIAL_BYTE);
 }
 
 static void take_clock(struct bus *bus, size_t pos)
@@ -198,28 +166,25 @@ static void take_settings(struct bus *bus, size_t pos)
 	snprintf(sl->info.name, sizeof(sl->info.name), "%s", want->name);
 }
 
+/* The EEPROM is loaded: only now does the chip have its clock. */
 static int describe(struct bus *bus, size_t pos)
 {
 	struct bus_slave *sl = &bus->slave[pos];
-	char why[128];
-	int r;
+	char damage[128] = "";
 
-	take_settings(bus, pos);
-	r = bus_sii_load(bus, pos);
-	if (r < 0) {
-		return bus_fail_slave(bus, pos, r, "its EEPROM cannot be read");
-	}
-	/* Damage is reported when the mapping is read, where it matters. */
-	sii_parse(sl->sii, sl->sii_len, &bus->parsed, why, sizeof(why));
+	/* Damage is reported where what it hides is needed: SYNC mode, mapping. */
+	sii_parse(sl->sii, sl->sii_len, &bus->parsed, damage, sizeof(damage));
+	free_sync(bus, pos);
+	take_clock(bus, pos);
 	name_device(bus, pos);
 	sl->is_lrw_forbidden = (sl->esc_features & ESC_FEATURE_NO_LRW) != 0 ||
 			       (bus->parsed.general_flags & SII_GENERAL_NOT_LRW) != 0;
-	sl->assign_activate = choose_assign_activate(bus, pos);
 	if (sl->info.name[0] == '\0') {
 		name_slave(sl->info.device, is_piccolo(&sl->info), pos, sl->info.name,
 			   sizeof(sl->info.name));
 	}
-	return 0;
+	bus_soem_describe(bus, pos);
+	return bus_sync_mode(bus, pos, damage);
 }
 
 static int check_names(struct bus *bus)
@@ -296,6 +261,27 @@ static void bind_slaves(struct bus *bus)
 	note_absent(bus, config);
 }
 
+static int describe_all(struct bus *bus)
+{
+	int r = bus_sii_load(bus);
+
+	for (size_t i = 0; i < bus->slave_count && r >= 0; i++) {
+		r = check_eeprom(bus, i);
+		if (r >= 0) {
+			take_identity(bus, i);
+		}
+	}
+	if (r < 0) {
+		return r;
+	}
+	bind_slaves(bus);
+	for (size_t i = 0; i < bus->slave_count && r >= 0; i++) {
+		take_settings(bus, i);
+		r = describe(bus, i);
+	}
+	return r < 0 ? r : check_names(bus);
+}
+
 int bus_scan(struct bus *bus, char *error)
 {
 	int r;
@@ -309,24 +295,14 @@ int bus_scan(struct bus *bus, char *error)
 	if (r < 0) {
 		return r;
 	}
-	for (size_t i = 0; i < bus->slave_count; i++) {
-		take_over(bus, i);
-	}
-	bind_slaves(bus);
-	for (size_t i = 0; i < bus->slave_count && r >= 0; i++) {
-		free_sync(bus, i);
-		take_clock(bus, i);
-		r = check_eeprom(bus, i);
-		if (r >= 0) {
-			r = describe(bus, i);
-		}
-	}
-	if (r >= 0) {
-		r = check_names(bus);
-	}
+	r = describe_all(bus);
 	bus_publish_slaves(bus);
 	if (r < 0) {
 		return r;
+	}
+	r = bus_mailboxes_open(bus);
+	if (r < 0) {
+		return bus_fail(bus, r, "the mailboxes cannot be set up: frames are lost");
 	}
 	r = bus_request_state(bus, AL_PREOP, (span_t){ bus->cfg->bus_scan_timeout_ns }, error);
 	for (size_t i = 0; i < bus->slave_count && r >= 0; i++) {

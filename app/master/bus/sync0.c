@@ -15,14 +15,13 @@
 enum {
 	TRIES = 3,
 	FRAMES_PER_SLAVE = 8, /* service frames to program one slave: a cycle each while riding */
-	ACTIVATION_SYNC0 = 0x02,
 	SYNC_UNIT_PDI = 0x01,
 	STATUS_PENDING = 0x01,     /* 0x0984: the first SYNC0 has not fired */
 	STATUS_START_WRONG = 0x04, /* 0x0984: the start time is not in the near future */
-	SYNC1_CYCLE_NONE = 0,
 };
 
 #define MARGIN_NS (100 * NS_PER_MS)
+#define NONSENSE_NS NS_PER_S /* no clock is that far off within one start */
 
 static int64_t period_ns(const struct bus *bus)
 {
@@ -40,7 +39,7 @@ static int has_sync0(const struct bus *bus, size_t pos)
 
 	return bus->plan.dc_reference != 0 && sl->clock.kind == CLOCK_SYSTEM_TIME &&
 	       sl->info.input_bits + sl->info.output_bits > 0 &&
-	       (activation_of(sl) & ACTIVATION_SYNC0) != 0;
+	       (activation_of(sl) & SYNC_ACTIVATE_SYNC0) != 0;
 }
 
 /* The SYNC unit belongs to the slave's own controller: one-shot mode. */
@@ -54,7 +53,16 @@ static int is_pdi_owned(const struct bus *bus, size_t pos)
 
 static int64_t shift_of(const struct bus *bus, size_t pos)
 {
-	return mod_floor(bus->slave[pos].sync0_shift_ns, period_ns(bus));
+	return mod_floor(bus->slave[pos].sync0_shift_ns, bus->slave[pos].sync0_cycle_ns);
+}
+
+/* The first SYNC0 of a slave at or after the common @start_ns: a multiple of its own cycle, and its
+ * shift. */
+static int64_t first_of(const struct bus *bus, size_t pos, int64_t start_ns)
+{
+	int64_t cycle_ns = bus->slave[pos].sync0_cycle_ns;
+
+	return start_ns + mod_floor(-start_ns, cycle_ns) + shift_of(bus, pos);
 }
 
 static int64_t next_start(const struct bus *bus, int64_t dc_now_ns, size_t slaves)
@@ -76,12 +84,14 @@ static int program(struct bus *bus, size_t pos, int64_t start_ns)
 	uint8_t on = activation_of(sl);
 	int r = register_write(bus, pos, ESC_REG_DC_ACTIVATION, &off, 1);
 
-	put_le64(start, (uint64_t)(start_ns + shift_of(bus, pos)));
-	put_le32(cycle, (uint32_t)period_ns(bus));
-	put_le32(cycle + 4, SYNC1_CYCLE_NONE);
+	put_le64(start, (uint64_t)first_of(bus, pos, start_ns));
+	put_le32(cycle, (uint32_t)sl->sync0_cycle_ns);
+	put_le32(cycle + 4, sl->sync1_after_ns);
 	/* T12: 0x0980 is not written where it has the required value. */
-	if (r >= 0 && register_read(bus, pos, ESC_REG_DC_CYCLIC_CONTROL, &owner, 1) == 0 &&
-	    owner != control) {
+	if (r >= 0) {
+		r = register_read(bus, pos, ESC_REG_DC_CYCLIC_CONTROL, &owner, 1);
+	}
+	if (r >= 0 && owner != control) {
 		r = register_write(bus, pos, ESC_REG_DC_CYCLIC_CONTROL, &control, 1);
 	}
 	if (r >= 0) {
@@ -97,17 +107,18 @@ static int program(struct bus *bus, size_t pos, int64_t start_ns)
 	return r;
 }
 
-/* The next SYNC0 must be within one period (plus a margin), on the grid. */
+/* The next SYNC0 must be within one of its cycles (plus a margin), on the grid. */
 static int is_next_plausible(const struct bus *bus, size_t pos, int64_t next_ns, int64_t now_ns)
 {
-	int64_t off_ns = fold_ns(next_ns - shift_of(bus, pos), period_ns(bus));
+	int64_t cycle_ns = bus->slave[pos].sync0_cycle_ns;
+	int64_t off_ns = fold_ns(next_ns - shift_of(bus, pos), cycle_ns);
 	int64_t ahead_ns = next_ns - now_ns;
 
 	if (!bus->slave[pos].is_clock_64bit) {
 		ahead_ns = (int32_t)(uint32_t)ahead_ns;
 		off_ns = 0; /* 2^32 is no multiple of the period */
 	}
-	return off_ns == 0 && ahead_ns > -NS_PER_US && ahead_ns <= period_ns(bus) + NS_PER_US;
+	return off_ns == 0 && ahead_ns > -NS_PER_US && ahead_ns <= cycle_ns + NS_PER_US;
 }
 
 int bus_sync0_is_running(struct bus *bus, size_t pos)
@@ -118,7 +129,7 @@ int bus_sync0_is_running(struct bus *bus, size_t pos)
 	uint8_t now[8] = { 0 };
 	uint8_t activation = 0;
 	uint8_t status = 0;
-	uint8_t cycle[4] = { 0 };
+	uint8_t cycle[8] = { 0 };
 	uint16_t station = sl->info.station_addr;
 	struct access access[] = {
 		{ .cmd = ECAT_CMD_FPRD,
@@ -139,7 +150,7 @@ int bus_sync0_is_running(struct bus *bus, size_t pos)
 		{ .cmd = ECAT_CMD_FPRD,
 		  .adp = station,
 		  .reg = ESC_REG_DC_SYNC0_CYCLE,
-		  .len = 4,
+		  .len = sizeof(cycle),
 		  .data = cycle },
 		/* Not every controller has it. */
 		{ .cmd = ECAT_CMD_FPRD,
@@ -157,7 +168,8 @@ int bus_sync0_is_running(struct bus *bus, size_t pos)
 			return -ENXIO;
 		}
 	}
-	return activation == activation_of(sl) && get_le32(cycle) == (uint32_t)period_ns(bus) &&
+	return activation == activation_of(sl) && get_le32(cycle) == (uint32_t)sl->sync0_cycle_ns &&
+	       get_le32(cycle + 4) == sl->sync1_after_ns &&
 	       (status & (STATUS_PENDING | STATUS_START_WRONG)) == 0 &&
 	       is_next_plausible(bus, pos, (int64_t)get_le64(next), (int64_t)get_le64(now));
 }
@@ -175,19 +187,57 @@ static int program_all(struct bus *bus, const uint8_t *wanted, int64_t start_ns)
 	return 0;
 }
 
-static int wait_past(struct bus *bus, int64_t start_ns)
+/* The end of the first cycle of the slowest slave in @wanted. */
+static int64_t end_of_start(const struct bus *bus, const uint8_t *wanted, int64_t start_ns)
+{
+	int64_t end_ns = start_ns + 2 * period_ns(bus);
+
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		int64_t past_ns = first_of(bus, i, start_ns) + period_ns(bus);
+
+		if (wanted[i] && past_ns > end_ns) {
+			end_ns = past_ns;
+		}
+	}
+	return end_ns;
+}
+
+/* The reference clock as it was last known; it goes on at the host's rate, about. */
+struct known_time {
+	int64_t dc_ns;
+	mono_t at;
+};
+
+static int64_t estimate_ns(const struct bus *bus, struct known_time known)
+{
+	return known.dc_ns + mono_sub(bus_now(bus), known.at).ns;
+}
+
+/*
+ * Wait until the reference clock has passed @end_ns. A reading that is far behind what the host's
+ * clock says is an error: nothing could bound the wait. One that is ahead is found by verify_all().
+ */
+static int wait_past(struct bus *bus, struct known_time known, int64_t end_ns)
 {
 	for (;;) {
+		int64_t expected_ns;
 		int64_t now_ns;
 
 		if (bus_reference_time(bus, &now_ns) < 0) {
 			return bus_fail_slave(bus, (size_t)bus->reference, -EIO,
 					      "the reference clock does not answer");
 		}
-		if (now_ns > start_ns + 2 * period_ns(bus)) {
+		expected_ns = estimate_ns(bus, known);
+		if (now_ns < expected_ns - NONSENSE_NS) {
+			return bus_fail_slave(bus, (size_t)bus->reference, -EIO,
+					      "the reference clock reads %" PRId64
+					      " ns, expected %" PRId64 " ns or later",
+					      now_ns, expected_ns);
+		}
+		if (now_ns > end_ns) {
 			return 0;
 		}
-		if (line_sleep(bus->line, (span_t){ start_ns + 3 * period_ns(bus) - now_ns }) < 0) {
+		if (line_sleep(bus->line, (span_t){ end_ns + period_ns(bus) - now_ns }) < 0) {
 			return bus_fail(bus, -ECANCELED, "cancelled while SYNC0 started");
 		}
 	}
@@ -241,6 +291,7 @@ static int give_to_pdi(struct bus *bus)
 int bus_sync0_start(struct bus *bus, int64_t dc_now_ns, char *error)
 {
 	uint8_t wanted[LIMIT_SLAVES] = { 0 };
+	struct known_time known = { dc_now_ns, bus_now(bus) };
 	size_t left = 0;
 	int r;
 
@@ -251,15 +302,15 @@ int bus_sync0_start(struct bus *bus, int64_t dc_now_ns, char *error)
 	}
 	r = bus->plan.dc_reference != 0 ? give_to_pdi(bus) : 0;
 	for (int i = 0; i < TRIES && left > 0 && r >= 0; i++) {
-		int64_t start_ns = next_start(bus, dc_now_ns, left);
+		int64_t start_ns = next_start(bus, estimate_ns(bus, known), left);
 
 		r = program_all(bus, wanted, start_ns);
 		if (r >= 0) {
-			r = wait_past(bus, start_ns);
+			r = wait_past(bus, known, end_of_start(bus, wanted, start_ns));
 		}
 		if (r >= 0) {
 			left = (size_t)verify_all(bus, wanted);
-			dc_now_ns = bus->reference_ns;
+			known = (struct known_time){ bus->reference_ns, bus->reference_at };
 			bus->sync0_start_ns = start_ns;
 		}
 	}

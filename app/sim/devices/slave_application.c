@@ -6,6 +6,7 @@
 
 #include "base/bytes.h"
 #include "devices/aoe_server.h"
+#include "devices/eeprom_emulation.h"
 #include "devices/voe_server.h"
 #include "wire/al.h"
 #include "wire/esc_reg.h"
@@ -232,6 +233,7 @@ void slave_application_run(struct slave_application *app, int64_t t_ns)
 {
 	uint8_t state;
 
+	eeprom_emulation_run(app->esc, t_ns);
 	if (app->esc->al_event & ESC_AL_EVENT_CONTROL) {
 		handle_control(app, t_ns);
 	}

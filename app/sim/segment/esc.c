@@ -19,6 +19,7 @@ const struct esc_features esc_et1100 = {
 	.features = 0x00fc,
 	.dc = ESC_DC_64,
 	.has_sync_unit = 1,
+	.is_dc_by_eeprom = 1,
 	.eeprom_bytes_a_read = 8,
 	.receive_time_at_power_on = ESC_RECEIVE_TIME_UNSET,
 };

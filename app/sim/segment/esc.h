@@ -40,6 +40,7 @@ struct esc_features {
 	int has_open_bits;   /* SyncManager status bits 6 and 7: a buffer is open */
 	unsigned eeprom_bytes_a_read; /* 4 or 8 */
 	int has_long_eeprom;          /* two address bytes: 0x0502 bit 7 */
+	int is_eeprom_emulated;       /* the PDI answers: 0x0502 bit 5 */
 	uint16_t eeprom_status;       /* bits of 0x0502 that read 1 and no data sheet names */
 	/* What 0x0900 to 0x090f hold before a port has seen a frame. */
 	uint32_t receive_time_at_power_on[4];
@@ -61,6 +62,7 @@ enum esc_al_event {
 	ESC_AL_EVENT_SYNC0 = 1u << 2,
 	ESC_AL_EVENT_SYNC1 = 1u << 3,
 	ESC_AL_EVENT_SM_ACTIVATION = 1u << 4,
+	ESC_AL_EVENT_EEPROM = 1u << 5, /* emulation: a command waits for the PDI */
 	ESC_AL_EVENT_WATCHDOG = 1u << 6,
 	ESC_AL_EVENT_SM0 = 1u << 8,
 };
@@ -193,7 +195,12 @@ struct esc {
 	int was_eeprom_loaded;        /* the alias is taken once only */
 	int64_t eeprom_busy_until_ns; /* 0: idle */
 	uint16_t eeprom_command;
-	int64_t watchdog_deadline_ns;     /* process data; INT64_MAX: not running */
+	int64_t eeprom_writing_until_ns; /* the memory chip does not acknowledge before that */
+	int64_t eeprom_slow_ns;          /* a fault: each command takes this much longer */
+	unsigned eeprom_writes_left;     /* a fault: the last of so many words is torn; 0: none */
+	uint8_t is_eeprom_cut;
+	uint8_t is_eeprom_deaf;       /* the command came while the memory chip programs a word */
+	int64_t watchdog_deadline_ns; /* process data; INT64_MAX: not running */
 	int64_t pdi_watchdog_deadline_ns; /* INT64_MAX: not running, or expired */
 	uint8_t is_pdi_expired;
 	int64_t mailbox_stuck_until_ns; /* a fault: the PDI's mailbox writes are lost */
@@ -228,6 +235,10 @@ void esc_clock_start(struct esc *esc, int64_t t_ns, uint64_t local_ns, double pp
 /** Change the crystal's rate from @t_ns on. */
 void esc_clock_drift(struct esc *esc, int64_t t_ns, double ppm);
 void esc_sync0_to(struct esc *esc, esc_sync0_sink sink, void *ctx);
+
+/** Cut the EEPROM's power in its @words-th next write of a word (1: the next one): that word is
+ * torn and later ones are lost, until the next power-on. */
+void esc_eeprom_cut(struct esc *esc, unsigned words);
 
 /** A new frame starts here; call before its first datagram. */
 void esc_frame_begin(struct esc *esc);

@@ -88,6 +88,9 @@ void esc_eeprom_owner(struct esc *esc, enum esc_side side);
 int esc_eeprom_is_free(const struct esc *esc, enum esc_side side);
 void esc_eeprom_command(struct esc *esc, int64_t t_ns, uint16_t control);
 void esc_eeprom_done(struct esc *esc);
+/** Emulation: the PDI wrote 0x0502, which ends the command. */
+void esc_eeprom_answered(struct esc *esc, int64_t t_ns);
+int esc_eeprom_is_asked(const struct esc *esc);
 
 /* --- esc_watchdog.c --- */
 

@@ -76,7 +76,7 @@ void esc_pdi_read(struct esc *esc, int64_t t_ns, uint16_t addr, void *buf, size_
 static int is_writable(const struct esc *esc, unsigned addr)
 {
 	if (addr >= ESC_REG_EEPROM_CONTROL && addr < ESC_REG_EEPROM_DATA + 8) {
-		return esc_eeprom_is_free(esc, ESC_PDI);
+		return esc_eeprom_is_free(esc, ESC_PDI) || esc_eeprom_is_asked(esc);
 	}
 	if (addr > ESC_REG_DC_CYCLIC_CONTROL && addr < ESC_REG_DC_SYNC1_CYCLE + 4) {
 		return esc->features.has_sync_unit &&
@@ -191,8 +191,10 @@ void esc_pdi_write(struct esc *esc, int64_t t_ns, uint16_t addr, const void *buf
 	if (esc_touches(addr, len, ESC_REG_EEPROM_PDI_ACCESS, 1)) {
 		esc_eeprom_owner(esc, ESC_PDI);
 	}
-	if (esc_touches(addr, len, ESC_REG_EEPROM_CONTROL + 1, 1) &&
-	    esc_eeprom_is_free(esc, ESC_PDI)) {
+	if (esc_touches(addr, len, ESC_REG_EEPROM_CONTROL + 1, 1) && esc_eeprom_is_asked(esc)) {
+		esc_eeprom_answered(esc, t_ns);
+	} else if (esc_touches(addr, len, ESC_REG_EEPROM_CONTROL + 1, 1) &&
+		   esc_eeprom_is_free(esc, ESC_PDI)) {
 		esc_eeprom_command(esc, t_ns, get_le16(esc->reg + ESC_REG_EEPROM_CONTROL));
 	}
 }

@@ -55,8 +55,8 @@ static void print_row(const char *name, const uint8_t *image, size_t image_bytes
 	printf(" |");
 	print_mailbox(sii.mailbox_protocols);
 	printf(" | %u | %u |", assigned_bits(&sii, 1), assigned_bits(&sii, 0));
-	if (sii.dc_assign_activate != 0) {
-		printf(" 0x%04x", sii.dc_assign_activate);
+	for (size_t i = 0; i < sii.dc_mode_count; i++) {
+		printf("%s 0x%04x", i > 0 ? "," : "", sii.dc_mode[i].assign_activate);
 	}
 	puts(" |");
 }

@@ -239,12 +239,16 @@ TEST(bring_up, slave_that_announces_coe_answers_or_is_an_error)
 /* T14 */
 TEST(bring_up, slave_without_clock_between_two_with_clocks_is_no_obstacle)
 {
+	static const char *const settings[] = { "slaves[0].assign_activate=0x0300",
+						"slaves[1].name=none",
+						"slaves[2].assign_activate=0x0300", NULL };
 	struct bus_bench *b =
 		bench_create(&(struct bench_spec){ .sii = { "el1008", "el1008", "el1008" },
 						   .clockless = 1u << 1,
 						   .clocked = 1u << 0 | 1u << 2,
 						   .ppm = { 100, 0, -100 },
-						   .seed = 8 });
+						   .seed = 8,
+						   .settings = settings });
 	const struct slave_info *slaves;
 	size_t count;
 
@@ -258,6 +262,8 @@ TEST(bring_up, slave_without_clock_between_two_with_clocks_is_no_obstacle)
 	memset(edge_ns, 0, sizeof(edge_ns));
 	segment_sync0_to(b->segment, on_edge, NULL);
 	bench_run(b, 200);
+	CHECK(segment_esc(b->segment, 0)->sync.edges >= 200);
+	CHECK(segment_esc(b->segment, 2)->sync.edges >= 200);
 	CHECK(spread_max_ns < 100);
 	CHECK(b->last.dc_diff_ns < 100);
 	bench_destroy(b);

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "sim/bus/bus_bench.h"
 
+#include <errno.h>
+
 #include "base/bytes.h"
 #include "base/prng.h"
 #include "devices/catalogue.h"
@@ -46,6 +48,7 @@ static void make_segment(struct bus_bench *b, const struct bench_spec *spec)
 	static struct segment_slave_spec slaves[LIMIT_SLAVES];
 	static uint8_t sii[BENCH_SIIS][SEGMENT_SII_BYTES];
 	static struct esc_features clockless;
+	static struct esc_features clocked;
 	struct prng prng = { spec->seed };
 	size_t n = 0;
 
@@ -57,6 +60,19 @@ static void make_segment(struct bus_bench *b, const struct bench_spec *spec)
 
 		CHECK_EQ(catalogue_sii_slave(sii[i], len, (int)n, &slaves[n]), 0);
 	}
+	for (unsigned i = 0; i < BENCH_SIIS && spec->catalogue[i] != NULL; i++, n++) {
+		static struct slave_model model;
+
+		CHECK_EQ(catalogue_find(spec->catalogue[i], &model), 0);
+		CHECK_EQ(catalogue_slave(&model, (int)n, &slaves[n]), 0);
+	}
+	for (unsigned i = 0; i < BENCH_SIIS && spec->image[i].bytes != NULL; i++, n++) {
+		CHECK_EQ(catalogue_sii_slave(spec->image[i].bytes, spec->image[i].len, (int)n,
+					     &slaves[n]),
+			 0);
+	}
+	clocked = esc_et1100;
+	clocked.is_dc_by_eeprom = 0;
 	clockless = esc_et1100;
 	clockless.dc = ESC_DC_NONE;
 	clockless.has_sync_unit = 0;
@@ -66,7 +82,7 @@ static void make_segment(struct bus_bench *b, const struct bench_spec *spec)
 			slaves[i].features = &clockless;
 		}
 		if ((spec->clocked >> i & 1) != 0) {
-			slaves[i].features = &esc_et1100;
+			slaves[i].features = &clocked;
 		}
 		slaves[i].ppm = spec->ppm[i];
 		slaves[i].clock_start_ns = spec->clock_start_ns[i] != 0
@@ -125,21 +141,74 @@ static void unmute(const struct bus_bench *b, uint8_t *frame, size_t frame_len)
 	}
 }
 
+/* When the segment goes on, on the host's clock; 0: it does not stand still now. */
+static mono_t end_of_pause(const struct bus_bench *b)
+{
+	struct platform platform = in_process_platform(b->host);
+	mono_t now = platform.now(platform.ctx);
+
+	if (b->pause_every_ns == 0 || now.ns % b->pause_every_ns >= b->pause_ns) {
+		return (mono_t){ 0 };
+	}
+	return (mono_t){ now.ns - now.ns % b->pause_every_ns + b->pause_ns };
+}
+
+static int pass_on(struct bus_bench *b, const uint8_t *frame, size_t frame_len)
+{
+	return b->is_reference_mute ? muted_send(b, frame, frame_len)
+				    : b->wire.send(b->wire.ctx, frame, frame_len);
+}
+
+static void count_eeprom(struct bus_bench *b, const uint8_t *frame, size_t frame_len)
+{
+	uint8_t copy[LIMIT_FRAME_BYTES];
+	struct ecat_datagram dg;
+	size_t pos = 0;
+
+	memcpy(copy, frame, frame_len);
+	while (ecat_frame_next(copy, frame_len, &pos, &dg) == 1) {
+		b->eeprom_commands += dg.cmd == ECAT_CMD_FPWR && dg.ado == ESC_REG_EEPROM_CONTROL;
+	}
+}
+
 static int counted_send(void *ctx, const uint8_t *frame, size_t frame_len)
 {
 	struct bus_bench *b = ctx;
 
 	b->frames_sent++;
-	return b->is_reference_mute ? muted_send(b, frame, frame_len)
-				    : b->wire.send(b->wire.ctx, frame, frame_len);
+	count_eeprom(b, frame, frame_len);
+	if (b->is_loopback || (end_of_pause(b).ns != 0 && b->held_count < BENCH_HELD)) {
+		memcpy(b->held[b->held_count], frame, frame_len);
+		b->held_len[b->held_count++] = frame_len;
+		return 0;
+	}
+	return pass_on(b, frame, frame_len);
 }
 
 static int counted_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadline,
 			   mono_t *ret_at)
 {
 	struct bus_bench *b = ctx;
-	int r = b->wire.receive(b->wire.ctx, frame, capacity, deadline, ret_at);
+	struct platform platform = in_process_platform(b->host);
+	mono_t end = end_of_pause(b);
+	int r;
 
+	if (end.ns != 0) {
+		platform.sleep_until(platform.ctx, end.ns < deadline.ns ? end : deadline);
+		if (end.ns >= deadline.ns) {
+			return -EAGAIN;
+		}
+	}
+	if (b->is_loopback && b->held_count > 0) {
+		b->held_count = 0;
+		memcpy(frame, b->held[0], b->held_len[0]);
+		return (int)b->held_len[0];
+	}
+	for (unsigned i = 0; i < b->held_count; i++) {
+		pass_on(b, b->held[i], b->held_len[i]);
+	}
+	b->held_count = 0;
+	r = b->wire.receive(b->wire.ctx, frame, capacity, deadline, ret_at);
 	if (r > 0) {
 		unmute(b, frame, (size_t)r);
 	}

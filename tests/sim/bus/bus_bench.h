@@ -14,11 +14,16 @@
 #include "segment/in_process.h"
 #include "segment/segment.h"
 
-enum { BENCH_SIIS = 8 };
+enum { BENCH_SIIS = 8, BENCH_HELD = 16 };
 
 struct bench_spec {
 	unsigned piccolos;           /* boards in line, first on the bus */
 	const char *sii[BENCH_SIIS]; /* then SII-only slaves by file name in the data folder */
+	const char *catalogue[BENCH_SIIS]; /* then slaves of the simulator's catalogue */
+	struct {
+		const uint8_t *bytes;
+		size_t len;
+	} image[BENCH_SIIS]; /* then SII-only slaves of these images */
 	double ppm[LIMIT_SLAVES];
 	double host_ppm;
 	uint64_t seed;
@@ -36,6 +41,13 @@ struct bus_bench {
 	struct transport wire; /* of the host; the master's goes through the bench */
 	unsigned frames_sent;
 	int is_reference_mute;
+	int is_loopback;        /* frames come back from a plug, no slave sees them */
+	int64_t pause_every_ns; /* the segment stands still for pause_ns each time; 0: never */
+	int64_t pause_ns;
+	uint8_t held[BENCH_HELD][LIMIT_FRAME_BYTES]; /* sent while it stood still */
+	size_t held_len[BENCH_HELD];
+	unsigned held_count;
+	unsigned eeprom_commands; /* writes to 0x0502 */
 	struct config cfg;
 	struct line *line;
 	struct bus *bus;

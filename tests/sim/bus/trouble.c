@@ -89,27 +89,40 @@ TEST(trouble, circular_category_list_ends_the_walk)
 	/* 0x80 + 4 + 2 * 0x7ffe is 0x80 again in 16 bits. */
 	put_le16(esc->sii + 0x80, 3);
 	put_le16(esc->sii + 0x82, 0x7ffe);
+	CHECK_EQ(bench_find(b), -EPROTO);
+	CHECK(strstr(b->error, "SYNC modes are unknown") != NULL);
+	CHECK(strstr(b->error, "runs past the end") != NULL);
+	bench_new_master(b);
+	b->cfg.slave_count = 1;
+	b->cfg.slave[0].assign_activate = CONFIG_ASSIGN_NONE;
 	CHECK_EQ(bench_find(b), 0);
 	CHECK_EQ(bench_map(b), -EPROTO);
 	CHECK(strstr(b->error, "runs past the end") != NULL);
 	bench_destroy(b);
 }
 
-/* Its categories are damaged, its words are not: it is found by its identity, and maps nothing. */
-TEST(trouble, damaged_sii_of_a_real_drive_is_survived)
+/* Its categories are damaged, its words are not. What stands behind the damage is not guessed. */
+TEST(trouble, damaged_sii_of_a_real_drive_is_named_where_its_contents_are_needed)
 {
 	struct bus_bench *b =
 		bench_create(&(struct bench_spec){ .sii = { "akd-damaged" }, .seed = 16 });
 	const struct slave_info *slave;
 	size_t count;
 
+	CHECK_EQ(bench_find(b), -EPROTO);
+	CHECK(strstr(b->error, "slave 0 (") == b->error);
+	CHECK(strstr(b->error, "its SYNC modes are unknown: SII: the category at byte 0x28a runs "
+			       "past the end (2048 bytes)") != NULL);
+	bench_new_master(b);
+	b->cfg.slave_count = 1;
+	b->cfg.slave[0].assign_activate = CONFIG_ASSIGN_NONE;
 	CHECK_EQ(bench_find(b), 0);
-	CHECK_EQ(bench_map(b), 0);
 	slave = bus_slaves(b->bus, &count);
 	CHECK_EQ(count, 1);
 	CHECK_EQ(slave->vendor, 0x6a);
 	CHECK_EQ(slave->product, 0x414b44);
-	CHECK_EQ(bus_plan(b->bus)->image_bytes, 0);
+	CHECK_EQ(bench_map(b), -EPROTO);
+	CHECK(strstr(b->error, "runs past the end") != NULL);
 	CHECK(bench_now_ns(b) < 20 * NS_PER_S);
 	bench_destroy(b);
 }

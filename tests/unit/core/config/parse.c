@@ -316,3 +316,19 @@ TEST(config, objects_must_be_whole_and_fit_their_type)
 		    "BOOL|SINT|INT|DINT|LINT|USINT|UINT|UDINT|ULINT|REAL|LREAL, not \"WORD\"");
 	parse_fails("outputs:\n- owner: local\n", "t.yaml:2: outputs[0].channel: is missing");
 }
+
+TEST(config, assign_activate_is_a_word_of_the_esi_or_sii_or_none)
+{
+	static struct config cfg;
+
+	parse_ok("slaves:\n"
+		 "  - {}\n"
+		 "  - assign_activate: none\n"
+		 "  - assign_activate: sii\n"
+		 "  - assign_activate: 0xffff\n",
+		 &cfg);
+	CHECK_EQ(cfg.slave[0].assign_activate, CONFIG_ASSIGN_SII);
+	CHECK_EQ(cfg.slave[1].assign_activate, CONFIG_ASSIGN_NONE);
+	CHECK_EQ(cfg.slave[2].assign_activate, CONFIG_ASSIGN_SII);
+	CHECK_EQ(cfg.slave[3].assign_activate, 0xffff);
+}

@@ -205,7 +205,7 @@ TEST(firmware, sii_is_what_the_master_reads_out_of_it)
 	CHECK_EQ(sii.boot_in_len, 128);
 	CHECK_EQ(sii.sm_count, PICCOLO_SM_COUNT);
 	CHECK_EQ(sii.sm[PICCOLO_SM_OUTPUTS].control, 0x64);
-	CHECK_EQ(sii.dc_assign_activate, 0x0300);
+	CHECK_EQ(sii.dc_mode[0].assign_activate, 0x0300);
 	CHECK_EQ(sii.pdo_count, 2);
 	check_entries(&sii, &sii.pdo[sii.pdo[0].is_tx ? 0 : 1], &d->tx);
 	check_entries(&sii, &sii.pdo[sii.pdo[0].is_tx ? 1 : 0], &d->rx);

@@ -69,7 +69,7 @@ TEST(catalogue, the_image_of_each_entry_says_what_the_entry_says)
 		CHECK_EQ(made.mailbox_in_len, model.sii.mailbox_in_len);
 		CHECK_EQ(made.mailbox_protocols, model.sii.mailbox_protocols);
 		CHECK_EQ(made.coe_details, model.sii.coe_details);
-		CHECK_EQ(made.has_dc, model.dc_count > 0);
+		CHECK_EQ(made.dc_mode_count, model.dc_count);
 		check_same_process_data(&made, &model.sii);
 		sii_text(image, len, made.device_name, name);
 		CHECK_STR(name, model.text[model.sii.device_name - 1]);

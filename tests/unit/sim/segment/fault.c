@@ -113,7 +113,9 @@ static struct fault_plan *plan_of(const char *line)
 
 static struct bench *two_slaves(void)
 {
-	return bench_create((struct bench_slave[]){ { .pdi = 5 }, { .pdi = 5 } }, 2);
+	return bench_create((struct bench_slave[]){ { .pdi = 5, .config = 0x0c },
+						    { .pdi = 5, .config = 0x0c } },
+			    2);
 }
 
 static struct fault_verdict judge(struct fault_plan *plan, struct bench *b)

@@ -8,6 +8,7 @@
 #include "segment/segment.h"
 #include "wire/datagram.h"
 #include "wire/esc_reg.h"
+#include "wire/sii.h"
 
 enum { SII_BYTES = 128, IN = 150, BACK = 100, MS = 1000000, LOADED_NS = 10000000 };
 
@@ -25,7 +26,7 @@ static struct segment *make_tree(void)
 	struct segment_slave_spec spec[5] = { 0 };
 	struct segment *segment = NULL;
 
-	sii[14] = 0;
+	sii[14] = sii_checksum(sii);
 	for (unsigned i = 0; i < 5; i++) {
 		spec[i] = (struct segment_slave_spec){ .features = &esc_et1100,
 						       .sii = sii,

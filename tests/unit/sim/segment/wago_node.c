@@ -121,7 +121,7 @@ TEST(wago_node, its_eeprom_says_what_real_ones_say)
 	CHECK_EQ(sii.sm[3].start, 0x2400);
 	CHECK_EQ(sii.sm[3].control, 0x00);
 	CHECK_EQ(sii.pdo_count, 0);
-	CHECK_EQ(sii.dc_assign_activate, 0x0300);
+	CHECK_EQ(sii.dc_mode[1].assign_activate, 0x0300);
 	sii_text(image, len, sii.device_name, text);
 	CHECK_STR(text, "WAGO Series 750 Bus Coupler");
 }
