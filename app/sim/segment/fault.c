@@ -143,10 +143,12 @@ static void al_error(struct esc *esc, uint16_t code)
 }
 
 /* Another device sits there: as an EEPROM says it that is read from now on. */
-static void change_identity(struct esc *esc, uint32_t product)
+static void change_identity(struct esc *esc, const struct fault *f)
 {
-	if (esc->sii_bytes >= SII_PRODUCT_BYTE + 4) {
-		put_le32(esc->sii + SII_PRODUCT_BYTE, product);
+	if (f->action == FAULT_SWITCH) {
+		esc->identification = f->id;
+	} else if (esc->sii_bytes >= SII_PRODUCT_BYTE + 4) {
+		put_le32(esc->sii + SII_PRODUCT_BYTE, f->product);
 	}
 }
 
@@ -220,6 +222,26 @@ static void plug(struct segment *segment, const struct fault *f, int64_t t_ns)
 	segment_plug(segment, f->slave, t_ns);
 }
 
+static void change_obedience(struct esc *esc, const struct fault *f)
+{
+	if (f->action == FAULT_SLOW) {
+		esc->al_fault.slow_state = f->state;
+		esc->al_fault.slow_ns = f->by_ns;
+	} else if (f->action == FAULT_REFUSE) {
+		esc->al_fault.refused_state = f->state;
+		esc->al_fault.refused_code = f->code;
+	} else {
+		esc->al_fault = (struct esc_al_fault){ 0 };
+	}
+}
+
+static void misbehave(struct esc *esc, const struct fault *f)
+{
+	esc->mailbox_fault = (struct esc_mailbox_fault){ .kind = f->kind,
+							 .count = f->count > 0 ? f->count : 1,
+							 .by_ns = f->by_ns };
+}
+
 static void apply_to_slave(const struct fault *f, struct segment *segment, int64_t t_ns)
 {
 	struct esc *esc = segment_esc(segment, f->slave);
@@ -253,12 +275,11 @@ static void apply_to_slave(const struct fault *f, struct segment *segment, int64
 		esc->mailbox_stuck_until_ns = f->for_ns > 0 ? t_ns + f->for_ns : INT64_MAX;
 		break;
 	case FAULT_MAILBOX:
-		esc->mailbox_fault = (struct esc_mailbox_fault){
-			.kind = f->kind, .count = f->count > 0 ? f->count : 1, .by_ns = f->by_ns
-		};
+		misbehave(esc, f);
 		break;
 	case FAULT_IDENTITY:
-		change_identity(esc, f->product);
+	case FAULT_SWITCH:
+		change_identity(esc, f);
 		break;
 	case FAULT_SYNC0_LOST:
 		esc->sync.pulses_lost += f->count;
@@ -273,18 +294,9 @@ static void apply_to_slave(const struct fault *f, struct segment *segment, int64
 		plug(segment, f, t_ns);
 		break;
 	case FAULT_SLOW:
-		esc->al_fault.slow_state = f->state;
-		esc->al_fault.slow_ns = f->by_ns;
-		break;
 	case FAULT_REFUSE:
-		esc->al_fault.refused_state = f->state;
-		esc->al_fault.refused_code = f->code;
-		break;
-	case FAULT_SWITCH:
-		esc->identification = f->id;
-		break;
 	case FAULT_OBEY:
-		esc->al_fault = (struct esc_al_fault){ 0 };
+		change_obedience(esc, f);
 		break;
 	case FAULT_LOSE:
 	case FAULT_DROP:
