@@ -196,6 +196,17 @@ static int is_seen(struct box_reader *rd, uint8_t counter, size_t len)
 	return is_equal && rd->is_counting;
 }
 
+/*
+ * A lost frame took a mail out of the box, and the slave has put another one in since: that mail is
+ * gone, its counter is missing.
+ */
+static int is_gap(const struct box_reader *rd, uint8_t counter)
+{
+	return (rd->is_tail_lost || rd->is_repeated) && rd->is_counting && rd->has_mail &&
+	       counter != 0 && counter != rd->counter &&
+	       counter != mailbox_counter_next(rd->counter);
+}
+
 static void take_mail(struct mailbox_engine *mb, uint16_t pos, mono_t now)
 {
 	struct box_slave *sl = mb->slave[pos];
@@ -207,7 +218,12 @@ static void take_mail(struct mailbox_engine *mb, uint16_t pos, mono_t now)
 	rd->poll_at = now;
 	rd->idle = (span_t){ IDLE_FIRST_NS };
 	sl->counters.received++;
-	sl->counters.recovered += rd->is_repeated;
+	if (is_gap(rd, header.counter)) {
+		sl->counters.lost++;
+		mb->hooks.gap(mb, pos);
+	} else {
+		sl->counters.recovered += rd->is_repeated;
+	}
 	rd->is_repeated = 0;
 	if (len > sl->spec.in_bytes) {
 		sl->counters.malformed++;

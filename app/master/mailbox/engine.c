@@ -241,6 +241,19 @@ static void received(struct mailbox_engine *mb, uint16_t pos, const struct mailb
 	}
 }
 
+static void gap(struct mailbox_engine *mb, uint16_t pos)
+{
+	struct box_slave *sl = mb->slave[pos];
+
+	for (unsigned type = 0; type < MAILBOX_TYPES; type++) {
+		struct mailbox_request *rq = sl->active[type];
+
+		if (rq != NULL && rq->step == REQUEST_AWAIT) {
+			rq->has_gap = 1;
+		}
+	}
+}
+
 static void malformed(struct mailbox_engine *mb, uint16_t pos, uint8_t type)
 {
 	struct box_slave *sl = mb->slave[pos];
@@ -355,7 +368,7 @@ int mailbox_create(const struct mailbox_wire *wire, struct mailbox_engine **ret_
 	}
 	mb->wire = *wire;
 	mb->hooks = (struct box_hooks){
-		.feed = feed, .sent = sent, .received = received, .malformed = malformed
+		.feed = feed, .sent = sent, .received = received, .gap = gap, .malformed = malformed
 	};
 	*ret_mb = mb;
 	return 0;
@@ -460,6 +473,7 @@ int mailbox_submit(struct mailbox_engine *mb, struct mailbox_request *rq)
 	rq->result = -EINPROGRESS;
 	rq->detail = 0;
 	rq->is_mailbox_error = 0;
+	rq->has_gap = 0;
 	rq->len = 0;
 	rq->total = 0;
 	rq->step = REQUEST_QUEUED;

@@ -108,8 +108,8 @@ struct mailbox_request {
 	void *ctx;
 	/* --- results --- */
 	/* -EINPROGRESS; 0; -EREMOTEIO refused by the slave, see detail; -ETIMEDOUT; -ECANCELED;
-	 * -EPROTO a reply that breaks the protocol; -EMSGSIZE the buffer is too small; -ENOTSUP;
-	 * -ENODEV the slave has no mailbox (any more); -EINVAL. */
+	 * -EPROTO a reply that breaks the protocol; -EMSGSIZE the buffer is too small; -EIO a part
+	 * of the reply was lost; -ENOTSUP; -ENODEV the slave has no mailbox (any more); -EINVAL. */
 	int result;
 	uint32_t detail; /* SDO abort code, FoE error, or mailbox error (is_mailbox_error) */
 	uint8_t is_mailbox_error;
@@ -128,7 +128,8 @@ struct mailbox_request {
 	uint16_t mail_room;     /* data bytes of a mail of this slave */
 	mono_t not_before;      /* a protocol may delay its next compose() */
 	mono_t deadline;
-	uint8_t step; /* engine */
+	uint8_t has_gap; /* a mail of the slave was lost while this waited: it may have been ours */
+	uint8_t step;    /* engine */
 	struct mailbox_request *next;
 };
 
@@ -191,6 +192,7 @@ struct mailbox_counters {
 	uint64_t repeated;  /* seen twice, dropped */
 	uint64_t malformed; /* length beyond the box */
 	uint64_t recovered; /* read again by a repeat request */
+	uint64_t lost;      /* gone: the slave had put the next one in before it was asked again */
 	uint64_t timeouts;  /* requests that ended with -ETIMEDOUT */
 };
 

@@ -111,6 +111,8 @@ struct box_hooks {
 	/** A whole mail of the slave. */
 	void (*received)(struct mailbox_engine *mb, uint16_t pos,
 			 const struct mailbox_header *header, const uint8_t *data, mono_t now);
+	/** A mail of the slave is missing. */
+	void (*gap)(struct mailbox_engine *mb, uint16_t pos);
 	/** A mail whose length is beyond its box. */
 	void (*malformed)(struct mailbox_engine *mb, uint16_t pos, uint8_t type);
 };

@@ -92,6 +92,10 @@ static int received(struct mailbox_request *rq, const uint8_t *data, size_t len)
 	    m.drive != with->drive) {
 		return MAILBOX_IGNORE;
 	}
+	if (rq->has_gap) {
+		return -EIO; /* a fragment before this one may be missing: nothing else would tell
+			      */
+	}
 	if (m.operation != with->operation + 1) {
 		return -EPROTO;
 	}

@@ -197,3 +197,27 @@ TEST(soe_engine, answers_survive_a_wire_that_loses_one_frame_in_20)
 	CHECK_EQ(mailbox_counters_of(b.mb, 0)->timeouts, 0);
 	bench_end(&b);
 }
+
+TEST(soe_engine, a_lost_fragment_fails_the_read_and_never_shortens_the_value)
+{
+	struct protocol_bench b;
+	static uint8_t in[TABLE_BYTES];
+	unsigned failed = 0;
+	char error[128];
+	size_t len;
+
+	begin(&b);
+	fault_plan_restart(b.faults, bench_now_ns(&b));
+	CHECK_EQ(fault_plan_add(b.faults, "p=0.05 lose", 1, error, sizeof(error)), 0);
+	for (unsigned i = 0; i < 100; i++) {
+		int r = read_idn(&b, SOE_IDN_TABLE, SOE_ELEMENT_VALUE, in, sizeof(in), &len);
+
+		CHECK(r == 0 || r == -EIO);
+		CHECK(r < 0 || len == TABLE_BYTES);
+		failed += r < 0;
+	}
+	CHECK(failed > 0);
+	CHECK(failed < 50);
+	CHECK_EQ(mailbox_counters_of(b.mb, 0)->lost, failed);
+	bench_end(&b);
+}
