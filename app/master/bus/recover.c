@@ -370,12 +370,21 @@ void bus_clear_alarms(struct bus *bus)
 	}
 }
 
-static enum recovery_step next_step(const struct bus *bus, size_t pos)
+/* A slave that restarted on its way back is in PRE-OP without what was set before: SAFE-OP without
+ * SYNC0 is AL status code 0x0030. */
+static enum recovery_step next_step(struct bus *bus, size_t pos)
 {
 	enum recovery_step step = bus->slave[pos].step;
 
-	return step == RECOVERY_SETUP && !needs_clock(bus, pos) ? RECOVERY_SAFEOP
-								: steps[step].next;
+	if (step != RECOVERY_SETUP || needs_clock(bus, pos)) {
+		return steps[step].next;
+	}
+	if (is_reference_set(bus) && !is_clock_near(bus, pos)) {
+		return RECOVERY_CLOCK;
+	}
+	return bus_sync0_is_wanted(bus, pos) && bus_sync0_is_running(bus, pos) == 0
+		       ? RECOVERY_SETTLE
+		       : RECOVERY_SAFEOP;
 }
 
 void bus_recover(struct bus *bus, size_t pos, const struct bus_emit *emit)
