@@ -12,15 +12,22 @@ enum {
 	DEFAULT_PERIOD_NS = 1000000,
 };
 
+static int64_t slot_of(const struct virtual_scope *sc, int64_t system_time_ns)
+{
+	return (system_time_ns + sc->period_ns / 2) / sc->period_ns;
+}
+
 static void on_edge(void *ctx, unsigned slave, int64_t t_ns, uint64_t system_time_ns)
 {
 	struct virtual_scope *sc = ctx;
-	int64_t slot = ((int64_t)system_time_ns + sc->period_ns / 2) / sc->period_ns;
+	int64_t slot = slot_of(sc, (int64_t)system_time_ns);
 
 	sc->slot[slave] = slot;
 	sc->edge_ns[slave] = t_ns;
 	sc->system_ns[slave] = system_time_ns;
 	sc->edges[slave]++;
+	sc->past_slot[slave][slot % VIRTUAL_EDGES] = slot;
+	sc->past_ns[slave][slot % VIRTUAL_EDGES] = t_ns;
 	for (unsigned other = 0; sc->is_measuring && other < LIMIT_SLAVES; other++) {
 		if (other != slave && sc->edges[other] > 0 && sc->slot[other] == slot) {
 			int64_t spread_ns = llabs(t_ns - sc->edge_ns[other]);
@@ -102,6 +109,16 @@ void virtual_bench_fault(struct virtual_bench *bench, const char *line)
 	if (fault_plan_add(bench->faults, line, bench->spec.slaves, error, sizeof(error)) < 0) {
 		test_fail(__FILE__, __LINE__, "fault \"%s\": %s", line, error);
 	}
+}
+
+int64_t virtual_bench_edge_ns(const struct virtual_bench *bench, unsigned slave, int64_t dc_time_ns)
+{
+	const struct virtual_scope *sc = &bench->scope;
+	int64_t slot = slot_of(sc, dc_time_ns);
+
+	return sc->past_slot[slave][slot % VIRTUAL_EDGES] == slot
+		       ? sc->past_ns[slave][slot % VIRTUAL_EDGES]
+		       : 0;
 }
 
 void virtual_bench_measure(struct virtual_bench *bench)

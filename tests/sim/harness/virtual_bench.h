@@ -15,6 +15,8 @@
 /* 2026-11-19: TAI that the host's clock starts at. */
 #define VIRTUAL_TAI_START_NS (INT64_C(1795000000) * NS_PER_S)
 
+enum { VIRTUAL_EDGES = 128 }; /* that are remembered of each slave */
+
 /* Fill the spec of the slave at @position; a negative errno ends the test. */
 typedef int (*virtual_slave_maker)(int position, struct segment_slave_spec *ret_spec);
 
@@ -40,6 +42,8 @@ struct virtual_scope {
 	uint64_t edges[LIMIT_SLAVES];
 	int64_t spread_max_ns; /* largest distance between two slaves, while measuring */
 	uint64_t compared;
+	int64_t past_slot[LIMIT_SLAVES][VIRTUAL_EDGES]; /* of the newest edges, by slot */
+	int64_t past_ns[LIMIT_SLAVES][VIRTUAL_EDGES];   /* true times of those */
 };
 
 struct virtual_bench {
@@ -58,6 +62,10 @@ void virtual_bench_done(struct virtual_bench *bench);
 void virtual_bench_fault(struct virtual_bench *bench, const char *line);
 /** True time now. */
 int64_t virtual_bench_now_ns(const struct virtual_bench *bench);
+/** True time of the SYNC0 edge of @slave that belongs to @dc_time_ns; 0: there was none, or it was
+ * too long ago (VIRTUAL_EDGES). */
+int64_t virtual_bench_edge_ns(const struct virtual_bench *bench, unsigned slave,
+			      int64_t dc_time_ns);
 /** Discard the measurements and start new ones. */
 void virtual_bench_measure(struct virtual_bench *bench);
 

@@ -228,6 +228,9 @@ static void count_sample(struct virtual_master *vm, size_t payload_bytes)
 		count_op(res, &h);
 	}
 	hash_bytes(&res->hash, vm->newest, payload_bytes);
+	if (vm->each_sample != NULL) {
+		vm->each_sample(vm);
+	}
 }
 
 static void take_samples(struct virtual_master *vm)

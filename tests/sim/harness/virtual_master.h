@@ -50,9 +50,11 @@ struct virtual_master {
 	int64_t stop_at_ns;     /* when a stop is requested, in a bring-up, too; 0: never */
 	void (*each_cycle)(struct virtual_master *vm); /* a checker, after every cycle; NULL: none
 							*/
+	/* Every sample, in order, as virtual_master_sample() and virtual_master_value() show it. */
+	void (*each_sample)(struct virtual_master *vm);
 	/* Every frame that comes back to the master; NULL: none looks. */
 	void (*each_frame)(struct virtual_master *vm, const uint8_t *frame, size_t frame_len);
-	void *user; /* of those two */
+	void *user; /* of those */
 	struct sample_header newest_header;
 	_Alignas(8) uint8_t newest[sizeof(struct sample_header) + LIMIT_IMAGE_BYTES];
 };
