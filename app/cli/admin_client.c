@@ -8,7 +8,16 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-enum { REPLY_TIMEOUT_S = 20 }; /* an SDO may take its own time-outs */
+/* ecdaqd ends each request by a time-out of its own; these are a little longer. */
+enum { REPLY_TIMEOUT_S = 25, BRING_UP_TIMEOUT_S = 605 };
+
+static int timeout_s(const struct admin_request *request)
+{
+	return request->verb == ADMIN_RESCAN || (request->verb == ADMIN_STATE &&
+						 request->slave_pos == ADMIN_ALL_SLAVES)
+		       ? BRING_UP_TIMEOUT_S
+		       : REPLY_TIMEOUT_S;
+}
 
 static enum exit_code fail_connect(const struct cli *cli, const char *path, int err)
 {
@@ -28,9 +37,9 @@ static enum exit_code fail_connect(const struct cli *cli, const char *path, int 
 	}
 }
 
-static int connect_to(const char *path)
+static int connect_to(const char *path, int reply_timeout_s)
 {
-	struct timeval timeout = { .tv_sec = REPLY_TIMEOUT_S };
+	struct timeval timeout = { .tv_sec = reply_timeout_s };
 	struct sockaddr_un address = { .sun_family = AF_UNIX };
 	int fd;
 
@@ -93,7 +102,7 @@ enum exit_code admin_ask(struct cli *cli, struct admin_request *request,
 	if (result != EXIT_CODE_OK) {
 		return result;
 	}
-	fd = connect_to(path);
+	fd = connect_to(path, timeout_s(request));
 	if (fd < 0) {
 		return fail_connect(cli, path, -fd);
 	}
@@ -102,7 +111,7 @@ enum exit_code admin_ask(struct cli *cli, struct admin_request *request,
 	close(fd);
 	if (r == -EAGAIN) {
 		return cli_fail(cli, EXIT_CODE_FAILED, "ecdaqd: no answer within %d s",
-				REPLY_TIMEOUT_S);
+				timeout_s(request));
 	}
 	if (r == -EPROTO) {
 		return cli_fail(cli, EXIT_CODE_FAILED,

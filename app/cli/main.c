@@ -86,6 +86,14 @@ static const struct verb verbs[] = {
 	  "is\n"
 	  "armed for the same instant.\n",
 	  verb_oneshot },
+	{ "state", "[STATE [SLAVE...|all]]", "AL states: show them, or lead slaves to one.",
+	  "ecdaq state                  the bus, its target, each slave\n"
+	  "ecdaq state PREOP            the whole bus, which stays there\n"
+	  "ecdaq state BOOT piccolo1    one slave, while the bus is not in operation\n\n"
+	  "STATE is INIT, PREOP, BOOT (of single slaves), SAFEOP or OP.\n",
+	  verb_state },
+	{ "rescan", "", "Take the bus down and bring it up again, with what is there now.",
+	  "Ends when the target is reached, or with the reason why not.\n", verb_rescan },
 	{ "sdo", "read|write SLAVE INDEX:SUB [VALUE]", "Read or write an object of a slave (CoE).",
 	  "ecdaq sdo read piccolo0 0x1018:1 --type UDINT\n"
 	  "ecdaq sdo write 0 0x8000:2 20 --type UINT\n\n"

@@ -50,6 +50,10 @@ void report_release(const struct report *report)
 
 void report_al_format(uint32_t al_state, char *buf, size_t buf_len)
 {
+	if ((al_state & AL_STATE_MASK) == 0) {
+		snprintf(buf, buf_len, "unknown"); /* no frame comes back from it */
+		return;
+	}
 	snprintf(buf, buf_len, "%s%s", al_state_to_str((uint16_t)(al_state & AL_STATE_MASK)),
 		 (al_state & AL_ERROR) != 0 ? "+ERROR" : "");
 }
@@ -68,6 +72,18 @@ static int64_t tai_now_ns(void)
 	return (int64_t)ts.tv_sec * NS_PER_S + ts.tv_nsec;
 }
 
+static void write_link(const struct status_page *page, FILE *out)
+{
+	uint32_t link = GET(page->link);
+	uint32_t mbps = GET(page->link_mbps);
+
+	if (link == STATUS_LINK_UP && mbps != 0) {
+		fprintf(out, ", link %u Mbit/s", mbps);
+	} else if (link != STATUS_LINK_UNKNOWN) {
+		fprintf(out, ", link %s", link == STATUS_LINK_UP ? "up" : "DOWN");
+	}
+}
+
 static void write_head(const struct report *report, FILE *out)
 {
 	const struct status_page *page = report->page;
@@ -78,7 +94,12 @@ static void write_head(const struct report *report, FILE *out)
 		fprintf(out, "ecdaqd has ended (process %" PRId64 " is gone): last known state\n",
 			page->pid);
 	}
-	fprintf(out, "ecdaqd %.32s   %s   ", page->version, bus_state_to_str(GET(page->bus_state)));
+	fprintf(out, "ecdaqd %.32s   %s%s", page->version, bus_state_to_str(GET(page->bus_state)),
+		GET(page->is_waiting) ? ", waiting" : "");
+	if (GET(page->bus_target) != BUS_OP || GET(page->is_waiting)) {
+		fprintf(out, ", target %s", bus_state_to_str(GET(page->bus_target)));
+	}
+	fputs("   ", out);
 	if (expected != 0 && expected != source_slave_count(page)) {
 		fprintf(out, "%u of %u slaves", source_slave_count(page), expected);
 	} else {
@@ -86,6 +107,7 @@ static void write_head(const struct report *report, FILE *out)
 			source_slave_count(page) == 1 ? "" : "s");
 	}
 	fprintf(out, " on %.32s%s", page->interface, page->is_simulated ? " (simulated)" : "");
+	write_link(page, out);
 	if (report->is_running) {
 		fprintf(out, "   up %s", text_uptime(tai_now_ns() - page->start_tai_ns, buf));
 	}

@@ -233,6 +233,14 @@ static void write_process(struct json *js, const struct report *report)
 		state = GET(page->bus_state_at_stop);
 	}
 	json_text(js, "state", bus_state_to_str(state));
+	json_text(js, "target", bus_state_to_str(GET(page->bus_target)));
+	json_truth(js, "waiting", GET(page->is_waiting) != 0);
+	if (GET(page->link) == STATUS_LINK_UNKNOWN) {
+		json_null(js, "link_up");
+	} else {
+		json_truth(js, "link_up", GET(page->link) == STATUS_LINK_UP);
+	}
+	json_u64(js, "link_mbps", GET(page->link_mbps));
 	json_truth(js, "running", report->is_running);
 	json_u64(js, "exit_code", GET(page->exit_code));
 	json_text(js, "message", page->message);

@@ -12,6 +12,16 @@
 
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
 
+static char mark_of(const struct status_page *page, uint32_t index)
+{
+	uint32_t al_state = GET(page->slave[index].al_state);
+
+	if (al_state == 0 || GET(page->slave[index].is_lost)) {
+		return '?';
+	}
+	return (al_state & AL_ERROR) != 0 ? 'E' : '+';
+}
+
 static void show(const struct status_page *page, uint32_t index)
 {
 	struct slave_info info = source_slave(page, index);
@@ -20,8 +30,7 @@ static void show(const struct status_page *page, uint32_t index)
 
 	report_al_format(GET(page->slave[index].al_state), state, sizeof(state));
 	printf("%2u  %u:%u  %-13s %c  %-16s %s\n", index, info.alias, index,
-	       GET(page->slave[index].is_lost) ? "LOST" : state,
-	       (GET(page->slave[index].al_state) & AL_ERROR) != 0 ? 'E' : '+', info.name,
+	       GET(page->slave[index].is_lost) ? "LOST" : state, mark_of(page, index), info.name,
 	       text_plain(info.device, device, sizeof(device)));
 }
 

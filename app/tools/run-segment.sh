@@ -444,10 +444,10 @@ run_inside()
 	start segment "$bin/ecdaq-sim" "${segment_options[@]}"
 	start recorder "$bin/ecdaq-record" "${set_options[@]}"
 	if [ "$view" = yes ]; then
-		start daemon "$bin/ecdaqd" "${set_options[@]}" "${daemon_options[@]}" >&4
+		start daemon "$bin/ecdaqd" --exit-on-failure "${set_options[@]}" "${daemon_options[@]}" >&4
 		start_view
 	else
-		start daemon "$bin/ecdaqd" "${set_options[@]}" "${daemon_options[@]}"
+		start daemon "$bin/ecdaqd" --exit-on-failure "${set_options[@]}" "${daemon_options[@]}"
 	fi
 	daemon_pid=${pid[daemon]}
 	adopt_dds

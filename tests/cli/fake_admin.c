@@ -13,6 +13,7 @@
 #include "base/histogram.h"
 #include "fake.h"
 #include "image/image.h"
+#include "wire/al.h"
 
 void fake_listen(struct fake *f)
 {
@@ -120,6 +121,29 @@ static void clear(struct fake *f)
 	f->page->cycle.frames_lost = 0;
 }
 
+static void answer_rescan(struct fake *f, const struct admin_request *rq, struct admin_reply *reply)
+{
+	if (rq->argument[1] == 0 && f->page->bus_state == BUS_OP) {
+		refuse(reply, -EPERM, "the bus is in operation, and a rescan stops it: --force");
+	}
+}
+
+/* Slave 1 refuses BOOT. */
+static void answer_state(struct fake *f, const struct admin_request *rq, struct admin_reply *reply)
+{
+	for (unsigned i = 0; i < SLAVES; i++) {
+		if (rq->slave_pos == ADMIN_ALL_SLAVES || rq->slave_pos == i) {
+			if (i == 1 && rq->argument[0] == AL_BOOT) {
+				refuse(reply, -EIO, "slave 1: refuses BOOT and is in OP");
+				return;
+			}
+			f->page->slave[i].al_state = rq->argument[0];
+		}
+	}
+	reply->data[0] = (uint8_t)rq->argument[0];
+	reply->data_len = 1;
+}
+
 static void answer(struct fake *f, const struct admin_request *rq, struct admin_reply *reply)
 {
 	*reply = (struct admin_reply){ .magic = ADMIN_MAGIC, .id = rq->id };
@@ -143,6 +167,12 @@ static void answer(struct fake *f, const struct admin_request *rq, struct admin_
 		break;
 	case ADMIN_CLEAR:
 		clear(f);
+		break;
+	case ADMIN_RESCAN:
+		answer_rescan(f, rq, reply);
+		break;
+	case ADMIN_STATE:
+		answer_state(f, rq, reply);
 		break;
 	case ADMIN_CANCEL:
 	case ADMIN_DATA:

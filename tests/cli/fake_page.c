@@ -137,6 +137,9 @@ void fake_make_status(struct fake *f)
 	status_text_set(&page->text_sequence, page->message, sizeof(page->message),
 			"slave 1: \"quoted\"\ttext");
 	page->bus_state = BUS_OP;
+	page->bus_target = BUS_OP;
+	page->link = STATUS_LINK_UP;
+	page->link_mbps = 100;
 	page->slave_count = f->slaves;
 	page->slaves_expected = SLAVES;
 	page->cycle_cpu = UINT32_MAX;

@@ -177,3 +177,24 @@ def test_a_socket_without_a_server_is_named(fake: Callable[..., Fake], run_dir: 
     fails(daemon("clear"), NO_DAEMON, "no answer")
     (run_dir / "admin").write_text("")
     fails(daemon("clear"), NO_DAEMON, "no answer")
+
+
+def test_state_shows_and_requests(daemon: Fake) -> None:
+    shown = json_of(daemon("state", "--json"))
+    assert (shown["state"], shown["target"], shown["waiting"]) == ("OP", "OP", False)
+    assert [slave["state"] for slave in shown["slave"]] == ["OP", "OP"]
+    assert works(daemon("state")).splitlines()[0] == "bus OP, target OP"
+    assert works(daemon("state", "preop", "piccolo1")) == ""
+    after = json_of(daemon("state", "SAFE-OP", "0", "--json"))
+    assert [slave["state"] for slave in after["slave"]] == ["SAFE-OP", "PRE-OP"]
+    after = json_of(daemon("state", "init", "--json"))
+    assert [slave["state"] for slave in after["slave"]] == ["INIT", "INIT"]
+    fails(daemon("state", "BOOT", "piccolo0", "piccolo1"), REFUSED, "refuses BOOT")
+    fails(daemon("state", "RUN"), USAGE, "RUN: expected INIT, PREOP, BOOT, SAFEOP or OP")
+    fails(daemon("state", "OP", "nobody"), FAILED, "nobody")
+
+
+def test_rescan_stops_a_bus_in_operation_only_by_force(daemon: Fake) -> None:
+    fails(daemon("rescan"), REFUSED, "--force")
+    assert works(daemon("rescan", "--force")) == ""
+    assert json_of(daemon("rescan", "--force", "--json"))["state"] == "OP"

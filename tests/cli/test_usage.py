@@ -16,6 +16,8 @@ VERBS = {
     "watch": "CHANNEL...",
     "set": "OUTPUT=VALUE...",
     "oneshot": "SLAVE|all",
+    "state": "[STATE [SLAVE...|all]]",
+    "rescan": "",
     "sdo": "read|write",
     "events": "",
     "sync0": "[calibrate]",
@@ -32,6 +34,7 @@ READING = [
     ["channels"],
     ["watch", "piccolo0.adc", "--count", "1"],
     ["histogram", "wake"],
+    ["state"],
     ["sdo", "read", "0", "0x1018:1"],
 ]
 

@@ -108,6 +108,10 @@ class Segment:
         )
 
     def start_daemon(self, *more: str) -> None:
+        """A bring-up that fails ends it."""
+        self.start_waiting_daemon("--exit-on-failure", *more)
+
+    def start_waiting_daemon(self, *more: str) -> None:
         self.start("daemon", str(BIN / "ecdaqd"), *self.options(), *more)
 
     def start_recorder(self) -> None:

@@ -23,7 +23,11 @@ def start(segment: Segment) -> None:
     segment.start_sim("--control", str(segment.run_dir / "segment"))
     wait_for("control socket", (segment.run_dir / "segment").exists, 30)
     segment.start(
-        "daemon", str(BIN / "ecdaqd"), "--config", str(CONFIG), *segment.options(), "--simulated"
+        "daemon",
+        str(BIN / "ecdaqd"),
+        *["--exit-on-failure", "--config", str(CONFIG)],
+        *segment.options(),
+        "--simulated",
     )
     segment.start_recorder()
     segment.wait_for_op()

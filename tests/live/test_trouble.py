@@ -13,7 +13,9 @@ from segment import BIN, Segment, wait_for
 
 
 def run_daemon(segment: Segment, *more: str) -> subprocess.CompletedProcess[str]:
-    return segment.space.run(str(BIN / "ecdaqd"), *segment.options(), *more, check=False)
+    return segment.space.run(
+        str(BIN / "ecdaqd"), "--exit-on-failure", *segment.options(), *more, check=False
+    )
 
 
 def only_line(got: subprocess.CompletedProcess[str]) -> str:
@@ -47,6 +49,7 @@ def test_without_the_right_to_raw_sockets_the_line_names_it(
         "--inh-caps=-all",
         "--bounding-set=-all",
         str(BIN / "ecdaqd"),
+        "--exit-on-failure",
         *segment.options(),
         check=False,
     )

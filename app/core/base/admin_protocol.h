@@ -35,6 +35,10 @@ enum admin_verb {
 	ADMIN_CANCEL = 8,    /* end the open request of this id; no reply of its own unless there is
 				none: -ENOENT */
 	ADMIN_DATA = 9,      /* more data of the request of this id: data_offset, data */
+	ADMIN_RESCAN = 10,   /* take the bus down and bring it up again; answered when that has
+				ended; argument[1] 1: also in operation */
+	ADMIN_STATE = 11,    /* slave_pos to argument[0], an enum al_state; data: the AL state it is
+				in; ADMIN_ALL_SLAVES: the bus is led there, and stays there */
 };
 
 /* Every slave with a one-shot output, all in one cycle or none. */

@@ -128,8 +128,9 @@ static const char *al_name(int32_t state)
 /* enum admin_verb, which base does not see. */
 static const char *command_name(int32_t verb)
 {
-	static const char *const names[] = { "none",     "ping",      "set",  "oneshot",
-					     "SDO read", "SDO write", "stop", "clear" };
+	static const char *const names[] = { "none",     "ping",      "set",    "oneshot",
+					     "SDO read", "SDO write", "stop",   "clear",
+					     "cancel",   "data",      "rescan", "AL state" };
 
 	return verb >= 0 && verb < (int32_t)(sizeof(names) / sizeof(names[0])) ? names[verb]
 									       : "unknown";

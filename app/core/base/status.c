@@ -14,8 +14,8 @@
 
 enum { READ_TRIES = 100 };
 
-static const char *const bus_names[] = { "DOWN", "SCANNING",   "PREOP",   "SAFEOP",
-					 "OP",   "RECOVERING", "STOPPED", "FAILED" };
+static const char *const bus_names[] = { "DOWN",       "SCANNING", "PREOP",  "SAFEOP", "OP",
+					 "RECOVERING", "STOPPED",  "FAILED", "INIT" };
 static const char *const dc_names[] = { "off", "acquiring", "locked", "lost" };
 static const char *const record_names[] = { "waiting", "running", "disk full", "ended", "failed" };
 

@@ -27,7 +27,11 @@ enum bus_state {
 	BUS_RECOVERING,
 	BUS_STOPPED,
 	BUS_FAILED,
+	BUS_INIT, /* all slaves in INIT, and ecdaqd serves requests; bus.target, or a failed
+		     bring-up */
 };
+
+enum status_link { STATUS_LINK_UNKNOWN = 0, STATUS_LINK_DOWN, STATUS_LINK_UP };
 
 enum dc_state { DC_OFF = 0, DC_ACQUIRING, DC_LOCKED, DC_LOST };
 
@@ -99,7 +103,8 @@ struct control_status {
 /* One slave as the service thread last saw it. [service] */
 struct slave_status {
 	struct slave_info info;
-	_Atomic uint32_t al_state; /* enum al_state, bit 4: error */
+	_Atomic uint32_t al_state; /* enum al_state, bit 4: error; 0: unknown, no frame comes back
+				    */
 	_Atomic uint32_t al_status_code;
 	_Atomic uint32_t is_lost;
 	_Atomic int32_t dc_diff_ns;
@@ -129,6 +134,10 @@ struct status_page {
 	char message[256];                  /* [service] newest trouble, one line; "" for none */
 	_Atomic uint32_t bus_state;         /* [service] enum bus_state */
 	_Atomic uint32_t bus_state_at_stop; /* [service] what it was when the orderly stop began */
+	_Atomic uint32_t bus_target;        /* [service] enum bus_state that the bus is led to */
+	_Atomic uint32_t is_waiting;        /* [service] 1: not there; message says why */
+	_Atomic uint32_t link;              /* [service] enum status_link */
+	_Atomic uint32_t link_mbps;         /* [service] 0: not known */
 	_Atomic uint32_t slave_count;       /* [service] */
 	_Atomic uint32_t slaves_expected;   /* [service] 0: whatever is there */
 	_Atomic uint32_t exit_code;         /* [service] valid in STOPPED and FAILED */

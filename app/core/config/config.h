@@ -19,6 +19,13 @@ enum config_owner { CONFIG_OWNER_LOCAL, CONFIG_OWNER_PROGRAM, CONFIG_OWNER_REMOT
 enum config_edge_clock { CONFIG_EDGE_AUTO, CONFIG_EDGE_MONOTONIC, CONFIG_EDGE_HTE };
 enum config_presence { CONFIG_ANY_SLAVES, CONFIG_EXACT_SLAVES };
 enum config_revision { CONFIG_REVISION_EXACT, CONFIG_REVISION_AT_LEAST, CONFIG_REVISION_ANY };
+enum config_target {
+	CONFIG_TARGET_INIT,
+	CONFIG_TARGET_PREOP,
+	CONFIG_TARGET_SAFEOP,
+	CONFIG_TARGET_OP
+};
+
 enum config_datagrams { CONFIG_DATAGRAMS_ONE, CONFIG_DATAGRAMS_PER_SLAVE };
 
 enum config_sync_type { CONFIG_SYNC_TYPE_SHOW, CONFIG_SYNC_TYPE_WRITE };
@@ -89,6 +96,7 @@ struct config {
 	uint32_t bus_recovery_attempts;
 	uint32_t bus_monitor; /* 1: BRD of AL status and 0x092C in every cycle */
 	enum config_presence bus_presence;
+	enum config_target bus_target;
 	enum config_datagrams bus_datagrams;
 	/* cycle */
 	int64_t cycle_period_ns;

@@ -46,6 +46,15 @@ const struct option option_table[] = {
 	  .max = "5min",
 	  .unit = "s",
 	  .prose = "Time to search for slaves and to wait until all reach PRE-OP." },
+	{ .name = "bus.target",
+	  .type = OPTION_WORD,
+	  FIELD(bus_target),
+	  .words = "init|preop|safeop|op",
+	  .default_value = "op",
+	  .unit = "",
+	  .prose = "State that the bus is led to. init and preop: the slaves are found and can be "
+		   "looked into and configured (ecdaq state, ecdaq sdo), and no process data are "
+		   "exchanged. safeop: inputs only. `ecdaq state` changes it while ecdaqd runs." },
 	{ .name = "bus.mailbox_timeout",
 	  .type = OPTION_DURATION,
 	  FIELD(bus_mailbox_timeout_ns),

@@ -351,6 +351,23 @@ static void report_sdo(const struct admin_target *t, struct admin_pending *pendi
 	}
 }
 
+static void run_on_bus(const struct admin_target *t, struct admin_pending *pending)
+{
+	const struct admin_request *rq = &pending->request;
+	int is_all = rq->verb == ADMIN_RESCAN || rq->slave_pos == ADMIN_ALL_SLAVES;
+
+	if (t->bus_request == NULL) {
+		admin_pending_refuse(pending, -EBUSY, "the bus is being brought up");
+		return;
+	}
+	if (!is_all && !has_slave(t, pending)) {
+		return;
+	}
+	emit(t, EVENT_COMMAND, is_all ? EVENT_NO_SLAVE : rq->slave_pos, rq->argument[0],
+	     (int32_t)rq->verb, (int32_t)pending->uid);
+	t->bus_request(t->ctx, pending);
+}
+
 /* --- all --- */
 
 void admin_command_report(const struct admin_target *target, struct admin_pending *pending)
@@ -397,6 +414,10 @@ void admin_command_run(const struct admin_target *target, struct admin_pending *
 	case ADMIN_CLEAR:
 		run_simple(target, pending, target->clear);
 		return;
+	case ADMIN_RESCAN:
+	case ADMIN_STATE:
+		run_on_bus(target, pending);
+		return;
 	case ADMIN_CANCEL:
 	case ADMIN_DATA:
 		break; /* the server's own */
@@ -409,6 +430,23 @@ int64_t admin_command_timeout_ns(const struct admin_request *request)
 	if (request->timeout_ms != 0) {
 		return request->timeout_ms * NS_PER_MS;
 	}
-	return request->verb == ADMIN_SET || request->verb == ADMIN_ONESHOT ? ADMIN_CYCLE_TIMEOUT_NS
-									    : ADMIN_TIMEOUT_NS;
+	switch ((enum admin_verb)request->verb) {
+	case ADMIN_SET:
+	case ADMIN_ONESHOT:
+		return ADMIN_CYCLE_TIMEOUT_NS;
+	case ADMIN_RESCAN:
+		return ADMIN_BRING_UP_TIMEOUT_NS;
+	case ADMIN_STATE:
+		return request->slave_pos == ADMIN_ALL_SLAVES ? ADMIN_BRING_UP_TIMEOUT_NS
+							      : ADMIN_TIMEOUT_NS;
+	case ADMIN_PING:
+	case ADMIN_SDO_READ:
+	case ADMIN_SDO_WRITE:
+	case ADMIN_STOP:
+	case ADMIN_CLEAR:
+	case ADMIN_CANCEL:
+	case ADMIN_DATA:
+		break;
+	}
+	return ADMIN_TIMEOUT_NS;
 }

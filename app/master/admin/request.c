@@ -69,6 +69,13 @@ static int check_verb(const struct admin_request *rq, char *why)
 			return refuse(why, -EINVAL, "is_relative must be 0 or 1");
 		}
 		return rq->slave_pos == ADMIN_ALL_SLAVES ? 0 : check_slave(rq, why);
+	case ADMIN_RESCAN:
+		return 0;
+	case ADMIN_STATE:
+		if (rq->argument[0] == 0 || rq->argument[0] > UINT8_MAX) {
+			return refuse(why, -EINVAL, "argument[0] must be an AL state");
+		}
+		return rq->slave_pos == ADMIN_ALL_SLAVES ? 0 : check_slave(rq, why);
 	case ADMIN_SDO_READ:
 		return check_slave(rq, why);
 	case ADMIN_SDO_WRITE:

@@ -69,6 +69,11 @@ int bus_sync0_start(struct bus *bus, int64_t dc_now_ns, char *error);
 /** All slaves to @state (SAFE-OP, OP, PRE-OP, INIT), with AL errors named by slave, code and text.
  */
 int bus_request_state(struct bus *bus, enum al_state state, span_t timeout, char *error);
+/** Ask one slave for @state, an enum al_state, and acknowledge its error; one frame. The bus must
+ * not be in operation: its supervision would lead the slave back. */
+int bus_slave_al_request(struct bus *bus, size_t pos, uint16_t state, char *error);
+/** AL status and code of one slave, 0x0130 to 0x0135; one frame. */
+int bus_slave_al_read(struct bus *bus, size_t pos, uint8_t ret_al[6], char *error);
 /** The first step of an ordered stop, while the cycle runs: all that answer to SAFE-OP, in 150 ms.
  */
 int bus_stop_outputs(struct bus *bus, char *error);

@@ -253,6 +253,28 @@ int bus_request_state(struct bus *bus, enum al_state state, span_t timeout, char
 	return lead_to(bus, state, LEAD_ALL, timeout);
 }
 
+int bus_slave_al_request(struct bus *bus, size_t pos, uint16_t state, char *error)
+{
+	uint8_t word[2];
+	int r;
+
+	bus->error = error;
+	put_le16(word, state | AL_ERROR);
+	r = register_write(bus, pos, ESC_REG_AL_CONTROL, word, sizeof(word));
+	return r < 0 ? bus_fail_slave(bus, pos, r, "does not take a request for %s",
+				      bus_al_name(state))
+		     : 0;
+}
+
+int bus_slave_al_read(struct bus *bus, size_t pos, uint8_t ret_al[AL_BYTES], char *error)
+{
+	int r;
+
+	bus->error = error;
+	r = register_read(bus, pos, ESC_REG_AL_STATUS, ret_al, AL_BYTES);
+	return r < 0 ? bus_fail_slave(bus, pos, r, "its AL status cannot be read") : 0;
+}
+
 /* A step down that continues after errors and keeps the first one. */
 static int step_down(struct bus *bus, enum al_state state, int before, char *error)
 {

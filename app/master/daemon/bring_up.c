@@ -51,9 +51,17 @@ static int begin_control(struct session *s, struct failure *failure)
 
 /* --- the slaves --- */
 
-static void on_bus_event(void *ctx, const struct event *ev)
+/* While this thread sends or waits: a sign of life, and the admin socket. */
+static void attend(void *ctx)
 {
-	session_emit(ctx, ev);
+	struct session *s = ctx;
+
+	if (s->spec.hooks.alive != NULL) {
+		s->spec.hooks.alive(s->spec.hooks.ctx);
+	}
+	if (s->is_climbing) { /* else the service loop does it in a moment */
+		session_serve_admin(s);
+	}
 }
 
 static int open_line(struct session *s, struct failure *failure)
@@ -64,7 +72,8 @@ static int open_line(struct session *s, struct failure *failure)
 	if (r < 0) {
 		return r;
 	}
-	s->is_link_up = 1;
+	s->is_link_up = transport.is_up == NULL || transport.is_up(transport.ctx) != 0;
+	session_show_link(s);
 	r = line_create(s->spec.platform, transport, &s->line);
 	if (r < 0) {
 		transport.destroy(transport.ctx);
@@ -72,14 +81,14 @@ static int open_line(struct session *s, struct failure *failure)
 	}
 	line_bind(s->line);
 	line_timeout_set(s->line, (span_t){ s->spec.cfg->bus_frame_timeout_ns });
-	line_set_keepalive(s->line, s->spec.hooks.alive, s->spec.hooks.ctx);
+	line_set_keepalive(s->line, attend, s);
 	s->stop_by = (mono_t){ 0 };
 	line_set_cancel(s->line, session_is_cancelled, s);
 	r = bus_create(s->spec.cfg, s->line, &s->bus);
 	if (r < 0) {
 		return failure_set(failure, EXIT_CODE_RESOURCES, r, "bus: %s", strerror(-r));
 	}
-	bus_listen(s->bus, on_bus_event, s);
+	bus_listen(s->bus, session_bus_event, s);
 	return 0;
 }
 
@@ -101,16 +110,24 @@ static int prepare_slaves(struct session *s, struct failure *failure)
 
 	session_state_set(s, BUS_SCANNING);
 	r = session_step(s, bus_scan(s->bus, error), EXIT_CODE_STATE, error, failure);
+	show_slaves(s);
 	if (r < 0) {
 		return r;
 	}
 	session_judge_doubled(s, line_answered(s->line), line_discarded(s->line));
-	show_slaves(s);
 	r = session_step(s, bus_compare(s->bus, error), EXIT_CODE_SLAVES, error, failure);
 	if (r < 0) {
 		return r;
 	}
 	session_state_set(s, BUS_PREOP);
+	return 0;
+}
+
+static int map_slaves(struct session *s, struct failure *failure)
+{
+	char error[BUS_ERROR_BYTES] = "";
+	int r;
+
 	r = session_step(s, bus_map(s->bus, error), EXIT_CODE_STATE, error, failure);
 	if (r < 0) {
 		return r;
@@ -290,16 +307,11 @@ static void arrive(struct session *s)
 	session_emit(s, &ev);
 }
 
-static int climb(struct session *s, struct failure *failure)
+/* From PRE-OP on: process data. */
+static int start_exchange(struct session *s, struct failure *failure)
 {
-	int r = load_control(s, failure);
+	int r = map_slaves(s, failure);
 
-	if (r == 0) {
-		r = open_line(s, failure);
-	}
-	if (r == 0) {
-		r = prepare_slaves(s, failure);
-	}
 	if (r == 0) {
 		r = begin_control(s, failure);
 	}
@@ -312,10 +324,52 @@ static int climb(struct session *s, struct failure *failure)
 	if (r == 0) {
 		r = start_cycle(s, failure);
 	}
+	return r == 0 ? session_lead_to_op(s, failure) : r;
+}
+
+static int go_to_init(struct session *s, struct failure *failure)
+{
+	span_t timeout = { s->spec.cfg->bus_scan_timeout_ns };
+	char error[BUS_ERROR_BYTES] = "";
+	int r = session_step(s, bus_request_state(s->bus, AL_INIT, timeout, error), EXIT_CODE_STATE,
+			     error, failure);
+
 	if (r == 0) {
-		r = session_lead_to_op(s, failure);
+		session_state_set(s, BUS_INIT);
 	}
 	return r;
+}
+
+static int climb(struct session *s, struct failure *failure)
+{
+	int r = load_control(s, failure);
+
+	if (r == 0) {
+		r = open_line(s, failure);
+	}
+	if (r == 0) {
+		r = prepare_slaves(s, failure);
+	}
+	if (r == 0 && s->target == CONFIG_TARGET_INIT) {
+		return go_to_init(s, failure);
+	}
+	return r == 0 && s->target > CONFIG_TARGET_PREOP ? start_exchange(s, failure) : r;
+}
+
+static void fall(struct session *s, const struct failure *failure)
+{
+	struct failure ignored;
+
+	if (session_hold_failed(s, failure)) {
+		return;
+	}
+	session_set_message(s, failure->text);
+	if (failure->code == EXIT_CODE_INTERFACE || failure->code == EXIT_CODE_NO_SLAVE) {
+		session_drop(s); /* no slave to restore */
+	} else {
+		session_stop(s, &ignored);
+	}
+	session_state_set(s, BUS_DOWN);
 }
 
 int session_bring_up(struct session *session, struct failure *failure)
@@ -324,18 +378,21 @@ int session_bring_up(struct session *session, struct failure *failure)
 	struct failure ignored;
 	int r;
 
-	s->run.page->session = (uint64_t)s->spec.platform.tai_ns(s->spec.platform.ctx);
-	r = climb(s, failure);
-	if (r < 0) {
-		session_set_message(s, failure->text);
-		if (failure->code == EXIT_CODE_INTERFACE || failure->code == EXIT_CODE_NO_SLAVE) {
-			session_drop(s); /* no slave to restore */
-		} else {
-			session_stop(s, &ignored);
-		}
-		session_state_set(s, BUS_DOWN);
-		return r;
+	if (s->line != NULL) {
+		session_stop(s, &ignored);
 	}
-	arrive(s);
-	return 0;
+	session_release(s);
+	s->run.page->session = (uint64_t)s->spec.platform.tai_ns(s->spec.platform.ctx);
+	s->is_climbing = 1;
+	r = climb(s, failure);
+	s->is_climbing = 0;
+	if (r < 0) {
+		fall(s, failure);
+	} else if (s->target == CONFIG_TARGET_OP) {
+		arrive(s);
+	} else {
+		session_hold(s);
+	}
+	session_restart_done(s, r < 0 ? failure : NULL);
+	return r;
 }

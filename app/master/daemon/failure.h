@@ -16,7 +16,7 @@ struct failure {
 int failure_set(struct failure *failure, enum exit_code code, int result, const char *format, ...)
 	__attribute__((format(printf, 4, 5)));
 
-/** 1 if the same attempt may succeed later (no slave yet), so that --wait tries again. */
+/** 1 if the same attempt may succeed later (no slave yet), so that it is repeated. */
 int failure_is_transient(enum exit_code code);
 
 /** The code for a call of bus/bus.h that failed with @r; @otherwise for a state or lock not

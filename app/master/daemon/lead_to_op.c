@@ -196,6 +196,9 @@ int session_lead_to_op(struct session *s, struct failure *failure)
 		return r;
 	}
 	session_state_set(s, BUS_SAFEOP);
+	if (s->target == CONFIG_TARGET_SAFEOP) {
+		return 0;
+	}
 	r = wait_for_flow(s, failure);
 	if (r < 0) {
 		return r;

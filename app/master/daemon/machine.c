@@ -4,6 +4,7 @@
 #include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -135,6 +136,24 @@ static void wait_shortly(void *ctx, mono_t until)
 	pf.sleep_until(pf.ctx, soon.ns < until.ns ? soon : until);
 }
 
+static int link_mbps(void *ctx)
+{
+	const struct program *pg = ctx;
+	char path[64 + sizeof(pg->cfg.interface)];
+	char text[16] = "";
+	long mbps;
+	FILE *file;
+
+	snprintf(path, sizeof(path), "/sys/class/net/%s/speed", pg->cfg.interface);
+	file = fopen(path, "re");
+	if (file == NULL) {
+		return 0;
+	}
+	mbps = fgets(text, sizeof(text), file) != NULL ? strtol(text, NULL, 10) : 0;
+	fclose(file);
+	return mbps > 0 ? (int)mbps : 0;
+}
+
 static void alive(void *ctx)
 {
 	struct program *pg = ctx;
@@ -175,12 +194,14 @@ int machine_session_create(struct program *pg, struct failure *failure)
 			.cycle_end = end_cycle,
 			.cycle_has_ended = has_cycle_ended,
 			.wait = wait_shortly,
+			.link_mbps = link_mbps,
 			.alive = alive,
 			.warn = warn,
 			.ctx = pg,
 		},
 		.segment = pg->options.is_simulated ? RUN_DIR_SIMULATED : RUN_DIR_REAL,
 		.tai_offset_s = kernel_tai_offset(),
+		.can_wait = 1,
 	};
 
 	return session_create(&spec, &pg->session, failure);

@@ -15,7 +15,7 @@
 struct options {
 	uint64_t cycles;  /* stop after this many in OP; 0: no limit */
 	uint64_t seconds; /* the same in seconds */
-	int can_wait;     /* retry while there is no slave or no link */
+	int is_exiting;   /* where a bring-up fails, rather than wait */
 	int is_simulated;
 };
 
@@ -30,8 +30,11 @@ struct program {
 	int has_been_up;
 	int is_ready;                          /* READY=1 was sent */
 	char link_warning[PACKET_ERROR_BYTES]; /* last one printed */
-	enum exit_code waiting_for;            /* last one printed */
-	uint64_t cycles_before;                /* of earlier sessions, in OP */
+	char waiting_text[FAILURE_TEXT_BYTES]; /* what it waits for, as printed; "": nothing */
+	int can_retry;                         /* what it waits for may come by itself */
+	mono_t retry_at;
+	int64_t back_off_ns;    /* next time */
+	uint64_t cycles_before; /* of earlier sessions, in OP */
 	uint64_t cycles_at_op;
 	mono_t op_since;
 };

@@ -5,6 +5,7 @@
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
+#include <string.h>
 #include <unistd.h>
 
 #include "base/stop.h"
@@ -16,6 +17,8 @@
 #define SERVICE_PERIOD_MS 20
 #define BACK_OFF_MIN_NS (250 * NS_PER_MS)
 #define BACK_OFF_MAX_NS (5 * NS_PER_S)
+/* No retry while a client has worked with the bus for so long. */
+#define UNATTENDED_NS (60 * NS_PER_S)
 
 /* An ordered stop takes less than a second; a second signal before that would cut it short. */
 #define STOP_GRACE_NS (2 * NS_PER_S)
@@ -52,22 +55,44 @@ static void say_ready(struct program *pg)
 	}
 }
 
-static void begin_op(struct program *pg)
+/* The target is reached: OP, or what bus.target or a client says. */
+static void begin(struct program *pg)
 {
 	const struct status_page *page = session_page(pg->session);
 	unsigned slaves = atomic_load(&page->slave_count);
+	const char *state = bus_state_to_str(atomic_load(&page->bus_state));
+	int is_op = atomic_load(&page->bus_state) == BUS_OP;
 
-	pg->waiting_for = EXIT_CODE_OK;
+	pg->waiting_text[0] = '\0';
+	pg->back_off_ns = BACK_OFF_MIN_NS;
 	pg->cycles_at_op = atomic_load(&page->cycle.cycles);
-	if (!pg->has_been_up) {
+	if (is_op && !pg->has_been_up) {
 		pg->op_since = machine_now();
 	}
-	pg->has_been_up = 1;
-	printf("ecdaqd: %s: %u slave%s in OP, period %" PRId64 " us\n", pg->cfg.interface, slaves,
-	       slaves == 1 ? "" : "s", pg->cfg.cycle_period_ns / NS_PER_US);
+	pg->has_been_up |= is_op;
+	printf("ecdaqd: %s: %u slave%s in %s, period %" PRId64 " us\n", pg->cfg.interface, slaves,
+	       slaves == 1 ? "" : "s", state, pg->cfg.cycle_period_ns / NS_PER_US);
 	fflush(stdout);
 	say_ready(pg);
-	notify_send(&pg->notify, "STATUS=%u slaves in OP", slaves);
+	notify_send(&pg->notify, "STATUS=%u slaves in %s", slaves, state);
+}
+
+/* The bring-up failed, and the session waits where it came to. */
+static void begin_waiting(struct program *pg, const struct failure *failure)
+{
+	const char *state = bus_state_to_str(atomic_load(&session_page(pg->session)->bus_state));
+
+	if (strcmp(pg->waiting_text, failure->text) != 0) {
+		fprintf(stderr, "ecdaqd: waiting in %s: %s\n", state, failure->text);
+		snprintf(pg->waiting_text, sizeof(pg->waiting_text), "%s", failure->text);
+		pg->back_off_ns = BACK_OFF_MIN_NS;
+	}
+	say_ready(pg);
+	notify_send(&pg->notify, "STATUS=waiting in %s: %s", state, failure->text);
+	pg->can_retry = failure_is_transient(failure->code);
+	pg->retry_at = mono_add(machine_now(), (span_t){ pg->back_off_ns });
+	pg->back_off_ns =
+		pg->back_off_ns * 2 > BACK_OFF_MAX_NS ? BACK_OFF_MAX_NS : pg->back_off_ns * 2;
 }
 
 static uint64_t cycles_in_op(const struct program *pg)
@@ -96,7 +121,16 @@ static void sleep_a_pass(const struct program *pg)
 	}
 }
 
-/* Serve in OP until the session ends: an enum session_result, or -errno with @failure. */
+/* A bus that somebody works with is not scanned under his hands. */
+static int is_retry_due(const struct program *pg)
+{
+	return session_is_waiting(pg->session) && pg->can_retry &&
+	       machine_now().ns >= pg->retry_at.ns &&
+	       session_unattended(pg->session).ns >= UNATTENDED_NS;
+}
+
+/* Serve until the session ends or has to be brought up: an enum session_result, or -errno with
+ * @failure. */
 static int serve(struct program *pg, struct failure *failure)
 {
 	int r;
@@ -104,52 +138,32 @@ static int serve(struct program *pg, struct failure *failure)
 	do {
 		sleep_a_pass(pg);
 		r = session_service(pg->session, failure);
-		if (r == SESSION_GOES_ON && is_time_over(pg)) {
+		if (r == SESSION_GOES_ON && pg->has_been_up && is_time_over(pg)) {
 			r = SESSION_STOP_ASKED;
+		}
+		if (r == SESSION_GOES_ON && is_retry_due(pg)) {
+			r = SESSION_RESTART;
 		}
 	} while (r == SESSION_GOES_ON);
 	return r;
 }
 
-/* Link down: wait for @span_ns while serving the admin socket. Returns 1 on a stop request. */
-static int idle(struct program *pg, int64_t span_ns)
-{
-	mono_t until = mono_add(machine_now(), (span_t){ span_ns });
-	struct failure failure;
-
-	while (machine_now().ns < until.ns) {
-		sleep_a_pass(pg);
-		if (session_service(pg->session, &failure) == SESSION_STOP_ASKED) {
-			return 1;
-		}
-	}
-	return 0;
-}
-
-/* 0 as soon as the bus is in OP; -errno with @failure when trying again makes no sense. */
+/* 0: the target is reached, or the session waits; else -errno with @failure. */
 static int bring_up(struct program *pg, struct failure *failure)
 {
-	int64_t back_off_ns = BACK_OFF_MIN_NS;
-	int r;
+	int r = session_bring_up(pg->session, failure);
 
-	while ((r = session_bring_up(pg->session, failure)) < 0) {
-		if (!failure_is_transient(failure->code) ||
-		    !(pg->options.can_wait || pg->has_been_up)) {
-			return r;
-		}
-		if (pg->waiting_for != failure->code) {
-			fprintf(stderr, "ecdaqd: waiting: %s\n", failure->text);
-			pg->waiting_for = failure->code;
-		}
-		say_ready(pg);
-		notify_send(&pg->notify, "STATUS=waiting: %s", failure->text);
-		if (idle(pg, back_off_ns)) {
-			return failure_set(failure, EXIT_CODE_OK, -ECANCELED,
-					   "bring-up: stopped before OP was reached");
-		}
-		back_off_ns = back_off_ns * 2 > BACK_OFF_MAX_NS ? BACK_OFF_MAX_NS : back_off_ns * 2;
+	if (r == 0) {
+		begin(pg);
+		return 0;
 	}
-	begin_op(pg);
+	if (!session_is_waiting(pg->session) || session_is_stop_asked(pg->session)) {
+		return r;
+	}
+	if (pg->options.is_exiting && !pg->has_been_up) {
+		return r;
+	}
+	begin_waiting(pg, failure);
 	return 0;
 }
 
@@ -168,18 +182,21 @@ static int run_bus(struct program *pg, struct failure *failure)
 
 	do {
 		r = bring_up(pg, failure);
-		if (r < 0) {
-			return r;
-		}
-		r = serve(pg, failure);
+		r = r < 0 ? r : serve(pg, failure);
 		if (r == SESSION_LOST) {
 			start_anew(pg);
 		}
-	} while (r == SESSION_LOST);
+	} while (r == SESSION_LOST || r == SESSION_RESTART);
 	notify_send(&pg->notify, "STOPPING=1");
 	if (r < 0) {
 		session_stop(pg->session, &stopping);
 		return r;
+	}
+	if (session_is_waiting(pg->session)) {
+		session_stop(pg->session, &stopping); /* what it waits for is no failure of the stop
+						       */
+		failure->code = EXIT_CODE_OK;
+		return 0;
 	}
 	return session_stop(pg->session, failure);
 }
@@ -278,10 +295,9 @@ int main(int argc, char **argv)
 		  "network interface of the segment (bus.interface)" },
 		{ "cycles", 0, args_count, &op->cycles, "N", "stop after N cycles in OP" },
 		{ "seconds", 0, args_count, &op->seconds, "N", "stop after N seconds in OP" },
-		{ "wait", 0, args_flag, &op->can_wait, NULL,
-		  "while there is no interface, link or slave yet: report it once and retry; "
-		  "READY=1 is "
-		  "sent when the waiting begins" },
+		{ "exit-on-failure", 0, args_flag, &op->is_exiting, NULL,
+		  "exit if the bus does not reach its target, instead of waiting in the state that "
+		  "was reached and serving ecdaq" },
 		{ "simulated", 0, args_flag, &op->is_simulated, NULL,
 		  "mark the segment as simulated in the status page" },
 	};

@@ -175,6 +175,17 @@ void session_state_set(struct session *s, enum bus_state state)
 	atomic_store_explicit(&s->run.page->bus_state, state, memory_order_relaxed);
 }
 
+void session_show_link(struct session *s)
+{
+	struct status_page *page = s->run.page;
+	const struct session_hooks *hooks = &s->spec.hooks;
+	int mbps = s->is_link_up && hooks->link_mbps != NULL ? hooks->link_mbps(hooks->ctx) : 0;
+
+	atomic_store_explicit(&page->link, s->is_link_up ? STATUS_LINK_UP : STATUS_LINK_DOWN,
+			      memory_order_relaxed);
+	atomic_store_explicit(&page->link_mbps, (uint32_t)mbps, memory_order_relaxed);
+}
+
 void session_set_message(struct session *session, const char *text)
 {
 	run_dir_set_message(&session->run, text);
@@ -221,6 +232,12 @@ struct control *session_control(const struct session *session)
 const struct run_dir *session_run_dir(const struct session *session)
 {
 	return &session->run;
+}
+
+span_t session_unattended(const struct session *session)
+{
+	return session->operator_at.ns == 0 ? (span_t){ INT64_MAX }
+					    : mono_sub(session_now(session), session->operator_at);
 }
 
 int session_fd(const struct session *session)
@@ -270,6 +287,7 @@ int session_create(const struct session_spec *spec, struct session **ret_session
 		session_destroy(s);
 		return r;
 	}
+	session_target_set(s, spec->cfg->bus_target);
 	r = open_sockets(s, error, sizeof(error));
 	if (r < 0) {
 		session_destroy(s);

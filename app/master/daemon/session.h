@@ -35,6 +35,8 @@ struct session_hooks {
 	int (*cycle_has_ended)(void *ctx);
 	/** Return at @until at the latest; on virtual time the cycle makes a step. */
 	void (*wait)(void *ctx, mono_t until);
+	/** Speed of the link in Mbit/s, 0: not known. May be NULL. */
+	int (*link_mbps)(void *ctx);
 	/** Called often, also in the middle of a long bring-up: a sign of life. May be NULL. */
 	void (*alive)(void *ctx);
 	/** A warning for whoever started the program; the session continues. May be NULL. */
@@ -48,6 +50,7 @@ struct session_spec {
 	struct session_hooks hooks;
 	enum run_dir_segment segment;
 	int32_t tai_offset_s; /* TAI - UTC of the kernel; 0: unset */
+	int can_wait;         /* a bring-up that fails leaves the bus as far as it came */
 };
 
 /** Run directory, status page, event ring, admin socket. Free with session_destroy(). 0 or -errno.
@@ -56,15 +59,21 @@ int session_create(const struct session_spec *spec, struct session **ret_session
 		   struct failure *failure);
 
 /**
- * Scan, compare, map, clocks; then ring and cycle; the servo's lock, SYNC0, SAFE-OP, OP. 0, or
- * -errno with @failure; everything but the run directory is taken down again then. -ECANCELED with
- * EXIT_CODE_OK: stop requested on the way.
+ * Scan, compare, map, clocks; then ring and cycle; the servo's lock, SYNC0, SAFE-OP, OP; as far as
+ * the target (bus.target, or what a client asked for since). What is still up is taken down first.
+ * 0, or -errno with @failure: then session_is_waiting(), or everything but the run directory is
+ * taken down. -ECANCELED with EXIT_CODE_OK: stop requested on the way.
  */
 int session_bring_up(struct session *session, struct failure *failure);
+/** 1: the newest bring-up failed, and the session serves requests in the state that was reached. */
+int session_is_waiting(const struct session *session);
+/** Time since the newest request of a client to the bus or a slave; INT64_MAX: none. */
+span_t session_unattended(const struct session *session);
 
 enum session_result {
 	SESSION_GOES_ON,
 	SESSION_STOP_ASKED, /* by session_stop_ask() or the admin socket */
+	SESSION_RESTART,    /* a client asked for it: bring it up again */
 	SESSION_LOST, /* all slaves have been lost for long: take it down and bring it up again */
 };
 

@@ -15,6 +15,9 @@
 #include "daemon/session.h"
 #include "link/line.h"
 
+/* All slaves lost for this long: their clocks may have been reset, restart from bring-up. */
+#define SESSION_LOST_NS (5 * NS_PER_S)
+
 struct session {
 	struct session_spec spec;
 	struct run_dir run;
@@ -32,7 +35,15 @@ struct session {
 	struct cycle *cycle;
 	struct control *control; /* NULL: none is configured */
 	struct board board;
-	int is_riding; /* the cycle owns the transport and the event ring */
+	enum config_target target;
+	int is_held;                   /* up, but not led to OP or recovered: hold.c */
+	int is_waiting;                /* held since the bring-up failed */
+	int is_climbing;               /* in session_bring_up() */
+	int is_serving;                /* in admin_server_service() */
+	mono_t served;                 /* newest pass of the admin socket */
+	mono_t operator_at;            /* newest request to the bus or a slave; 0: none */
+	struct admin_pending *restart; /* that asked for a bring-up; NULL: nobody */
+	int is_riding;                 /* the cycle owns the transport and the event ring */
 	int is_link_up;
 	enum bus_state state;
 	int is_partial; /* RECOVERING, and the cycle continues with the slaves that are in OP */
@@ -83,6 +94,32 @@ int session_report_ended(struct session *s, struct failure *failure);
 void session_listen(struct session *s);
 /** Of @frames sent, @twice came back a second time: warn if that is nearly all of them. */
 void session_judge_doubled(struct session *s, uint64_t frames, uint64_t twice);
+/** For bus.h: session_emit(). */
+void session_bus_event(void *ctx, const struct event *ev);
+/** Admin requests, also in the middle of a bring-up: then only those that need no bus. */
+void session_serve_admin(struct session *s);
+
+/** Link and speed on the page. */
+void session_show_link(struct session *s);
+
+/** What the bus is led to, from the next bring-up on. */
+void session_target_set(struct session *s, enum config_target target);
+/** The target below OP is reached: keep it. */
+void session_hold(struct session *s);
+/** After a bring-up that failed: keep what was reached if the session may wait. 1: it does. */
+int session_hold_failed(struct session *s, const struct failure *failure);
+/** The opposite: it is taken down, or led on. */
+void session_release(struct session *s);
+/** Supervise a held bus, one step; an enum session_result. */
+int session_watch_held(struct session *s);
+/** No frame comes back: the page does not show AL states that were true before. */
+void session_forget_states(struct session *s);
+
+/** ADMIN_RESCAN, ADMIN_STATE. */
+void session_bus_request(void *ctx, struct admin_pending *pending);
+/** Answer whoever asked for the bring-up that has ended; @failure NULL: it succeeded. */
+void session_restart_done(struct session *s, const struct failure *failure);
+
 /** Supervise the bus, one step; an enum session_result. */
 enum session_result session_watch(struct session *s);
 

@@ -75,6 +75,8 @@ void session_drop(struct session *session)
 {
 	struct session *s = session;
 
+	session_release(s);
+	session_forget_states(s);
 	session_cycle_end(s);
 	cycle_destroy(s->cycle);
 	s->cycle = NULL;

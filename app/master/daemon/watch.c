@@ -13,12 +13,12 @@
 #define WATCH_PERIOD_NS (100 * NS_PER_MS)
 /* Recovery does one step per poll. */
 #define RECOVERY_PERIOD_NS (20 * NS_PER_MS)
-/* All slaves lost for this long: their clocks may have been reset, restart from bring-up. */
-#define LOST_LIMIT_NS (5 * NS_PER_S)
+/* How often the admin socket is served while something else blocks. */
+#define SERVE_PERIOD_NS (10 * NS_PER_MS)
 
 enum { DOUBLED_WINDOW_CYCLES = 500, DOUBLED_FRAMES_MIN = 50 };
 
-static void emit_event(void *ctx, const struct event *ev)
+void session_bus_event(void *ctx, const struct event *ev)
 {
 	session_emit(ctx, ev);
 }
@@ -47,26 +47,45 @@ static void admin_clear(void *ctx)
 	}
 }
 
-static void serve_admin(struct session *s)
+static void make_target(struct session *s, struct admin_target *ret_target)
 {
-	struct admin_target target = {
+	*ret_target = (struct admin_target){
 		.cfg = s->spec.cfg,
 		.is_op = s->state == BUS_OP || s->is_partial,
 		.dc_now = admin_dc_now,
 		.stop = admin_stop,
 		.clear = admin_clear,
-		.emit = emit_event,
+		.emit = session_bus_event,
 		.ctx = s,
 	};
-
-	if (s->is_riding) {
-		target.cfg = bus_config(s->bus);
-		target.channels = bus_channels(s->bus, &target.channel_count);
-		target.slaves = bus_slaves(s->bus, &target.slave_count);
-		target.board = &s->board;
-		target.sdo = session_sdo;
+	if (s->is_climbing) {
+		return; /* the bus is in use: what needs it is refused */
 	}
-	s->replies_waiting = admin_server_service(s->admin, &target, session_now(s));
+	ret_target->bus_request = session_bus_request;
+	if (s->bus != NULL) {
+		ret_target->slaves = bus_slaves(s->bus, &ret_target->slave_count);
+		ret_target->sdo = session_sdo;
+	}
+	if (s->is_riding) {
+		ret_target->cfg = bus_config(s->bus);
+		ret_target->channels = bus_channels(s->bus, &ret_target->channel_count);
+		ret_target->board = &s->board;
+	}
+}
+
+void session_serve_admin(struct session *s)
+{
+	struct admin_target target;
+	mono_t now = session_now(s);
+
+	if (s->is_serving || (s->is_climbing && mono_sub(now, s->served).ns < SERVE_PERIOD_NS)) {
+		return;
+	}
+	s->is_serving = 1;
+	s->served = now;
+	make_target(s, &target);
+	s->replies_waiting = admin_server_service(s->admin, &target, now);
+	s->is_serving = 0;
 }
 
 /* --- bus --- */
@@ -85,6 +104,7 @@ static void watch_link(struct session *s)
 	if (is_up >= 0 && is_up != s->is_link_up) {
 		s->is_link_up = is_up;
 		session_emit(s, &ev);
+		session_show_link(s);
 	}
 }
 
@@ -189,6 +209,7 @@ static void follow_silence(struct session *s)
 	if (line_unchanged(s->line) > s->unchanged_seen) {
 		snprintf(report.trouble, sizeof(report.trouble), "%s", LINE_UNCHANGED_TEXT);
 	}
+	session_forget_states(s);
 	follow_bus(s, &report);
 }
 
@@ -216,12 +237,12 @@ enum session_result session_watch(struct session *s)
 	if (s->silent_cycles >= silence_limit(s)) {
 		/* No slave answers; each request would cost its timeout. */
 		follow_silence(s);
-	} else if (bus_watch(s->bus, s->run.page, emit_event, s, &report) == 0) {
+	} else if (bus_watch(s->bus, s->run.page, session_bus_event, s, &report) == 0) {
 		follow_bus(s, &report);
-		bus_lead_back(s->bus, emit_event, s);
+		bus_lead_back(s->bus, session_bus_event, s);
 		follow_reference(s);
 	}
-	if (s->lost_since.ns != 0 && mono_sub(session_now(s), s->lost_since).ns > LOST_LIMIT_NS) {
+	if (s->lost_since.ns != 0 && mono_sub(session_now(s), s->lost_since).ns > SESSION_LOST_NS) {
 		return SESSION_LOST;
 	}
 	return SESSION_GOES_ON;
@@ -302,6 +323,22 @@ int session_report_ended(struct session *s, struct failure *failure)
 			   "cycle: thread ended unexpectedly: error %d", -r);
 }
 
+/* What is looked at a few times a second. */
+static enum session_result watch(struct session *s)
+{
+	if (s->line != NULL) {
+		watch_link(s);
+	}
+	if (s->is_held) {
+		return session_watch_held(s);
+	}
+	if (!s->is_riding) {
+		return SESSION_GOES_ON;
+	}
+	watch_doubled(s);
+	return session_watch(s);
+}
+
 int session_service(struct session *session, struct failure *failure)
 {
 	struct session *s = session;
@@ -314,9 +351,11 @@ int session_service(struct session *session, struct failure *failure)
 	if (s->is_riding && s->spec.hooks.cycle_has_ended(s->spec.hooks.ctx)) {
 		return session_report_ended(s, failure);
 	}
-	serve_admin(s);
+	session_serve_admin(s);
 	if (s->is_riding) {
 		session_listen(s);
+	}
+	if (s->bus != NULL) {
 		bus_mailbox_step(s->bus);
 	}
 	if (now.ns >= s->next_watch.ns || is_wkc_alarming(s) ||
@@ -324,14 +363,13 @@ int session_service(struct session *session, struct failure *failure)
 		s->wkc_low_seen =
 			atomic_load_explicit(&s->run.page->cycle.wkc_low, memory_order_relaxed);
 		atomic_fetch_add_explicit(&s->run.page->heartbeat, 1, memory_order_relaxed);
-		if (s->is_riding) {
-			watch_link(s);
-			watch_doubled(s);
-			news = session_watch(s);
-		}
+		news = watch(s);
 		s->next_watch =
 			mono_add(now, (span_t){ s->state == BUS_RECOVERING ? RECOVERY_PERIOD_NS
 									   : WATCH_PERIOD_NS });
 	}
-	return session_is_stop_asked(s) ? SESSION_STOP_ASKED : (int)news;
+	if (session_is_stop_asked(s)) {
+		return SESSION_STOP_ASKED;
+	}
+	return s->restart != NULL ? SESSION_RESTART : (int)news;
 }

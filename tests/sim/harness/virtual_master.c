@@ -238,6 +238,9 @@ static void take_samples(struct virtual_master *vm)
 	uint64_t lost = 0;
 	enum ring_result r;
 
+	if (vm->samples == NULL) {
+		return; /* there was no cycle yet */
+	}
 	while ((r = ring_read(vm->samples, vm->newest, ring_payload_bytes(vm->samples), &lost)) ==
 		       RING_OK ||
 	       r == RING_LOST) {
@@ -278,8 +281,8 @@ static void configure(struct virtual_master *vm, const char *const *settings)
 	CHECK_EQ(config_check(&vm->cfg, error, sizeof(error)), 0);
 }
 
-void virtual_master_init(struct virtual_master *vm, struct virtual_bench *bench,
-			 const char *const *settings)
+static void init(struct virtual_master *vm, struct virtual_bench *bench,
+		 const char *const *settings, int can_wait)
 {
 	struct session_spec spec = {
 		.cfg = &vm->cfg,
@@ -294,6 +297,7 @@ void virtual_master_init(struct virtual_master *vm, struct virtual_bench *bench,
 			   .wait = advance_clock,
 			   .ctx = vm },
 		.segment = RUN_DIR_SIMULATED,
+		.can_wait = can_wait,
 	};
 
 	memset(vm, 0, sizeof(*vm));
@@ -305,6 +309,18 @@ void virtual_master_init(struct virtual_master *vm, struct virtual_bench *bench,
 	if (session_create(&spec, &vm->session, &vm->failure) < 0) {
 		test_fail(__FILE__, __LINE__, "%s", vm->failure.text);
 	}
+}
+
+void virtual_master_init(struct virtual_master *vm, struct virtual_bench *bench,
+			 const char *const *settings)
+{
+	init(vm, bench, settings, 0);
+}
+
+void virtual_master_init_waiting(struct virtual_master *vm, struct virtual_bench *bench,
+				 const char *const *settings)
+{
+	init(vm, bench, settings, 1);
 }
 
 void virtual_master_kill(struct virtual_master *vm)
@@ -321,7 +337,7 @@ int virtual_master_bring_up(struct virtual_master *vm)
 	int64_t start_ns = virtual_bench_now_ns(vm->bench);
 	int r = session_bring_up(vm->session, &vm->failure);
 
-	if (r == 0) {
+	if (vm->cycle != NULL) { /* also where it failed and the session waits */
 		vm->op_ns = virtual_bench_now_ns(vm->bench) - start_ns;
 		open_samples(vm);
 		take_samples(vm);
@@ -329,7 +345,7 @@ int virtual_master_bring_up(struct virtual_master *vm)
 	return r;
 }
 
-int virtual_master_run(struct virtual_master *vm, uint64_t cycles)
+static int run_cycles(struct virtual_master *vm, uint64_t cycles)
 {
 	const _Atomic uint64_t *done = &session_page(vm->session)->cycle.cycles;
 	uint64_t end = *done + cycles;
@@ -347,6 +363,28 @@ int virtual_master_run(struct virtual_master *vm, uint64_t cycles)
 	}
 	take_samples(vm);
 	return r;
+}
+
+static int serve(struct virtual_master *vm, uint64_t periods)
+{
+	int r = SESSION_GOES_ON;
+
+	for (uint64_t i = 0; i < periods && r == SESSION_GOES_ON; i++) {
+		advance_clock(vm, (mono_t){ door_now(vm).ns + vm->cfg.cycle_period_ns });
+		if (++vm->steps >= SERVICE_CYCLES) {
+			vm->steps = 0;
+			r = session_service(vm->session, &vm->failure);
+		}
+	}
+	return r;
+}
+
+int virtual_master_run(struct virtual_master *vm, uint64_t cycles)
+{
+	if (vm->cycle == NULL) {
+		return serve(vm, cycles);
+	}
+	return run_cycles(vm, cycles);
 }
 
 int virtual_master_stop(struct virtual_master *vm)
@@ -429,7 +467,9 @@ struct admin_reply virtual_master_ask(struct virtual_master *vm,
 
 	CHECK_EQ(send(fd, request, sizeof(*request), 0), sizeof(*request));
 	for (int i = 0; i < REPLY_CYCLES / SERVICE_CYCLES; i++) {
-		virtual_master_run(vm, SERVICE_CYCLES);
+		if (virtual_master_run(vm, SERVICE_CYCLES) == SESSION_RESTART) {
+			virtual_master_bring_up(vm);
+		}
 		if (recv(fd, &reply, sizeof(reply), MSG_DONTWAIT) == (ssize_t)sizeof(reply)) {
 			close(fd);
 			return reply;

@@ -65,12 +65,16 @@ struct virtual_master {
  */
 void virtual_master_init(struct virtual_master *vm, struct virtual_bench *bench,
 			 const char *const *settings);
+/** The same, but a bring-up that fails leaves the bus as far as it came, as ecdaqd does. */
+void virtual_master_init_waiting(struct virtual_master *vm, struct virtual_bench *bench,
+				 const char *const *settings);
 /** End without sending a frame, as by SIGKILL. */
 void virtual_master_kill(struct virtual_master *vm);
 
 /** session_bring_up(); 0 or -errno with vm->failure. */
 int virtual_master_bring_up(struct virtual_master *vm);
-/** @cycles cycles with the service loop between them. An enum session_result or -errno. */
+/** @cycles cycles, or periods where no cycle runs, with the service loop between them. An enum
+ * session_result or -errno. */
 int virtual_master_run(struct virtual_master *vm, uint64_t cycles);
 /** Outputs safe, INIT; 0 or -errno with vm->failure. The samples up to there are in the result. */
 int virtual_master_stop(struct virtual_master *vm);
@@ -88,7 +92,8 @@ uint64_t virtual_master_value(const struct virtual_master *vm, const char *name)
 /** Print the newest @count events, for a test that is about to fail. */
 void virtual_master_print_events(const struct virtual_master *vm, uint64_t count);
 
-/** A request through the admin socket, cycles going on until the reply is there. */
+/** A request through the admin socket, cycles going on until the reply is there; a restart that it
+ * asks for is made. */
 struct admin_reply virtual_master_ask(struct virtual_master *vm,
 				      const struct admin_request *request);
 

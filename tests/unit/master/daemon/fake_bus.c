@@ -209,6 +209,24 @@ int bus_request_state(struct bus *bus, enum al_state state, span_t timeout, char
 	return state == AL_OP ? step(FAKE_OP, "op", error) : step(FAKE_SAFEOP, "safeop", error);
 }
 
+int bus_slave_al_request(struct bus *bus, size_t pos, uint16_t state, char *error)
+{
+	(void)bus;
+	(void)pos;
+	(void)state;
+	(void)error;
+	return 0;
+}
+
+int bus_slave_al_read(struct bus *bus, size_t pos, uint8_t ret_al[6], char *error)
+{
+	(void)bus;
+	(void)pos;
+	(void)error;
+	ret_al[0] = AL_PREOP;
+	return 0;
+}
+
 int bus_stop_outputs(struct bus *bus, char *error)
 {
 	(void)bus;
