@@ -8,7 +8,6 @@
 #include "wire/al.h"
 #include "wire/datagram.h"
 #include "wire/esc_reg.h"
-#include "wire/foe.h"
 
 enum { SM_MAILBOX_OUT = 0x26, SM_MAILBOX_IN = 0x22, TRANSMIT_NS = 4000, ALL_PROTOCOLS = 0x3f };
 

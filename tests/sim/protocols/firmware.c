@@ -8,7 +8,6 @@
 #include "firmware/fb1111_piccolo/image.h"
 #include "harness/test.h"
 #include "sim/protocols/bench.h"
-#include "wire/al.h"
 #include "wire/foe.h"
 
 enum { PROGRAM_BYTES = 60000, FILE_BYTES = IMAGE_HEADER + PROGRAM_BYTES };

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* FoE through the engine with slaves that are slow, lossy or stubborn. */
 #include <errno.h>
-#include <stdlib.h>
 
 #include "harness/test.h"
 #include "sim/protocols/bench.h"

@@ -7,7 +7,6 @@
 #include "harness/test.h"
 #include "terminal.h"
 #include "wire/al.h"
-#include "wire/esc_reg.h"
 #include "wire/foe.h"
 #include "wire/mailbox.h"
 
