@@ -51,7 +51,6 @@ const struct option option_table[] = {
 	  FIELD(bus_target),
 	  .words = "init|preop|safeop|op",
 	  .default_value = "op",
-	  .unit = "",
 	  .prose = "State that the bus is led to. init and preop: the slaves are found and can be "
 		   "looked into and configured (ecdaq state, ecdaq sdo), and no process data are "
 		   "exchanged. safeop: inputs only. `ecdaq state` changes it while ecdaqd runs." },
@@ -627,7 +626,6 @@ const struct option option_table[] = {
 	  .type = OPTION_WORD,
 	  SLAVE(revision_policy),
 	  .default_value = "exact",
-	  .unit = "",
 	  .words = "exact|at_least|any",
 	  .prose = "How the revision is compared: exact: it is slaves[].revision. at_least: the "
 		   "same or a newer one. any: not at all." },
@@ -637,7 +635,6 @@ const struct option option_table[] = {
 	  .default_value = "0",
 	  .min = "0",
 	  .max = "4294967295",
-	  .unit = "",
 	  .prose = "Expected serial number (SII word 0x0e). 0: any." },
 	{ .name = "slaves[].identification",
 	  .type = OPTION_UINT,
@@ -645,14 +642,12 @@ const struct option option_table[] = {
 	  .default_value = "0",
 	  .min = "0",
 	  .max = "65535",
-	  .unit = "",
 	  .prose = "Expected explicit device identification: the number of the device's switch, "
 		   "read from 0x0134 after a request in AL control. 0: not asked for." },
 	{ .name = "slaves[].optional",
 	  .type = OPTION_WORD,
 	  SLAVE(is_optional),
 	  .default_value = "false",
-	  .unit = "",
 	  .words = "false|true",
 	  .prose =
 		  "true: the slave may be absent at the start of a session. It is reported, has no "

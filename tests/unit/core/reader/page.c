@@ -124,7 +124,7 @@ TEST(page, a_writer_that_died_inside_a_text_does_not_hide_its_page)
 
 TEST(status, a_state_that_is_not_known_has_a_name_too)
 {
-	static const uint32_t unknown[] = { 8, 9, 20, 64, 1000, UINT32_MAX };
+	static const uint32_t unknown[] = { 9, 10, 20, 64, 1000, UINT32_MAX };
 
 	for (size_t i = 0; i < sizeof(unknown) / sizeof(unknown[0]); i++) {
 		CHECK_STR(bus_state_to_str(unknown[i]), "unknown");
