@@ -20,7 +20,7 @@
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
 
 /* Results that are looked through for the newest of each line. */
-#define NEWEST (UINT64_C(4) * LIMIT_SLAVES)
+#define NEWEST (UINT64_C(4) * LIMIT_SYNC0_LINES)
 
 enum { PROGRAM_PATH_BYTES = 4096, PROGRAM_ARGUMENTS = 8 };
 
@@ -28,8 +28,8 @@ struct view {
 	const struct sync0_status *page;
 	int is_running;
 	uint32_t lines;
-	int has_result[LIMIT_SLAVES];
-	struct sync0_result result[LIMIT_SLAVES]; /* the newest of each line */
+	int has_result[LIMIT_SYNC0_LINES];
+	struct sync0_result result[LIMIT_SYNC0_LINES]; /* the newest of each line */
 };
 
 /* The newest result of each line is among the last few of the ring. */

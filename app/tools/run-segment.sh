@@ -18,7 +18,7 @@ It needs no privilege where the kernel grants users network namespaces; ecdaqd t
 real-time priority and reports that once.
 
   --seconds N     stop after N seconds in OP (default: at Ctrl-C)
-  --slaves WHAT   1 to 64: number of FB1111+Piccolo slaves; or names, in the order of the line, or as a tree, of the catalogue
+  --slaves WHAT   1 to 512: number of FB1111+Piccolo slaves; or names, in the order of the line, or as a tree, of the catalogue
                   (build/stage/bin/ecdaq-sim --list-slaves): ek1100,el2828,el3104 (default: 2)
   --sii DIR       folder of SII images of real slaves, used instead of the catalogue (default: $ECDAQ_SII)
   --config FILE   ecdaq.yaml for ecdaqd and ecdaq-record (default: built-in defaults)
@@ -111,8 +111,8 @@ check_options()
 		[ -z "$sii" ] || [ -d "$sii" ] || usage_error "--sii: $sii: no such directory"
 		;;
 	*)
-		if [ "${#slaves}" -gt 2 ] || [ "$slaves" -lt 1 ] || [ "$slaves" -gt 64 ]; then
-			usage_error "--slaves: $slaves is not 1 to 64"
+		if [ "${#slaves}" -gt 3 ] || [ "$slaves" -lt 1 ] || [ "$slaves" -gt 512 ]; then
+			usage_error "--slaves: $slaves is not 1 to 512"
 		fi
 		;;
 	esac

@@ -21,8 +21,8 @@ NIC = ["--interface", "lo"]
 MISTAKES = [
     (USAGE, [], "--interface is missing"),
     (FAILED, ["--interface", "nosuchnic"], "nosuchnic: no such interface"),
-    (FAILED, [*NIC, "--slaves", "0"], "expected a number from 1 to 64"),
-    (FAILED, [*NIC, "--slaves", "65"], "expected a number from 1 to 64"),
+    (FAILED, [*NIC, "--slaves", "0"], "expected a number from 1 to 512"),
+    (FAILED, [*NIC, "--slaves", "513"], "expected a number from 1 to 512"),
     (USAGE, [*NIC, "--slaves", ""], "missing value"),
     (FAILED, [*NIC, "--slaves", "a/b"], "--slaves: expected the name of a slave at 'a/b'"),
     (FAILED, [*NIC, "--slaves", "ek1100(el2828"], "--slaves: ')' is missing"),

@@ -11,9 +11,11 @@
 #include <stdatomic.h>
 #include <stdint.h>
 
+#include "limits.h"
+
 #define BOARD_MAGIC UINT64_C(0x3164726162716463) /* "cdqbard1" */
 
-enum { BOARD_OUTPUTS = 512 }; /* the n-th output channel of the channel table */
+enum { BOARD_OUTPUTS = LIMIT_OUTPUTS }; /* the n-th output channel of the channel table */
 
 struct board_output {
 	_Atomic uint64_t raw;    /* [writer] as it goes into the image */

@@ -21,7 +21,7 @@
 #define WORD_BYTES sizeof(uint64_t)
 /* Far above what any ring of ecdaq has; a reader allocates no more than these. */
 #define PAYLOAD_LIMIT (UINT32_C(1) << 16)
-#define META_LIMIT (UINT64_C(1) << 20)
+#define META_LIMIT (UINT64_C(1) << 22)
 /* 280 years at 1 GHz: a head beyond it was not counted but written by someone. */
 #define HEAD_LIMIT (UINT64_C(1) << 62)
 /* Slots that a reader copies at once, in bytes. */

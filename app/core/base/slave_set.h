@@ -18,9 +18,9 @@
 
 #include "base/limits.h"
 
-enum { SLAVE_SET_WORD_BITS = 64, SLAVE_SET_WORDS = 8 };
+enum { SLAVE_SET_WORD_BITS = 64, SLAVE_SET_WORDS = LIMIT_SLAVES / SLAVE_SET_WORD_BITS };
 
-static_assert(LIMIT_SLAVES <= SLAVE_SET_WORDS * SLAVE_SET_WORD_BITS, "a bit for each slave");
+static_assert(LIMIT_SLAVES % SLAVE_SET_WORD_BITS == 0, "whole words");
 
 struct slave_set {
 	uint64_t word[SLAVE_SET_WORDS]; /* bit pos % 64 of word pos / 64 */
@@ -132,7 +132,7 @@ static inline int slave_set_is_equal(const struct slave_set *a, const struct sla
 	return differs == 0;
 }
 
-/* The first position in @set that is not below @from; LIMIT_SLAVES or more: none. */
+/* The first position in @set that is not below @from; LIMIT_SLAVES: none. */
 static inline unsigned slave_set_next(const struct slave_set *set, unsigned from)
 {
 	for (unsigned pos = from; pos / SLAVE_SET_WORD_BITS < SLAVE_SET_WORDS;

@@ -149,7 +149,7 @@ struct sync0_status {
 	_Atomic int64_t noise_p99_ns; /* of the calibration; -1: not calibrated */
 	_Atomic int64_t noise_sd_ns;
 	_Atomic int64_t window_ns;
-	struct sync0_line_status line[LIMIT_SLAVES];
+	struct sync0_line_status line[LIMIT_SYNC0_LINES];
 };
 
 /**

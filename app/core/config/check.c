@@ -125,10 +125,19 @@ static int check_dds(const struct config *cfg, const struct option_lines *lines,
 
 static int check_slaves(const struct config *cfg, const char **ret_key, int *ret_line, char *reason)
 {
+	size_t sync0_lines = 0;
+
 	for (size_t i = 0; i < cfg->slave_count; i++) {
 		const struct config_slave *slave = &cfg->slave[i];
 
 		*ret_line = slave->line;
+		sync0_lines += slave->sync0_line[0] != '\0';
+		if (sync0_lines > LIMIT_SYNC0_LINES) {
+			*ret_key = "slaves[].sync0_line";
+			snprintf(reason, OPTION_WHY_BYTES, "more than LIMIT_SYNC0_LINES = %d lines",
+				 LIMIT_SYNC0_LINES);
+			return -EINVAL;
+		}
 		if (slave->sync0_shift_ns <= -cfg->cycle_period_ns ||
 		    slave->sync0_shift_ns >= cfg->cycle_period_ns) {
 			*ret_key = "slaves[].sync0_shift";

@@ -32,7 +32,11 @@ enum config_sync_type { CONFIG_SYNC_TYPE_SHOW, CONFIG_SYNC_TYPE_WRITE };
 /* slaves[].assign_activate, besides words of 1 to 0xffff */
 enum { CONFIG_ASSIGN_SII = 0, CONFIG_ASSIGN_NONE = 0x10000 };
 
-enum { CONFIG_LIMIT_SDOS = 256, CONFIG_LIMIT_OUTPUTS = 512, CONFIG_PATH_BYTES = 256 };
+enum {
+	CONFIG_LIMIT_SDOS = 4 * LIMIT_SLAVES, /* of all slaves together */
+	CONFIG_LIMIT_OUTPUTS = LIMIT_OUTPUTS,
+	CONFIG_PATH_BYTES = 256,
+};
 enum { CONFIG_OPTIONS_BYTES = 512 };
 
 /* slaves[]: what is expected at each position, and how it is set up. */

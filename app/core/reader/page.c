@@ -65,8 +65,8 @@ int page_read_sync0(const char *path, struct sync0_status *ret_page)
 		return r;
 	}
 	TERMINATE(ret_page->message);
-	bound(&ret_page->line_count, LIMIT_SLAVES);
-	for (unsigned i = 0; i < LIMIT_SLAVES; i++) {
+	bound(&ret_page->line_count, LIMIT_SYNC0_LINES);
+	for (unsigned i = 0; i < LIMIT_SYNC0_LINES; i++) {
 		TERMINATE(ret_page->line[i].slave);
 		TERMINATE(ret_page->line[i].line);
 	}

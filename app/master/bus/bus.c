@@ -126,6 +126,8 @@ void bus_destroy(struct bus *bus)
 	if (bus != NULL) {
 		mailbox_destroy(bus->mailbox);
 		bus_sii_free(bus);
+		free(bus->pdo);
+		free(bus->channel);
 		free(bus);
 	}
 }

@@ -135,9 +135,9 @@ struct bus {
 	struct bus_slave slave[LIMIT_SLAVES];
 	size_t slave_count;
 	struct slave_info info[LIMIT_SLAVES]; /* what bus_slaves() shows */
-	struct pdo_entry pdo[PDO_LIMIT];
+	struct pdo_entry *pdo;                /* of all slaves, since the mapping */
 	size_t pdo_count;
-	struct channel channel[LIMIT_CHANNELS];
+	struct channel *channel; /* since the mapping */
 	size_t channel_count;
 	struct exchange_plan plan;
 	struct schedule schedule;

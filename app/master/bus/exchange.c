@@ -20,7 +20,7 @@ enum {
 	DC_DIFF_MAGNITUDE = 0x7fffffff,
 };
 
-static_assert(LIMIT_FRAMES <= 8, "a bit per frame in history[]");
+static_assert(LIMIT_FRAMES <= 64, "a bit per frame in history[]");
 
 /*
  * How long a frame's end is behind its start, but for its own length: wires, slaves, NIC. The
@@ -42,8 +42,8 @@ struct exchange {
 	unsigned frame_count;
 	uint16_t sequence; /* of the exchange that runs or ran last */
 	uint64_t run_count;
-	unsigned missing;         /* bit per frame of this exchange that is not back */
-	uint8_t history[HISTORY]; /* by sequence: bit per frame that came back */
+	uint64_t missing;          /* bit per frame of this exchange that is not back */
+	uint64_t history[HISTORY]; /* by sequence: bit per frame that came back */
 	struct dc_track dc;
 	_Atomic int is_reference_doubted;   /* [cycle] */
 	_Atomic int is_reference_confirmed; /* [service] sets, [cycle] takes */
@@ -51,7 +51,7 @@ struct exchange {
 	int64_t wire_ns;               /* of its frames */
 	struct exchange_result result; /* result being built; keeps the counts of a ride for the
 					  next one */
-	struct exchange_frame frame[LIMIT_FRAMES];
+	struct exchange_frame *frame;  /* frame_count of them */
 	uint8_t inputs[LIMIT_IMAGE_BYTES];
 	uint8_t received[LIMIT_FRAME_BYTES];
 };
@@ -94,11 +94,16 @@ int exchange_create(const struct exchange_plan *plan, struct line *line,
 	ex->transport = *line_transport(line);
 	ex->platform = *line_platform(line);
 	ex->frame_count = exchange_frame_count(plan);
+	ex->frame = calloc(ex->frame_count, sizeof(ex->frame[0]));
+	if (ex->frame == NULL) {
+		free(ex);
+		return -ENOMEM;
+	}
 	for (unsigned i = 0; i < ex->frame_count; i++) {
 		int r = exchange_frame_build(plan, i, &ex->frame[i]);
 
 		if (r < 0) {
-			free(ex);
+			exchange_destroy(ex);
 			return r;
 		}
 		ex->wire_ns += ecat_wire_time_ns(ex->frame[i].len);
@@ -109,6 +114,9 @@ int exchange_create(const struct exchange_plan *plan, struct line *line,
 
 void exchange_destroy(struct exchange *ex)
 {
+	if (ex != NULL) {
+		free(ex->frame);
+	}
 	free(ex);
 }
 
@@ -158,7 +166,7 @@ static unsigned send_frames(struct exchange *ex, const uint8_t *image)
 		if (ef->dc != 0) {
 			load_dc(ex, ef, ex->result.sent);
 		}
-		ex->missing |= 1u << i;
+		ex->missing |= UINT64_C(1) << i;
 		r = ex->transport.send(ex->transport.ctx, ef->bytes, ef->len);
 		if (r < 0) {
 			ex->result.send_error = r;
@@ -261,8 +269,8 @@ static void measure_path(struct path_time *path, int64_t ns)
 static int sort_frame(struct exchange *ex, unsigned number, uint16_t sequence, mono_t at)
 {
 	unsigned age = (uint16_t)(ex->sequence - sequence);
-	uint8_t *came = &ex->history[sequence % HISTORY];
-	uint8_t bit = (uint8_t)(1u << number);
+	uint64_t *came = &ex->history[sequence % HISTORY];
+	uint64_t bit = UINT64_C(1) << number;
 
 	if (age >= ex->run_count) {
 		ex->result.foreign++;
@@ -278,7 +286,7 @@ static int sort_frame(struct exchange *ex, unsigned number, uint16_t sequence, m
 	/* Outside exchange_run() no frame is pending: one that comes then is late by at least one
 	 * cycle. */
 	if (age == 0 && (ex->missing & bit) != 0) {
-		ex->missing &= ~(unsigned)bit;
+		ex->missing &= ~bit;
 		keep_frame(ex, number);
 		if (ex->missing == 0) {
 			ex->result.round_trip = mono_sub(at, ex->result.sent);

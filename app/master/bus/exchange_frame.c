@@ -90,7 +90,8 @@ static uint32_t register_address(uint16_t station, uint16_t reg)
 	return (uint32_t)reg << 16 | station;
 }
 
-/* The chunks that frame @number carries. The bytes they take of its capacity. */
+/* The chunks that frame @number carries. The bytes they take of its capacity; UINT32_MAX: too
+ * many. */
 static uint32_t list_parts(const struct exchange_plan *plan, unsigned number,
 			   struct exchange_frame *ef)
 {
@@ -99,6 +100,9 @@ static uint32_t list_parts(const struct exchange_plan *plan, unsigned number,
 
 	for (unsigned i = 0; i < plan->chunk_count; i++) {
 		if (plan->chunk_frame[i] == number) {
+			if (ef->part_count == EXCHANGE_PARTS) {
+				return UINT32_MAX;
+			}
 			taken += (ef->part_count > 0 ? OVERHEAD : 0) + plan->chunk_bytes[i];
 			ef->part[ef->part_count++] = (struct exchange_part){
 				.offset = offset, .len = plan->chunk_bytes[i], .chunk = i

@@ -20,6 +20,8 @@ enum {
 	EXCHANGE_DIFF_BYTES = 4,
 	EXCHANGE_NOP_BYTES = 2,
 	EXCHANGE_NUMBERED = 2, /* datagrams whose index bytes carry the sequence */
+	/* Datagrams of one byte that a frame has room for. */
+	EXCHANGE_PARTS = LIMIT_FRAME_BYTES / (EXCHANGE_OVERHEAD + 1),
 };
 
 /* One datagram of process data: a chunk of the process image. */
@@ -37,7 +39,7 @@ struct exchange_frame {
 	size_t len;
 	size_t datagram[EXCHANGE_NUMBERED]; /* the first ones */
 	unsigned datagram_count;
-	struct exchange_part part[LIMIT_CHUNKS];
+	struct exchange_part part[EXCHANGE_PARTS];
 	unsigned part_count;
 	size_t dc;   /* FRMW or FPRD of 0x0910 */
 	size_t al;   /* BRD of 0x0130 */

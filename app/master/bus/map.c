@@ -7,6 +7,7 @@
  */
 #include <errno.h>
 #include <inttypes.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "base/bytes.h"
@@ -275,6 +276,28 @@ static int read_all(struct bus *bus)
 	return r;
 }
 
+/* At their limits while their sizes are not known. */
+static int make_tables(struct bus *bus)
+{
+	free(bus->pdo);
+	free(bus->channel);
+	bus->pdo = calloc(PDO_LIMIT, sizeof(bus->pdo[0]));
+	bus->channel = calloc(LIMIT_CHANNELS, sizeof(bus->channel[0]));
+	return bus->pdo != NULL && bus->channel != NULL
+		       ? 0
+		       : bus_fail(bus, -ENOMEM, "no memory for the channel table");
+}
+
+/* Memory of ecdaqd is locked: what is not used is given back. */
+static void shrink_tables(struct bus *bus)
+{
+	void *pdo = realloc(bus->pdo, (bus->pdo_count + 1) * sizeof(bus->pdo[0]));
+	void *channel = realloc(bus->channel, (bus->channel_count + 1) * sizeof(bus->channel[0]));
+
+	bus->pdo = pdo != NULL ? pdo : bus->pdo;
+	bus->channel = channel != NULL ? channel : bus->channel;
+}
+
 int bus_map(struct bus *bus, char *error)
 {
 	static const uint8_t image[LIMIT_IMAGE_BYTES]; /* SOEM only computes places in it */
@@ -282,7 +305,8 @@ int bus_map(struct bus *bus, char *error)
 	int r;
 
 	bus->error = error;
-	r = read_all(bus);
+	r = make_tables(bus);
+	r = r < 0 ? r : read_all(bus);
 	if (r < 0) {
 		return r;
 	}
@@ -294,6 +318,7 @@ int bus_map(struct bus *bus, char *error)
 	for (size_t i = 0; i < bus->slave_count && r >= 0; i++) {
 		r = set_watchdog(bus, i);
 	}
+	shrink_tables(bus);
 	bus_publish_slaves(bus);
 	return r;
 }

@@ -32,7 +32,7 @@ int checker_create(const struct checker_spec *spec, struct checker **ret_checker
 	struct checker *ck;
 	int r;
 
-	if (spec->line_count == 0 || spec->line_count > LIMIT_SLAVES || spec->period_ns <= 0 ||
+	if (spec->line_count == 0 || spec->line_count > LIMIT_SYNC0_LINES || spec->period_ns <= 0 ||
 	    spec->window_ns / spec->period_ns < WINDOW_CYCLES_MIN) {
 		return -EINVAL;
 	}

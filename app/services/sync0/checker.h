@@ -44,7 +44,7 @@ struct checker_spec {
 	uint64_t session;
 	int64_t mono_to_tai_ns; /* for the results' times */
 	size_t line_count;
-	struct checker_line line[LIMIT_SLAVES];
+	struct checker_line line[LIMIT_SYNC0_LINES];
 	struct judge_limits limits;
 	struct judge_noise noise;
 	/* What comes out; any may be NULL. */

@@ -45,7 +45,7 @@ struct checker {
 	int64_t newest_cycle; /* of the master, or of the first line */
 	uint64_t windows;
 	uint64_t alarms;
-	struct line line[LIMIT_SLAVES];
+	struct line line[LIMIT_SYNC0_LINES];
 };
 
 static inline struct window *checker_oldest(const struct checker *ck)

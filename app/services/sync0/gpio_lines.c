@@ -22,7 +22,7 @@ struct one_line {
 struct gpio_lines {
 	const struct config *cfg;
 	const char *dev_dir;
-	struct one_line line[LIMIT_SLAVES];
+	struct one_line line[LIMIT_SYNC0_LINES];
 	size_t count;
 };
 
@@ -36,7 +36,7 @@ struct gpio_lines *gpio_lines_create(const struct config *cfg, const char *dev_d
 	l->cfg = cfg;
 	l->dev_dir = dev_dir;
 	for (size_t i = 0; i < cfg->slave_count; i++) {
-		if (cfg->slave[i].sync0_line[0] != '\0') {
+		if (cfg->slave[i].sync0_line[0] != '\0' && l->count < LIMIT_SYNC0_LINES) {
 			l->line[l->count++] = (struct one_line){ .slave_pos = (uint16_t)i,
 								 .text = cfg->slave[i].sync0_line };
 		}
@@ -135,7 +135,7 @@ size_t gpio_lines_open(struct gpio_lines *l, gpio_lines_report report, void *ctx
 
 void gpio_lines_wait(const struct gpio_lines *l, int ms)
 {
-	struct pollfd fds[LIMIT_SLAVES];
+	struct pollfd fds[LIMIT_SYNC0_LINES];
 	nfds_t n = 0;
 
 	for (size_t i = 0; i < l->count; i++) {

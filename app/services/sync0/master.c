@@ -18,7 +18,7 @@ enum { SHOT_INDEX = 0x7000, SHOT_SUBINDEX = 2, SHOT_BITS = 64 };
 struct master {
 	struct reader *reader;
 	int has_session;
-	uint64_t slaves;
+	struct slave_set slaves;
 	const struct channel *shot_channel[LIMIT_SLAVES];
 	uint64_t shot_ns[LIMIT_SLAVES];
 };
@@ -68,7 +68,7 @@ int master_open(struct master *m)
 	}
 	m->has_session = 1;
 	seek_back(m);
-	master_watch_shots(m, 0);
+	master_watch_shots(m, &(struct slave_set){ .word = { 0 } });
 	return 1;
 }
 
@@ -77,18 +77,18 @@ const struct channel_table *master_table(const struct master *m)
 	return reader_table(m->reader);
 }
 
-void master_watch_shots(struct master *m, uint64_t slaves)
+void master_watch_shots(struct master *m, const struct slave_set *slaves)
 {
 	const struct channel_table *t = reader_table(m->reader);
 	const struct channel *ch = t->channels;
 
-	m->slaves = slaves;
+	m->slaves = *slaves;
 	memset(m->shot_channel, 0, sizeof(m->shot_channel));
 	memset(m->shot_ns, 0, sizeof(m->shot_ns));
 	for (uint32_t i = 0; i < t->meta.channel_count; i++) {
 		if (ch[i].index == SHOT_INDEX && ch[i].subindex == SHOT_SUBINDEX &&
 		    ch[i].bit_len == SHOT_BITS && ch[i].direction == CHANNEL_OUTPUT &&
-		    (slaves >> ch[i].slave_pos & 1) != 0) {
+		    slave_set_has(slaves, ch[i].slave_pos)) {
 			m->shot_channel[ch[i].slave_pos] = &ch[i];
 		}
 	}

@@ -23,8 +23,8 @@ int master_open(struct master *m);
 /** Of the open session. */
 const struct channel_table *master_table(const struct master *m);
 
-/* Slaves whose shots are looked for: bit n of the positions. */
-void master_watch_shots(struct master *m, uint64_t slaves);
+/* Slaves whose shots are looked for. */
+void master_watch_shots(struct master *m, const struct slave_set *slaves);
 
 /* The time of the slave's shot was set to @dc_ns, which may have passed or be 0: then to none. */
 struct master_shot {

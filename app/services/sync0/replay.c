@@ -141,7 +141,7 @@ static void fill_lines(struct replay_run *run, const struct contents *c, struct 
 	for (uint16_t pos = 0; pos < LIMIT_SLAVES; pos++) {
 		int is_oneshot = c->shots[pos] > 0 || config_is_oneshot(cfg, pos);
 
-		if (c->edges[pos] + c->shots[pos] == 0) {
+		if (c->edges[pos] + c->shots[pos] == 0 || spec->line_count == LIMIT_SYNC0_LINES) {
 			continue;
 		}
 		run->line_of_slave[pos] = spec->line_count + 1;

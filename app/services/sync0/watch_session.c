@@ -54,7 +54,8 @@ static void lines_of_session(struct watch *w)
 		memset(w->line_of_slave, 0, sizeof(w->line_of_slave));
 		w->line_count = 0;
 		for (uint32_t i = 0; i < meta->slave_count; i++) {
-			if (slave[i].has_dc && slave[i].slave_pos < LIMIT_SLAVES) {
+			if (slave[i].has_dc && slave[i].slave_pos < LIMIT_SLAVES &&
+			    w->line_count < LIMIT_SYNC0_LINES) {
 				w->line_of_slave[slave[i].slave_pos] = ++w->line_count;
 			}
 		}
@@ -153,7 +154,7 @@ static struct checker_spec session_spec(struct watch *w)
 void watch_begin_session(struct watch *w)
 {
 	struct checker_spec spec;
-	uint64_t shots = 0;
+	struct slave_set shots = slave_set_empty();
 	int r;
 
 	w->has_session = 1;
@@ -171,10 +172,10 @@ void watch_begin_session(struct watch *w)
 	}
 	for (size_t i = 0; i < spec.line_count; i++) {
 		if (spec.line[i].mode == CHECKER_ONESHOT) {
-			shots |= UINT64_C(1) << spec.line[i].slave_pos;
+			slave_set_add(&shots, spec.line[i].slave_pos);
 		}
 	}
-	master_watch_shots(w->master, shots);
+	master_watch_shots(w->master, &shots);
 	watch_set_state(w, SYNC0_LEARNING);
 }
 

@@ -15,7 +15,7 @@ static unsigned next_port(unsigned port)
 static void process(struct frame_path *path, unsigned slave, int64_t t_ns)
 {
 	if (path->count < LIMIT_SLAVES) {
-		path->slave[path->count++] = (uint8_t)slave;
+		path->slave[path->count++] = (uint16_t)slave;
 	}
 	path->passing[slave].pu_ns = t_ns;
 }

@@ -35,7 +35,7 @@ struct path_node {
 /* Times from the moment at which the frame leaves the master. */
 struct frame_path {
 	unsigned count;
-	uint8_t slave[LIMIT_SLAVES];            /* in the order of processing */
+	uint16_t slave[LIMIT_SLAVES];           /* in the order of processing */
 	struct esc_frame passing[LIMIT_SLAVES]; /* by slave */
 	int is_back;
 	enum segment_port exit;

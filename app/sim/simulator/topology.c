@@ -48,6 +48,7 @@ static int take_list(struct topology *l)
 
 static int take_slaves(struct topology *l)
 {
+	char line[LINE_BYTES];
 	char *end;
 	long count = strtol(l->opt->slaves, &end, 10);
 
@@ -55,7 +56,9 @@ static int take_slaves(struct topology *l)
 		return take_list(l);
 	}
 	if (count < 1 || count > LIMIT_SLAVES) {
-		return sim_error("--slaves: expected a number from 1 to 64");
+		snprintf(line, sizeof(line), "--slaves: expected a number from 1 to %d",
+			 LIMIT_SLAVES);
+		return sim_error(line);
 	}
 	for (; l->count < (int)count; l->count++) {
 		l->entry[l->count] = (struct slave_list_entry){ .name = "fb1111_piccolo",

@@ -47,7 +47,7 @@ TEST(config, conflicting_options_are_reported_with_a_line_of_the_file)
 
 TEST(config, lists_longer_than_the_compiled_limit_name_it)
 {
-	static char text[65536];
+	static char text[262144];
 	size_t len = (size_t)snprintf(text, sizeof(text), "slaves:\n");
 
 	for (int i = 0; i < LIMIT_SLAVES; i++) {
@@ -58,14 +58,36 @@ TEST(config, lists_longer_than_the_compiled_limit_name_it)
 	parse_ok(text, &cfg);
 	CHECK_EQ(cfg.slave_count, LIMIT_SLAVES);
 	snprintf(text + len, sizeof(text) - len, "- name: more\n");
-	parse_fails(text, "t.yaml:66: slaves: more than LIMIT_SLAVES = 64 items");
+	parse_fails(text, "t.yaml:514: slaves: more than LIMIT_SLAVES = 512 items");
 
 	len = (size_t)snprintf(text, sizeof(text), "slaves:\n- sdo:\n");
 	for (int i = 0; i <= CONFIG_LIMIT_SDOS; i++) {
 		len += (size_t)snprintf(text + len, sizeof(text) - len,
 					"  - { index: 0x8000, type: UINT, value: %d }\n", i);
 	}
-	parse_fails(text, "t.yaml:259: slaves[0].sdo: more than CONFIG_LIMIT_SDOS = 256 items");
+	parse_fails(text, "t.yaml:2051: slaves[0].sdo: more than CONFIG_LIMIT_SDOS = 2048 items");
+}
+
+TEST(config, more_outputs_and_sync0_lines_than_the_limit_name_it)
+{
+	static char text[524288];
+	static struct config cfg;
+	size_t len = (size_t)snprintf(text, sizeof(text), "outputs:\n");
+
+	for (int i = 0; i < LIMIT_OUTPUTS; i++) {
+		len += (size_t)snprintf(text + len, sizeof(text) - len, "- channel: a.o%d\n", i);
+	}
+	parse_ok(text, &cfg);
+	CHECK_EQ(cfg.output_count, LIMIT_OUTPUTS);
+	snprintf(text + len, sizeof(text) - len, "- channel: a.more\n");
+	parse_fails(text, "t.yaml:4098: outputs: more than CONFIG_LIMIT_OUTPUTS = 4096 items");
+
+	len = (size_t)snprintf(text, sizeof(text), "slaves:\n");
+	for (int i = 0; i <= LIMIT_SYNC0_LINES; i++) {
+		len += (size_t)snprintf(text + len, sizeof(text) - len, "- sync0_line: chip:%d\n",
+					i);
+	}
+	parse_fails(text, "t.yaml:66: slaves[].sync0_line: more than LIMIT_SYNC0_LINES = 64 lines");
 }
 
 TEST(config, aliases_and_anchors_work_and_cannot_recurse)

@@ -80,9 +80,11 @@ TEST(page, texts_of_the_other_programs_pages_end_too)
 	memset((char *)page + 12, 'x', sizeof(sync0) - 12);
 	CHECK_EQ(page_read_sync0(path, &sync0), 0);
 	CHECK_EQ(strlen(sync0.message), sizeof(sync0.message) - 1);
-	CHECK_EQ(strlen(sync0.line[63].slave), sizeof(sync0.line[63].slave) - 1);
-	CHECK_EQ(strlen(sync0.line[63].line), sizeof(sync0.line[63].line) - 1);
-	CHECK_EQ(sync0.line_count, LIMIT_SLAVES);
+	CHECK_EQ(strlen(sync0.line[LIMIT_SYNC0_LINES - 1].slave),
+		 sizeof(sync0.line[LIMIT_SYNC0_LINES - 1].slave) - 1);
+	CHECK_EQ(strlen(sync0.line[LIMIT_SYNC0_LINES - 1].line),
+		 sizeof(sync0.line[LIMIT_SYNC0_LINES - 1].line) - 1);
+	CHECK_EQ(sync0.line_count, LIMIT_SYNC0_LINES);
 	status_unmap(page, sizeof(sync0));
 	unlink(path);
 }

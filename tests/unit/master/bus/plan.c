@@ -3,6 +3,7 @@
 
 #include <errno.h>
 
+#include "base/slave_set.h"
 #include "bus/exchange_frame.h"
 #include "harness/test.h"
 
@@ -98,14 +99,17 @@ TEST(plan, buffer_larger_than_a_frame_is_named)
 
 TEST(plan, more_frames_than_the_limit_are_refused)
 {
-	struct exchange_plan plan = plan_of(9 * 1400);
-	struct plan_area area[9];
+	enum { AREAS = LIMIT_FRAMES + 1 };
+	struct exchange_plan plan = plan_of(LIMIT_FRAMES * 1400);
+	struct plan_area area[AREAS];
 	int blocked = 5;
 
-	for (unsigned i = 0; i < 9; i++) {
+	for (unsigned i = 0; i < AREAS; i++) {
 		area[i] = area_of(i * 1400, i * 1400 + 1400, (uint16_t)i, 0);
 	}
-	CHECK_EQ(plan_chunks(&plan, area, 9, &blocked), -E2BIG);
+	CHECK_EQ(plan_chunks(&plan, area, LIMIT_FRAMES, &blocked), 0);
+	plan = plan_of(AREAS * 1400);
+	CHECK_EQ(plan_chunks(&plan, area, AREAS, &blocked), -E2BIG);
 	CHECK_EQ(blocked, -1);
 }
 
@@ -161,23 +165,27 @@ TEST(plan, split_keeps_together_what_shares_a_byte_or_is_one_slave_s)
 	CHECK_EQ(plan.chunk_slaves[2].word[0], 8);
 }
 
-TEST(plan, split_fills_frames_in_order_up_to_sixty_four_slaves)
+TEST(plan, split_fills_frames_in_order_up_to_the_greatest_bus)
 {
-	struct exchange_plan plan = plan_of(64 * 22);
-	struct plan_area area[128];
+	enum { OUT = 8, IN = 56, INPUTS = LIMIT_SLAVES * OUT };
+	struct exchange_plan plan = plan_of(LIMIT_IMAGE_BYTES);
+	static struct plan_area area[2 * LIMIT_SLAVES];
 	struct exchange_frame frame;
 	uint32_t bytes = 0;
 	int blocked;
 
-	for (unsigned i = 0; i < 64; i++) {
-		area[i] = area_of(i * 9, i * 9 + 9, (uint16_t)i, 1);
-		area[64 + i] = area_of(64 * 9 + i * 13, 64 * 9 + i * 13 + 13, (uint16_t)i, 0);
+	for (unsigned i = 0; i < LIMIT_SLAVES; i++) {
+		area[i] = area_of(i * OUT, i * OUT + OUT, (uint16_t)i, 1);
+		area[LIMIT_SLAVES + i] =
+			area_of(INPUTS + i * IN, INPUTS + i * IN + IN, (uint16_t)i, 0);
 	}
 	plan.is_split = 1;
-	CHECK_EQ(plan_chunks(&plan, area, 128, &blocked), 0);
-	CHECK_EQ(plan.chunk_count, 128);
-	CHECK_EQ(plan.wkc_expected, 3 * 64);
-	CHECK_EQ(exchange_frame_count(&plan), 3);
+	CHECK_EQ(plan_chunks(&plan, area, 2 * LIMIT_SLAVES, &blocked), 0);
+	CHECK_EQ(plan.chunk_count, 2 * LIMIT_SLAVES);
+	CHECK_EQ(plan.wkc_expected, 3 * LIMIT_SLAVES);
+	CHECK_EQ(slave_set_count(&plan.chunk_slaves[LIMIT_SLAVES + 300]), 1);
+	CHECK(slave_set_has(&plan.chunk_slaves[LIMIT_SLAVES + 300], 300));
+	CHECK_EQ(exchange_frame_count(&plan), 32);
 	for (unsigned n = 0; n < exchange_frame_count(&plan); n++) {
 		CHECK_EQ(exchange_frame_build(&plan, n, &frame), 0);
 		CHECK(frame.len <= LIMIT_FRAME_BYTES);

@@ -40,6 +40,14 @@ static size_t next(struct ring_bench *b, struct master_item *ret)
 	return ret->shots;
 }
 
+static void watch_shots_of(struct ring_bench *b, unsigned slave)
+{
+	struct slave_set slaves = slave_set_empty();
+
+	slave_set_add(&slaves, slave);
+	master_watch_shots(b->master, &slaves);
+}
+
 TEST(sync0, a_shot_is_every_change_of_its_time_in_the_ring)
 {
 	struct ring_bench b;
@@ -53,7 +61,7 @@ TEST(sync0, a_shot_is_every_change_of_its_time_in_the_ring)
 	fake_master_push(&b.fake, 0);
 	fake_master_push(&b.fake, UINT64_MAX);
 	CHECK_EQ(master_open(b.master), 1);
-	master_watch_shots(b.master, UINT64_C(1) << FAKE_SHOT_SLAVE);
+	watch_shots_of(&b, FAKE_SHOT_SLAVE);
 	CHECK_EQ(next(&b, &item), 0);
 	CHECK_EQ(next(&b, &item), 1);
 	CHECK_EQ(item.shot[0].slave_pos, FAKE_SHOT_SLAVE);
@@ -77,7 +85,7 @@ TEST(sync0, a_shot_that_was_armed_before_the_first_look_is_known)
 	fake_master_push(&b.fake, at_ns);
 	fake_master_push(&b.fake, at_ns);
 	CHECK_EQ(master_open(b.master), 1);
-	master_watch_shots(b.master, UINT64_C(1) << FAKE_SHOT_SLAVE);
+	watch_shots_of(&b, FAKE_SHOT_SLAVE);
 	CHECK_EQ(next(&b, &item), 1);
 	CHECK_EQ(item.shot[0].dc_ns, at_ns);
 	CHECK_EQ(next(&b, &item), 0);
@@ -92,7 +100,7 @@ TEST(sync0, shots_of_a_slave_that_is_not_in_one_shot_mode_are_not_looked_for)
 	begin(&b);
 	fake_master_push(&b.fake, (uint64_t)(FAKE_DC0_NS + 50 * PERIOD_NS));
 	CHECK_EQ(master_open(b.master), 1);
-	master_watch_shots(b.master, UINT64_C(1) << 0);
+	watch_shots_of(&b, 0);
 	CHECK_EQ(next(&b, &item), 0);
 	end(&b);
 }

@@ -255,7 +255,7 @@ TEST(topology, a_segment_that_cannot_be_is_refused)
 	CHECK(s == NULL);
 }
 
-TEST(topology, a_line_of_64_slaves_answers_as_64)
+TEST(topology, a_line_of_as_many_slaves_as_allowed_answers_as_that_many)
 {
 	static struct segment_slave_spec spec[LIMIT_SLAVES];
 	static const uint8_t sii[16];
@@ -271,7 +271,8 @@ TEST(topology, a_line_of_64_slaves_answers_as_64)
 	}
 	CHECK_EQ(segment_create(spec, LIMIT_SLAVES, 0, &s), 0);
 	CHECK_EQ(send(s, MS, ECAT_CMD_BRD, 0, ESC_REG_TYPE, data, 1), LIMIT_SLAVES);
-	CHECK_EQ(send(s, MS, ECAT_CMD_APRD, (uint16_t)-63, ESC_REG_TYPE, data, 1), 1);
-	CHECK_EQ(send(s, MS, ECAT_CMD_APRD, (uint16_t)-64, ESC_REG_TYPE, data, 1), 0);
+	CHECK_EQ(send(s, MS, ECAT_CMD_APRD, (uint16_t)(1 - LIMIT_SLAVES), ESC_REG_TYPE, data, 1),
+		 1);
+	CHECK_EQ(send(s, MS, ECAT_CMD_APRD, (uint16_t)-LIMIT_SLAVES, ESC_REG_TYPE, data, 1), 0);
 	segment_destroy(s);
 }
