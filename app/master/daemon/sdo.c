@@ -36,6 +36,8 @@ static const char *why(const struct mailbox_request *rq)
 		return "cancelled";
 	case -EMSGSIZE:
 		return "object is longer than 1 MiB";
+	case -EIO:
+		return "the slave is lost";
 	case -ENODEV:
 		return "the slave was restarted";
 	case -ENOTSUP:
