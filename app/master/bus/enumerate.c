@@ -161,29 +161,21 @@ static int read_chips(struct bus *bus)
 	for (size_t i = 0; i < bus->slave_count; i++) {
 		ec_slavet *soem = &bus->soem_slave[soem_index(i)];
 		struct bus_slave *sl = &bus->slave[i];
-		uint8_t alias[2] = { 0 };
 		uint8_t dl_status[2] = { 0 };
 		uint16_t station = (uint16_t)(STATION_FIRST + i);
 		struct access access[] = {
-			{ .cmd = ECAT_CMD_FPRD,
-			  .adp = station,
-			  .reg = ESC_REG_STATION_ALIAS,
-			  .len = 2,
-			  .data = alias },
 			{ .cmd = ECAT_CMD_FPRD,
 			  .adp = station,
 			  .reg = ESC_REG_DL_STATUS,
 			  .len = 2,
 			  .data = dl_status },
 		};
-		int r = registers_run(bus, access, 2);
+		int r = registers_run(bus, access, 1);
 
 		if (r < 0) {
 			return r;
 		}
-		sl->info.alias = get_le16(alias);
 		sl->clock.ports = open_ports(get_le16(dl_status));
-		soem->aliasadr = sl->info.alias;
 		soem->activeports = sl->clock.ports;
 	}
 	return 0;

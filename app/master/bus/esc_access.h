@@ -98,8 +98,8 @@ enum sii_job_kind { SII_JOB_READ, SII_JOB_WRITE, SII_JOB_ALIAS };
 
 /*
  * One read or write of an EEPROM, in steps of one frame. The caller owns it and its image, calls
- * begin, then step until it does not return 1, and may stop calling at any time (see
- * sii_job_cancel()). Fields are read only.
+ * begin, then step until it does not return 1, and may stop calling at any time: a write then
+ * leaves what a power loss leaves. Fields are read only.
  *
  * Power loss during a write. The order is: word 7 gets a value that is the checksum of neither the
  * old nor the new words 0 to 6 nor of any mixture on the way; words from 8 on; words 0 to 6; word 7
@@ -114,9 +114,10 @@ struct sii_job {
 	size_t pos;
 	uint16_t alias;
 	enum esc_guard guard;
-	uint8_t *image;   /* of the caller: read into, or written from */
-	size_t capacity;  /* of image */
-	size_t len_bytes; /* of the EEPROM (read) or of the image (write) */
+	uint8_t *image;          /* of the caller, read into */
+	const uint8_t *contents; /* of the caller, written from */
+	size_t capacity;         /* of image */
+	size_t len_bytes;        /* of the EEPROM (read) or of the image (write) */
 	size_t done_words;
 	size_t total_words;   /* for progress; grows once the size is known */
 	size_t written_words; /* that differed */
@@ -128,7 +129,8 @@ struct sii_job {
 	uint32_t word;
 	uint16_t header[SII_HEADER_WORDS]; /* as it was in the EEPROM */
 	uint16_t wanted_header[SII_HEADER_WORDS];
-	uint16_t pending; /* value being written */
+	uint16_t words[12]; /* header and identity, while they are read */
+	uint16_t pending;   /* value being written */
 	uint8_t tries;
 	uint8_t is_changed; /* a word differed: word 7 is marked */
 };

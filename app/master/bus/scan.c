@@ -121,7 +121,11 @@ static void take_identity(struct bus *bus, size_t pos)
 {
 	struct slave_info *info = &bus->slave[pos].info;
 	const uint8_t *sii = bus->slave[pos].sii;
+	uint8_t alias[2] = { 0 };
 
+	/* The chip takes it from the EEPROM when it loads that. */
+	register_read(bus, pos, ESC_REG_STATION_ALIAS, alias, sizeof(alias));
+	info->alias = get_le16(alias);
 	info->vendor = get_le32(sii + SII_VENDOR_BYTE);
 	info->product = get_le32(sii + SII_PRODUCT_BYTE);
 	info->revision = get_le32(sii + SII_REVISION_BYTE);
