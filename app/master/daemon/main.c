@@ -155,6 +155,7 @@ static int bring_up(struct program *pg, struct failure *failure)
 
 	if (r == 0) {
 		begin(pg);
+		failure->code = EXIT_CODE_OK; /* whatever an earlier one failed with */
 		return 0;
 	}
 	if (!session_is_waiting(pg->session) || session_is_stop_asked(pg->session)) {
@@ -164,6 +165,7 @@ static int bring_up(struct program *pg, struct failure *failure)
 		return r;
 	}
 	begin_waiting(pg, failure);
+	failure->code = EXIT_CODE_OK;
 	return 0;
 }
 
@@ -193,9 +195,7 @@ static int run_bus(struct program *pg, struct failure *failure)
 		return r;
 	}
 	if (session_is_waiting(pg->session)) {
-		session_stop(pg->session, &stopping); /* what it waits for is no failure of the stop
-						       */
-		failure->code = EXIT_CODE_OK;
+		session_stop(pg->session, &stopping); /* it was not up: not a failed stop */
 		return 0;
 	}
 	return session_stop(pg->session, failure);

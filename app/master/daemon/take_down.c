@@ -75,6 +75,9 @@ void session_drop(struct session *session)
 {
 	struct session *s = session;
 
+	if (s->run.page == NULL) {
+		return; /* the run directory is another ecdaqd's: nothing was up */
+	}
 	session_release(s);
 	session_forget_states(s);
 	session_cycle_end(s);
