@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* ecdaq-sim: the simulated segment on a network interface, in real time. */
 #include <errno.h>
+#include <inttypes.h>
 #include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -55,26 +56,34 @@ static void write_edge(void *ctx, unsigned slave, int64_t t_ns, uint64_t system_
 	edge_writer_put(((struct simulation *)ctx)->edges, slave, t_ns, system_time_ns);
 }
 
+static int make_faults(struct simulation *sim, char *error, size_t error_bytes)
+{
+	size_t slaves = segment_slave_count(sim->segment);
+	char jitter[64] = "";
+	int r;
+
+	sim->faults = fault_plan_create((uint64_t)sim->opt.seed.value, wire_socket_now_ns());
+	if (sim->faults == NULL) {
+		snprintf(error, error_bytes, "no memory");
+		return -ENOMEM;
+	}
+	if (sim->opt.transit_jitter_ns.value > 0) {
+		snprintf(jitter, sizeof(jitter), "p=1 jitter by=%" PRId64 "ns",
+			 (int64_t)sim->opt.transit_jitter_ns.value);
+	}
+	r = fault_plan_add(sim->faults, jitter, slaves, error, error_bytes);
+	return r < 0 || sim->opt.faults == NULL
+		       ? r
+		       : fault_plan_load(sim->faults, sim->opt.faults, slaves, error, error_bytes);
+}
+
 static int open_all(struct simulation *sim)
 {
 	char error[256];
 	int r;
 
-	sim->faults = fault_plan_create((uint64_t)sim->opt.seed.value, wire_socket_now_ns());
-	if (sim->faults == NULL) {
-		return sim_error("no memory");
-	}
-	if (sim->opt.transit_jitter_ns.value > 0) {
-		char line[64];
-
-		snprintf(line, sizeof(line), "p=1 jitter by=%ldns",
-			 (long)sim->opt.transit_jitter_ns.value);
-		fault_plan_add(sim->faults, line, segment_slave_count(sim->segment), error,
-			       sizeof(error));
-	}
-	if (sim->opt.faults != NULL &&
-	    fault_plan_load(sim->faults, sim->opt.faults, segment_slave_count(sim->segment), error,
-			    sizeof(error)) < 0) {
+	r = make_faults(sim, error, sizeof(error));
+	if (r < 0) {
 		return sim_error(error);
 	}
 	if (sim->opt.edges != NULL) {
