@@ -21,7 +21,7 @@ void check_init(struct check *check, const struct config *cfg, const struct slav
 
 void check_restart_some(struct check *check, const struct slave_set *slaves)
 {
-	for (unsigned i = slave_set_next(slaves, 0); i < check->slave_count;
+	for (unsigned i = slave_set_next(slaves, 0); i < LIMIT_SLAVES;
 	     i = slave_set_next(slaves, i + 1)) {
 		check->slave[i].has_last = 0;
 	}

@@ -76,7 +76,7 @@ static void count_samples(struct cycle *cy, const struct slave_set *wrong)
 {
 	struct cycle_stats *st = cy->spec.stats;
 
-	for (unsigned i = slave_set_next(&cy->live, 0); i < cy->spec.slave_count;
+	for (unsigned i = slave_set_next(&cy->live, 0); i < LIMIT_SLAVES;
 	     i = slave_set_next(&cy->live, i + 1)) {
 		if (slave_set_has(&cy->sample.slaves_bad, i)) {
 			ADD(st->samples_bad, 1);

@@ -44,7 +44,7 @@ static void count_skipped(struct cycle *cy, uint64_t count)
 	ADD(st->overruns, 1);
 	ADD(st->cycles_skipped, count);
 	ADD(st->samples_bad, count * slave_set_count(&cy->live));
-	for (unsigned i = slave_set_next(&cy->live, 0); i < cy->spec.slave_count;
+	for (unsigned i = slave_set_next(&cy->live, 0); i < LIMIT_SLAVES;
 	     i = slave_set_next(&cy->live, i + 1)) {
 		ADD(st->slave_bad[i], count);
 	}
