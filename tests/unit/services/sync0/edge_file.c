@@ -40,7 +40,7 @@ TEST(sync0, a_line_that_is_none_is_refused_and_leaves_the_output_untouched)
 {
 	static const char *const bad[] = {
 		"1",
-		"64 5",
+		"512 5",
 		"-1 5",
 		"0 -5",
 		"0 0",
@@ -61,7 +61,7 @@ TEST(sync0, a_line_that_is_none_is_refused_and_leaves_the_output_untouched)
 		"0 99999999999999999999",
 		"cc 1 2 3 4 5 6 1",
 		"s 1 2",
-		"s 64 2 3",
+		"s 512 2 3",
 		"s 1 2 3 4",
 		"s 1 -2 3",
 		"sc 1 2 3",
