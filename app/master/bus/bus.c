@@ -121,6 +121,15 @@ void bus_listen(struct bus *bus, void (*emit)(void *ctx, const struct event *ev)
 	bus->listener = (struct bus_emit){ .call = emit, .ctx = emit_ctx };
 }
 
+void bus_sii_free(struct bus *bus)
+{
+	for (size_t i = 0; i < LIMIT_SLAVES; i++) {
+		free(bus->slave[i].sii);
+		bus->slave[i].sii = NULL;
+		bus->slave[i].sii_len = 0;
+	}
+}
+
 void bus_destroy(struct bus *bus)
 {
 	if (bus != NULL) {

@@ -184,6 +184,8 @@ static inline int is_piccolo(const struct slave_info *info)
 }
 
 mono_t bus_now(const struct bus *bus);
+/** Free what bus_sii_load() read. */
+void bus_sii_free(struct bus *bus);
 
 /** Stamp @ev with the time now and hand it over. */
 void bus_emit_event(struct bus *bus, const struct bus_emit *emit, struct event ev);
@@ -210,7 +212,6 @@ int bus_enumerate(struct bus *bus);
  * damaged, only these.
  */
 int bus_sii_load(struct bus *bus);
-void bus_sii_free(struct bus *bus);
 
 /* --- sii_entries.c --- */
 

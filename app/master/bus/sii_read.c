@@ -262,12 +262,3 @@ int bus_sii_load(struct bus *bus)
 	free(rs);
 	return r;
 }
-
-void bus_sii_free(struct bus *bus)
-{
-	for (size_t i = 0; i < LIMIT_SLAVES; i++) {
-		free(bus->slave[i].sii);
-		bus->slave[i].sii = NULL;
-		bus->slave[i].sii_len = 0;
-	}
-}
