@@ -6,19 +6,6 @@
 #include "control/program.h"
 #include "cycle/cycle_internal.h"
 
-/* Number of frames with fail-safe values of all outputs before the cycle ends. */
-enum { LAST_CYCLES = 4 };
-
-void cycle_end_safely(struct cycle *cy, int result)
-{
-	if (cy->last_steps > 0) {
-		return; /* it ends already: another reason must not put that off */
-	}
-	cy->is_latched_safe = 1;
-	cy->result = result;
-	cy->last_steps = LAST_CYCLES + 1;
-}
-
 static void note_crash(struct cycle *cy)
 {
 	struct control_crash crash = { 0 };
@@ -70,15 +57,4 @@ void cycle_control(struct cycle *cy)
 int cycle_is_control_safe(const struct cycle *cy)
 {
 	return cy->spec.control != NULL && control_is_safe(cy->spec.control);
-}
-
-void cycle_count_down(struct cycle *cy)
-{
-	if (cy->last_steps == 0) {
-		return;
-	}
-	cy->last_steps--;
-	if (cy->last_steps == 0) {
-		cycle_stop(cy);
-	}
 }

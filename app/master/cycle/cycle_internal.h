@@ -121,6 +121,9 @@ int cycle_is_unlocked_safe(const struct cycle *cy);
 void cycle_control(struct cycle *cy);
 /** 1 if it is there and its outputs are to be fail-safe. */
 int cycle_is_control_safe(const struct cycle *cy);
+
+/* --- cycle_end.c --- */
+
 /** All outputs fail-safe from the next frame on; after some of those frames the cycle ends with
  * @result. */
 void cycle_end_safely(struct cycle *cy, int result);
