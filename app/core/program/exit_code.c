@@ -16,7 +16,8 @@ static const char *const texts[EXIT_CODE_COUNT] = {
 	[EXIT_CODE_CLOCKS] = "distributed clocks did not lock",
 	[EXIT_CODE_STATE] = "slave refused a state (AL error) or did not reach it",
 	[EXIT_CODE_WIRE] = "frames lost or damaged",
-	[EXIT_CODE_OVERRUN] = "overrun or lost DC lock, and cycle.overrun or dc.unlock_policy is stop",
+	[EXIT_CODE_OVERRUN] =
+		"overrun or lost DC lock, and cycle.overrun or dc.unlock_policy is stop",
 	[EXIT_CODE_CONTROL] = "control program crashed, hung, or overran (control.overrun stop)",
 	[EXIT_CODE_NO_DAEMON] = "no ecdaqd or no data of one; or several, and none selected",
 	[EXIT_CODE_REFUSED] = "refused by ecdaqd or by a slave",

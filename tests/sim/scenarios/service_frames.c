@@ -21,7 +21,7 @@ static struct virtual_bench b;
 static struct virtual_master vm;
 
 static struct {
-	int is_busy;      /* the mailbox slot is never empty */
+	int is_busy; /* the mailbox slot is never empty */
 	unsigned step;
 	unsigned to_next; /* cycles until the one after a late one */
 	unsigned answered;
@@ -61,9 +61,8 @@ static void each_cycle(struct virtual_master *master)
 {
 	struct sample_header h = newest(master);
 	int64_t period_ns = PERIOD_US * NS_PER_US;
-	int64_t off_ns = h.frame_dc_ns > 0
-				 ? llabs((int64_t)h.frame_dc_ns % period_ns - period_ns / 2)
-				 : 0;
+	int64_t off_ns =
+		h.frame_dc_ns > 0 ? llabs((int64_t)h.frame_dc_ns % period_ns - period_ns / 2) : 0;
 
 	if (seen.is_busy) {
 		keep_slot_busy(line_bound());

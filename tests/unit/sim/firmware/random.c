@@ -15,7 +15,8 @@ static int is_state(unsigned status)
 {
 	unsigned state = status & AL_STATE_MASK;
 
-	return (state == AL_INIT || state == AL_PREOP || state == AL_BOOT || state == AL_SAFEOP || state == AL_OP) &&
+	return (state == AL_INIT || state == AL_PREOP || state == AL_BOOT || state == AL_SAFEOP ||
+		state == AL_OP) &&
 	       (status & ~(unsigned)(AL_STATE_MASK | AL_ERROR)) == 0;
 }
 
