@@ -19,7 +19,6 @@
 #include "bus/dc_topology.h"
 #include "bus/error_counters.h"
 #include "bus/pdo.h"
-#include "bus/places.h"
 #include "mailbox/mailbox.h"
 #include "wire/sii.h"
 
@@ -110,6 +109,39 @@ struct bus_slave {
 	enum recovery_step trouble_step;
 	uint16_t trouble_code; /* AL status code of the newest failure; 0: it was late */
 	mono_t op_since;
+};
+
+/* What a device is by its EEPROM (bus/identity.h). */
+struct bus_identity {
+	uint32_t vendor; /* never 0 once read */
+	uint32_t product;
+	uint32_t revision;
+	uint32_t serial;
+	uint16_t alias;
+};
+
+enum { GUESTS_MAX = 16 };
+
+enum guest_kind {
+	GUEST_NONE,
+	GUEST_NEW,        /* isolated, not identified yet */
+	GUEST_STRANGER,   /* of no slave of this session */
+	GUEST_WRONG,      /* in the place of a lost slave, with another identity */
+	GUEST_UNREADABLE, /* its EEPROM is blank, damaged or does not answer */
+	GUEST_WAITING,    /* a lost slave, but it is not certain which one */
+};
+
+/* A device that a walk found and that is bound to no slave (bus/guests.h). */
+struct bus_guest {
+	enum guest_kind kind;
+	uint16_t position;
+	uint16_t came_with; /* station address */
+	int owner;          /* the slave that has this address; -1: none */
+	int expected;       /* the lost slave whose place it has; -1: none */
+	int shut_by;        /* the slave whose port to it is closed; -1: it is on the wire */
+	uint8_t shut_port;
+	mono_t readable_by;
+	struct bus_identity identity;
 };
 
 struct bus_emit {
@@ -316,13 +348,6 @@ int bus_sync0_restore(struct bus *bus, size_t pos);
 int bus_sync0_is_running(struct bus *bus, size_t pos);
 void bus_sync0_stop(struct bus *bus);
 
-/* --- places.c --- */
-
-/** A lost slave is there again. */
-void bus_note_back(struct bus *bus, size_t pos, const struct bus_emit *emit);
-/** Vendor, product, revision, alias, and the serial number where the slave has one. */
-int bus_is_same_device(const struct bus_slave *sl, const struct bus_identity *found);
-
 /* --- states.c --- */
 
 /** "refuses SAFE-OP and is in PRE-OP: AL status code 0x0018, no valid inputs available" */
@@ -335,6 +360,8 @@ const char *bus_al_name(uint16_t al_status);
 
 /** One step towards OP for a slave that is not there. */
 void bus_recover(struct bus *bus, size_t pos, const struct bus_emit *emit);
+/** A lost slave is there again: its way back begins. */
+void bus_recover_begin(struct bus *bus, size_t pos, const struct bus_emit *emit);
 /** The slave is in OP: after a while its failures are forgotten. */
 void bus_recover_settled(struct bus *bus, size_t pos);
 /** Forget them now: an operator says so. */

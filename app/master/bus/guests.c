@@ -5,6 +5,7 @@
 #include <stdio.h>
 
 #include "base/bytes.h"
+#include "bus/identity.h"
 
 enum {
 	PARKING_FIRST = 0x7e00, /* station addresses of guests, one a guest */
@@ -243,7 +244,7 @@ static void return_slave(struct bus *bus, struct bus_guest *guest, size_t pos,
 	bus->soem_slave[soem_index(pos)].eep_pdi = 0;
 	error_counters_restart(&sl->errors);
 	sl->is_clock_set = 0;
-	bus_note_back(bus, pos, emit);
+	bus_recover_begin(bus, pos, emit);
 	bus_recover_restart(bus, pos);
 }
 

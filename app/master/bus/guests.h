@@ -13,4 +13,11 @@ void guests_drop(struct bus *bus, const struct walk *walk, const struct bus_emit
 /** A step for each unbound position of @walk; lost slaves that are back are bound in it. */
 void guests_follow(struct bus *bus, struct walk *walk, const struct bus_emit *emit);
 
+/** Guests on the wire now. Those behind a closed port do not count. */
+unsigned bus_guests_answering(const struct bus *bus);
+/** Guests that are none of our slaves, wherever they are. */
+unsigned bus_guests_known(const struct bus *bus);
+/** One line about the guests; empty: there are none. */
+void bus_guests_describe(const struct bus *bus, char *ret_text, size_t text_bytes);
+
 #endif

@@ -120,6 +120,14 @@ int bus_identity_read(struct bus *bus, uint16_t station, struct bus_identity *re
 	return 0;
 }
 
+int bus_is_same_device(const struct bus_slave *sl, const struct bus_identity *found)
+{
+	return sl->info.vendor == found->vendor && sl->info.product == found->product &&
+	       sl->info.revision == found->revision &&
+	       (sl->info.serial == 0 || sl->info.serial == found->serial) &&
+	       sl->info.alias == found->alias;
+}
+
 static int read_al(struct bus *bus, size_t pos, uint16_t *ret_status, uint16_t *ret_code)
 {
 	uint8_t al[6] = { 0 };

@@ -6,15 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-struct bus;
-
-struct bus_identity {
-	uint32_t vendor; /* never 0 once read */
-	uint32_t product;
-	uint32_t revision;
-	uint32_t serial;
-	uint16_t alias;
-};
+#include "bus/bus_internal.h"
 
 /**
  * Read it from the EEPROM of the device with station address @station. 0; -EAGAIN: busy, loading,
@@ -23,6 +15,9 @@ struct bus_identity {
  * three to five reads.
  */
 int bus_identity_read(struct bus *bus, uint16_t station, struct bus_identity *ret);
+
+/** Vendor, product, revision, alias, and the serial number where the slave has one. */
+int bus_is_same_device(const struct bus_slave *sl, const struct bus_identity *found);
 
 /**
  * The explicit device identification of the slave at @pos: its number after a request in AL control

@@ -6,6 +6,7 @@
 
 #include "base/bytes.h"
 #include "bus/guests.h"
+#include "bus/identity.h"
 
 /* --- binding by what was written --- */
 
@@ -81,20 +82,6 @@ static int bind_slave(struct bus *bus, size_t pos, struct walk *walk)
 	return 0;
 }
 
-void bus_note_back(struct bus *bus, size_t pos, const struct bus_emit *emit)
-{
-	struct bus_slave *sl = &bus->slave[pos];
-
-	if (sl->is_lost) {
-		sl->is_lost = 0;
-		sl->misses = 0;
-		sl->step = RECOVERY_BACK;
-		bus_emit_event(
-			bus, emit,
-			(struct event){ .id = EVENT_SLAVE_BACK, .slave_pos = (uint16_t)pos });
-	}
-}
-
 /* --- all of it --- */
 
 /* Something is on its way: the positions are walked in every poll. */
@@ -146,20 +133,12 @@ int bus_places_follow(struct bus *bus, unsigned answering, int is_doubtful,
 	}
 	for (size_t i = 0; i < walk.count; i++) {
 		if (walk.at[i].slave >= 0) {
-			bus_note_back(bus, (size_t)walk.at[i].slave, emit);
+			bus_recover_begin(bus, (size_t)walk.at[i].slave, emit);
 		}
 	}
 	guests_drop(bus, &walk, emit);
 	guests_follow(bus, &walk, emit);
 	return 0;
-}
-
-int bus_is_same_device(const struct bus_slave *sl, const struct bus_identity *found)
-{
-	return sl->info.vendor == found->vendor && sl->info.product == found->product &&
-	       sl->info.revision == found->revision &&
-	       (sl->info.serial == 0 || sl->info.serial == found->serial) &&
-	       sl->info.alias == found->alias;
 }
 
 void bus_places_release(struct bus *bus)

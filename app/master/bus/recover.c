@@ -334,6 +334,20 @@ static void note_fall(struct bus *bus, size_t pos, const struct bus_emit *emit)
 
 /* --- public --- */
 
+void bus_recover_begin(struct bus *bus, size_t pos, const struct bus_emit *emit)
+{
+	struct bus_slave *sl = &bus->slave[pos];
+
+	if (sl->is_lost) {
+		sl->is_lost = 0;
+		sl->misses = 0;
+		sl->step = RECOVERY_BACK;
+		bus_emit_event(
+			bus, emit,
+			(struct event){ .id = EVENT_SLAVE_BACK, .slave_pos = (uint16_t)pos });
+	}
+}
+
 void bus_recover_settled(struct bus *bus, size_t pos)
 {
 	struct bus_slave *sl = &bus->slave[pos];

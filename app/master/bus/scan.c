@@ -12,6 +12,7 @@
 #include "bus/bus_internal.h"
 #include "bus/compare.h"
 #include "bus/eeprom.h"
+#include "bus/identity.h"
 #include "bus/names.h"
 #include "bus/registers.h"
 

@@ -8,6 +8,7 @@
 
 #include "base/bytes.h"
 #include "bus/bus_internal.h"
+#include "bus/places.h"
 #include "bus/registers.h"
 
 enum { AL_BYTES = 6, POLL_MS = 2, ACKNOWLEDGE_NS = 500000000 };

@@ -7,6 +7,8 @@
 #include "base/bytes.h"
 #include "base/slave_set.h"
 #include "bus/bus_internal.h"
+#include "bus/guests.h"
+#include "bus/places.h"
 #include "bus/registers.h"
 
 enum {

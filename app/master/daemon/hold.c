@@ -9,19 +9,6 @@
 #include "daemon/session.h"
 #include "daemon/session_internal.h"
 
-static const enum bus_state states[] = {
-	[CONFIG_TARGET_INIT] = BUS_INIT,
-	[CONFIG_TARGET_PREOP] = BUS_PREOP,
-	[CONFIG_TARGET_SAFEOP] = BUS_SAFEOP,
-	[CONFIG_TARGET_OP] = BUS_OP,
-};
-
-void session_target_set(struct session *s, enum config_target target)
-{
-	s->target = target;
-	atomic_store_explicit(&s->run.page->bus_target, states[target], memory_order_relaxed);
-}
-
 void session_forget_states(struct session *s)
 {
 	for (size_t i = 0; i < LIMIT_SLAVES; i++) {

@@ -28,6 +28,11 @@ void session_emit(struct session *s, const struct event *ev)
 	}
 }
 
+void session_bus_event(void *ctx, const struct event *ev)
+{
+	session_emit(ctx, ev);
+}
+
 /* --- the cycle's platform --- */
 
 static void clear_control(struct control_status *st)
@@ -173,6 +178,19 @@ void session_state_set(struct session *s, enum bus_state state)
 	}
 	s->state = state;
 	atomic_store_explicit(&s->run.page->bus_state, state, memory_order_relaxed);
+}
+
+void session_target_set(struct session *s, enum config_target target)
+{
+	static const enum bus_state states[] = {
+		[CONFIG_TARGET_INIT] = BUS_INIT,
+		[CONFIG_TARGET_PREOP] = BUS_PREOP,
+		[CONFIG_TARGET_SAFEOP] = BUS_SAFEOP,
+		[CONFIG_TARGET_OP] = BUS_OP,
+	};
+
+	s->target = target;
+	atomic_store_explicit(&s->run.page->bus_target, states[target], memory_order_relaxed);
 }
 
 void session_show_link(struct session *s)

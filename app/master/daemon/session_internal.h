@@ -63,10 +63,14 @@ struct session {
 
 /** @ev goes to the event ring, stamped with the time now. */
 void session_emit(struct session *s, const struct event *ev);
+/** For bus.h: session_emit(). */
+void session_bus_event(void *ctx, const struct event *ev);
 /** Begin the SDO transfer of an admin request; @ctx is the session. */
 void session_sdo(void *ctx, struct admin_pending *pending);
 /** State, page and event. */
 void session_state_set(struct session *s, enum bus_state state);
+/** What the bus is led to, from the next bring-up on. */
+void session_target_set(struct session *s, enum config_target target);
 void session_wait(struct session *s, span_t span);
 mono_t session_now(const struct session *s);
 
@@ -94,16 +98,12 @@ int session_report_ended(struct session *s, struct failure *failure);
 void session_listen(struct session *s);
 /** Of @frames sent, @twice came back a second time: warn if that is nearly all of them. */
 void session_judge_doubled(struct session *s, uint64_t frames, uint64_t twice);
-/** For bus.h: session_emit(). */
-void session_bus_event(void *ctx, const struct event *ev);
 /** Admin requests, also in the middle of a bring-up: then only those that need no bus. */
 void session_serve_admin(struct session *s);
 
 /** Link and speed on the page. */
 void session_show_link(struct session *s);
 
-/** What the bus is led to, from the next bring-up on. */
-void session_target_set(struct session *s, enum config_target target);
 /** The target below OP is reached: keep it. */
 void session_hold(struct session *s);
 /** After a bring-up that failed: keep what was reached if the session may wait. 1: it does. */

@@ -18,11 +18,6 @@
 
 enum { DOUBLED_WINDOW_CYCLES = 500, DOUBLED_FRAMES_MIN = 50 };
 
-void session_bus_event(void *ctx, const struct event *ev)
-{
-	session_emit(ctx, ev);
-}
-
 /* --- admin --- */
 
 static int admin_dc_now(void *ctx, int64_t *ret_dc_ns)
