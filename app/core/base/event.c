@@ -47,6 +47,7 @@ static const struct {
 	[EVENT_SLAVE_WRONG] = { "slave_wrong", EVENT_ERROR },
 	[EVENT_SLAVE_UNREADABLE] = { "slave_unreadable", EVENT_ERROR },
 	[EVENT_SLAVE_ABSENT] = { "slave_absent", EVENT_WARNING },
+	[EVENT_SM_LENGTH] = { "sm_length", EVENT_NOTICE },
 	[EVENT_SLAVE_ALARM] = { "slave_alarm", EVENT_ERROR },
 	[EVENT_DC_DIFF_HIGH] = { "dc_diff_high", EVENT_WARNING },
 	[EVENT_OP_LOST] = { "op_lost", EVENT_WARNING },
@@ -443,6 +444,11 @@ int event_format(const struct event *ev, char *buf, size_t buf_len)
 		return format_stranger(ev, buf, buf_len);
 	case EVENT_SLAVE_ABSENT:
 		return snprintf(buf, buf_len, "slaves[%" PRId32 "] is optional and absent", a[0]);
+	case EVENT_SM_LENGTH:
+		return snprintf(buf, buf_len,
+				"slave %u: %" PRId32 " bytes are mapped to SM%" PRId32
+				" by CoE, %" PRId64 " by its SII: CoE is used",
+				slave, a[1], a[0], ev->value);
 	case EVENT_SLAVE_ALARM:
 		return format_alarm(ev, buf, buf_len);
 	case EVENT_SDO_ABORT:

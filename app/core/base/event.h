@@ -71,6 +71,7 @@ enum event_id {
 	EVENT_SLAVE_COUNT,  /* value: cycle; arg: slaves that answered, expected */
 	EVENT_SLAVE_ABSENT, /* arg: item of slaves[], optional, that was not found */
 	EVENT_DC_DIFF_HIGH, /* value: cycle; arg: |0x092C| of all slaves ORed ns, limit ns */
+	EVENT_SM_LENGTH,    /* slave; arg: SyncManager, bytes mapped by CoE; value: bytes by SII */
 	EVENT_COUNT,
 };
 

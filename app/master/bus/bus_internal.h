@@ -82,6 +82,7 @@ struct bus_slave {
 	uint32_t sync1_after_ns;  /* 0x09a4 */
 	size_t pdo_first;         /* its entries in bus->pdo */
 	size_t pdo_count;
+	int is_mapped_by_coe; /* 0: by its SII */
 	enum config_mode mode;
 	struct sync_limits output_sync;
 	struct sync_limits input_sync;

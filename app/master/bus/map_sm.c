@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * SyncManagers from mapped bits: how long each is, whether it fits where the SII puts it, and
- * whether the two descriptions of a fixed mapping agree.
+ * SyncManagers from mapped bits: how long each is, whether it fits where the SII puts it. If
+ * the two descriptions of a fixed mapping differ, the one by CoE is used and the other reported.
  */
 #include <errno.h>
 
@@ -75,21 +75,23 @@ static int check_room(struct bus *bus, size_t pos, unsigned n, uint32_t bytes)
 	return 0;
 }
 
-/* A slave with a fixed mapping gives its length twice: in its SII and in its object dictionary. */
-static int check_fixed(struct bus *bus, size_t pos, unsigned n, uint32_t bytes)
+/* A slave with a fixed mapping gives its length twice: in its SII and in its object dictionary. The
+ * dictionary is what its firmware exchanges; the SII is often wrong. */
+static void compare_with_sii(struct bus *bus, size_t pos, unsigned n, uint32_t bytes)
 {
 	const ec_slavet *soem = &bus->soem_slave[soem_index(pos)];
 	uint32_t sii_bytes = etohs(soem->SM[n].SMlength);
 	int is_variable = (soem->CoEdetails & (ECT_COEDET_PDOASSIGN | ECT_COEDET_PDOCONFIG)) != 0;
 
-	if (!bus_has_coe(bus, pos) || is_variable || sii_bytes == 0 || sii_bytes == bytes) {
-		return 0;
+	if (!bus->slave[pos].is_mapped_by_coe || is_variable || sii_bytes == 0 ||
+	    sii_bytes == bytes) {
+		return;
 	}
-	return bus_fail_slave(
-		bus, pos, -EPROTO,
-		"PDO mapping does not fit: %u bytes mapped to SM%u by CoE, but its SII says %u "
-		"and the mapping is fixed",
-		bytes, n, sii_bytes);
+	bus_emit_event(bus, &bus->listener,
+		       (struct event){ .id = EVENT_SM_LENGTH,
+				       .slave_pos = (uint16_t)pos,
+				       .arg = { (int32_t)n, (int32_t)bytes },
+				       .value = sii_bytes });
 }
 
 static int set_sm(struct bus *bus, size_t pos, unsigned n, const struct sm_bits *sb)
@@ -105,10 +107,8 @@ static int set_sm(struct bus *bus, size_t pos, unsigned n, const struct sm_bits 
 				"%u bytes are mapped to SM%u, which its SII does not have", bytes,
 				n);
 		}
-		r = check_fixed(bus, pos, n, bytes);
-		if (r >= 0) {
-			r = check_room(bus, pos, n, bytes);
-		}
+		compare_with_sii(bus, pos, n, bytes);
+		r = check_room(bus, pos, n, bytes);
 		if (r < 0) {
 			return r;
 		}

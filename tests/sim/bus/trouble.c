@@ -190,6 +190,49 @@ static void set_coe_details(struct bus_bench *b, uint8_t details)
 	entry[4] = 0; /* data type */
 }
 
+static void note_event(void *ctx, const struct event *ev)
+{
+	struct event *last = ctx;
+
+	CHECK_EQ(last->id, EVENT_NONE);
+	*last = *ev;
+}
+
+/* Its mapping is fixed: CoE details have neither PDO assignment nor configuration. */
+TEST(trouble, coe_is_used_where_the_sii_states_another_length_and_an_event_reports_it_once)
+{
+	enum { SM_OUTPUTS = 2, SM_BYTES = 8, SM_LENGTH = 2 };
+	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 1, .seed = 22 });
+	struct event seen = { .id = EVENT_NONE };
+	uint8_t *length = sii_category(segment_esc(b->segment, 0), SII_CATEGORY_SM) +
+			  SM_OUTPUTS * SM_BYTES + SM_LENGTH;
+	uint16_t by_coe = get_le16(length);
+
+	put_le16(length, (uint16_t)(by_coe + 2));
+	bus_listen(b->bus, note_event, &seen);
+	bench_bring_up(b);
+	CHECK_EQ(seen.id, EVENT_SM_LENGTH);
+	CHECK_EQ(seen.slave_pos, 0);
+	CHECK_EQ(seen.arg[0], SM_OUTPUTS);
+	CHECK_EQ(seen.arg[1], by_coe);
+	CHECK_EQ(seen.value, by_coe + 2);
+	CHECK_EQ(get_le16(segment_esc(b->segment, 0)->reg + ESC_REG_SM + SM_OUTPUTS * ESC_SM_BYTES +
+			  SM_LENGTH),
+		 by_coe);
+	bench_destroy(b);
+}
+
+TEST(trouble, equal_lengths_by_coe_and_sii_are_no_event)
+{
+	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 1, .seed = 22 });
+	struct event seen = { .id = EVENT_NONE };
+
+	bus_listen(b->bus, note_event, &seen);
+	bench_bring_up(b);
+	CHECK_EQ(seen.id, EVENT_NONE);
+	bench_destroy(b);
+}
+
 static unsigned mailbox_writes_of_bring_up(uint8_t coe_details)
 {
 	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 1, .seed = 21 });
