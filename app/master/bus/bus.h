@@ -107,6 +107,14 @@ int bus_watch(struct bus *bus, struct status_page *page,
 	      struct bus_watch_report *ret_report);
 
 /**
+ * For a working counter that stays low while all slaves are in OP: one frame or two that compare
+ * SyncManagers and FMMUs of some slaves, others at the next call, with what bus_map() programmed.
+ * 1: @ret_text names the slave and what is switched off or changed; 0: nothing was found in these,
+ * and it is empty. 128 bytes are always enough.
+ */
+int bus_map_check(struct bus *bus, char *ret_text, size_t text_bytes);
+
+/**
  * Acknowledge errors and restore slaves that fell back to SAFE-OP or PRE-OP or were power-cycled to
  * OP (with DC redone for a returned slave, T18), a step per call. After bus_watch(), when its
  * report has been acted on: a slave on its way through INIT takes the working counter from all.

@@ -162,8 +162,8 @@ struct bus {
 	struct mailbox_engine *mailbox;
 	char *error;      /* of the public call that runs */
 	uint8_t sequence; /* index byte of our own frames */
-	/* In bus_watch() or bus_lead_back(): what is lost is polled again soon, so fewer tries.
-	 */
+	/* In bus_watch(), bus_map_check() or bus_lead_back(): what is lost is polled again soon, so
+	 * fewer tries. */
 	int is_looking;
 	struct bus_slave slave[LIMIT_SLAVES];
 	size_t slave_count;
@@ -181,6 +181,7 @@ struct bus {
 	enum al_state target;   /* state requested last */
 	size_t next_recovery;   /* position served first */
 	size_t next_detailed;   /* position whose counters are read first */
+	size_t next_checked;    /* position that bus_map_check() begins with */
 	struct bus_guest guest[GUESTS_MAX];
 	/* SOEM */
 	ecx_contextt context;

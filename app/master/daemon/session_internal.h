@@ -54,6 +54,7 @@ struct session {
 	uint64_t lost_seen;
 	mono_t lost_since; /* all slaves, from then on; 0: not so */
 	uint64_t wkc_low_seen;
+	int is_wkc_alarming;    /* low in bus.wkc_miss_limit cycles since the last look */
 	uint64_t alerts_seen;   /* cycle_alerts() when the last look began */
 	uint64_t doubled_seen;  /* with doubled_since: where the window began */
 	uint64_t doubled_since; /* cycles */

@@ -224,6 +224,20 @@ static void follow_reference(struct session *s)
 	}
 }
 
+/* All slaves are in OP, and yet process data do not come whole: the AL states say nothing of it. */
+static void explain_low_wkc(struct session *s, struct bus_watch_report *report)
+{
+	char who[BUS_TROUBLE_BYTES - 64];
+
+	if (!report->is_all_op || !s->is_wkc_alarming) {
+		return;
+	}
+	bus_map_check(s->bus, who, sizeof(who));
+	snprintf(report->trouble, sizeof(report->trouble),
+		 "working counter low while all slaves are in OP%s%s", who[0] != '\0' ? ": " : "",
+		 who);
+}
+
 enum session_result session_watch(struct session *s)
 {
 	struct bus_watch_report report = { 0 };
@@ -233,6 +247,7 @@ enum session_result session_watch(struct session *s)
 		/* No slave answers; each request would cost its timeout. */
 		follow_silence(s);
 	} else if (bus_watch(s->bus, s->run.page, session_bus_event, s, &report) == 0) {
+		explain_low_wkc(s, &report);
 		follow_bus(s, &report);
 		bus_lead_back(s->bus, session_bus_event, s);
 		follow_reference(s);
@@ -353,7 +368,8 @@ int session_service(struct session *session, struct failure *failure)
 	if (s->bus != NULL) {
 		bus_mailbox_step(s->bus);
 	}
-	if (now.ns >= s->next_watch.ns || is_wkc_alarming(s) ||
+	s->is_wkc_alarming = is_wkc_alarming(s);
+	if (now.ns >= s->next_watch.ns || s->is_wkc_alarming ||
 	    (s->is_riding && cycle_alerts(s->cycle) != s->alerts_seen)) {
 		s->wkc_low_seen =
 			atomic_load_explicit(&s->run.page->cycle.wkc_low, memory_order_relaxed);

@@ -81,6 +81,7 @@ struct esc_sm {
 	uint16_t len;
 	uint8_t control;
 	uint8_t is_active; /* by the master's activate and the PDI's control bit */
+	uint8_t is_locked; /* the PDI has switched off what the master has activated */
 	uint8_t is_mailbox;
 	uint8_t is_ecat_write;  /* the master writes, the PDI reads */
 	uint8_t is_reader_open; /* between the first and the last byte of the area */

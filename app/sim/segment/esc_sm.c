@@ -112,6 +112,7 @@ void esc_sm_configure(struct esc *esc, unsigned n, enum esc_side side)
 	sm->is_mailbox = (sm->control & 3) == SM_MODE_MAILBOX;
 	sm->is_ecat_write = (sm->control & 0x0c) == SM_DIRECTION_WRITE;
 	sm->is_active = (r[SM_ACTIVATE] & 1) && !(r[SM_PDI_CONTROL] & 1) && sm->len > 0;
+	sm->is_locked = (r[SM_ACTIVATE] & 1) && (r[SM_PDI_CONTROL] & 1) && sm->len > 0;
 	if (!was_active || !sm->is_active) {
 		reset(esc, sm);
 	}
@@ -160,7 +161,7 @@ static int is_writer(const struct esc_sm *sm, enum esc_side side)
 static int sm_read(struct esc *esc, struct esc_sm *sm, enum esc_side side, size_t at, uint8_t *buf,
 		   size_t len)
 {
-	if (is_writer(sm, side) || (sm->is_mailbox && !sm->is_full)) {
+	if (sm->is_locked || is_writer(sm, side) || (sm->is_mailbox && !sm->is_full)) {
 		return 0;
 	}
 	if (at == 0) {
@@ -205,7 +206,7 @@ struct writer {
 static int sm_write(struct esc *esc, struct esc_sm *sm, const struct writer *by, size_t at,
 		    const uint8_t *buf, size_t len)
 {
-	if (!is_writer(sm, by->side) || (sm->is_mailbox && sm->is_full) ||
+	if (sm->is_locked || !is_writer(sm, by->side) || (sm->is_mailbox && sm->is_full) ||
 	    (by->side == ESC_PDI && sm->is_mailbox && by->t_ns < esc->mailbox_stuck_until_ns)) {
 		return 0;
 	}
@@ -233,7 +234,7 @@ static struct esc_sm *sm_at(struct esc *esc, size_t addr, size_t *len)
 		struct esc_sm *sm = &esc->sm[i];
 		size_t end = (size_t)sm->start + sm->len;
 
-		if (!sm->is_active || sm->start < ESC_REG_PROCESS_RAM || addr >= end) {
+		if ((!sm->is_active && !sm->is_locked) || sm->start < ESC_REG_PROCESS_RAM || addr >= end) {
 			continue;
 		}
 		if (addr >= sm->start) {

@@ -178,6 +178,88 @@ TEST(mailbox, sdo_that_a_slave_aborts_is_an_event_with_object_and_code)
 	bench_destroy(b);
 }
 
+/* --- T04 --- */
+
+static uint8_t name_buffer[64];
+
+static void begin_read(struct bus_bench *b, struct mailbox_request *rq)
+{
+	*rq = (struct mailbox_request){ .slave_pos = 1,
+					.with.coe = { .operation = COE_UPLOAD, .index = 0x1008 },
+					.buffer = name_buffer,
+					.capacity = sizeof(name_buffer) };
+	CHECK_EQ(bus_sdo_submit(b->bus, rq), 0);
+}
+
+static void check_name_is_read(struct bus_bench *b)
+{
+	size_t len = sizeof(name_buffer);
+	uint32_t abort = 0;
+
+	CHECK_EQ(bus_sdo_read(b->bus, 1, 0x1008, 0, name_buffer, &len, &abort), 0);
+	CHECK_EQ(len, strlen("FB1111-Piccolo"));
+}
+
+/* A request is on its way for @cycles while the state changes; its answer comes all the same. */
+static void change_with_sdo(struct bus_bench *b, enum al_state state, unsigned cycles)
+{
+	struct mailbox_request rq;
+
+	begin_read(b, &rq);
+	bench_run(b, cycles);
+	CHECK_EQ(bus_request_state(b->bus, state, (span_t){ NS_PER_S }, b->error), 0);
+	bench_run(b, 50);
+	CHECK_EQ(rq.result, 0);
+	CHECK_EQ(rq.len, strlen("FB1111-Piccolo"));
+	check_name_is_read(b);
+}
+
+TEST(mailbox, sdo_is_answered_whatever_state_change_it_meets)
+{
+	enum { ROUNDS = 5 };
+	struct bus_bench *b = start(2, 119);
+
+	for (unsigned i = 0; i < ROUNDS; i++) {
+		struct mailbox_request cut;
+
+		change_with_sdo(b, AL_SAFEOP, i);
+		change_with_sdo(b, AL_PREOP, i);
+		change_with_sdo(b, AL_SAFEOP, i);
+		change_with_sdo(b, AL_OP, i);
+		begin_read(b, &cut);
+		bench_run(b, i);
+		bench_stop(b);
+		bench_new_master(b); /* ends what still runs */
+		CHECK(!mailbox_is_running(&cut));
+		bench_bring_up(b);
+		check_name_is_read(b);
+	}
+	bench_destroy(b);
+}
+
+TEST(mailbox, master_that_is_started_again_finds_full_mailboxes_and_reads_on)
+{
+	enum { CUTS = 12 };
+	struct bus_bench *b = start(2, 120);
+
+	for (unsigned i = 0; i < CUTS; i++) {
+		struct mailbox_request cut;
+
+		/* a mail that nobody fetches, and a request that was cut off somewhere */
+		put_emergency(b, 0);
+		begin_read(b, &cut);
+		bench_run(b, i / 2);
+		if (i % 2 == 1) {
+			put_emergency(b, 1);
+		}
+		bench_new_master(b);
+		CHECK(!mailbox_is_running(&cut));
+		bench_bring_up(b);
+		check_name_is_read(b);
+	}
+	bench_destroy(b);
+}
+
 /* --- a storm --- */
 
 enum { STORM_SLAVES = 64, STORM_TRANSFERS = 10, STORM_CYCLES = 1500 };
