@@ -8,6 +8,8 @@
 #include "mailbox/mailbox.h"
 #include "wire/sii.h"
 
+enum { SCALAR_MAX_BYTES = 8 };
+
 static int start(struct mailbox_request *rq)
 {
 	const struct soe_parameters *with = &rq->with.soe;
@@ -56,6 +58,16 @@ static int sent(struct mailbox_request *rq)
 	return rq->len < rq->capacity ? MAILBOX_SEND : MAILBOX_WAIT;
 }
 
+/*
+ * A value of more than 8 bytes is a list, and a list begins with its length in bytes: that a slave
+ * left out the first fragments shows by nothing else.
+ */
+static int is_whole(const struct mailbox_request *rq)
+{
+	return rq->with.soe.elements != SOE_ELEMENT_VALUE || rq->len <= SCALAR_MAX_BYTES ||
+	       get_le16(rq->buffer) == rq->len - SOE_LIST_HEADER_BYTES;
+}
+
 static int take_read(struct mailbox_request *rq, const struct soe_message *m)
 {
 	struct soe_state *st = &rq->state.soe;
@@ -77,7 +89,10 @@ static int take_read(struct mailbox_request *rq, const struct soe_message *m)
 	rq->len += m->body_len;
 	st->has_fragment = 1;
 	st->fragments_left = m->fragments_left;
-	return m->has_more ? MAILBOX_WAIT : MAILBOX_DONE;
+	if (m->has_more) {
+		return MAILBOX_WAIT;
+	}
+	return is_whole(rq) ? MAILBOX_DONE : -EPROTO;
 }
 
 static int received(struct mailbox_request *rq, const uint8_t *data, size_t len)

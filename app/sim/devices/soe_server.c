@@ -240,6 +240,11 @@ static size_t answer_write(struct soe_server *s, const struct mailbox_call *call
 	int i = find(m->idn);
 	enum soe_error error;
 
+	if (s->incoming_len > 0 && m->fragments_left + 1 != s->incoming_left) {
+		s->incoming_len = 0; /* another write: the master has given up the one before */
+		s->is_too_long = 0;
+	}
+	s->incoming_left = m->fragments_left;
 	if (m->body_len > sizeof(s->incoming) - s->incoming_len) {
 		s->is_too_long = 1;
 	} else {

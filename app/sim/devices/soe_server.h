@@ -31,6 +31,7 @@ struct soe_server {
 	uint16_t state[SOE_SERVER_IDNS];
 	uint8_t incoming[SOE_VALUE_BYTES]; /* of a write in fragments */
 	size_t incoming_len;
+	uint16_t incoming_left; /* fragments that are to follow */
 	uint8_t is_too_long;
 	uint8_t outgoing[SOE_ANSWER_BYTES]; /* of a read in fragments */
 	size_t outgoing_len;

@@ -9,6 +9,8 @@
 #include "harness/test.h"
 #include "mailbox/mailbox.h"
 #include "sim/harness/virtual_master.h"
+#include "wire/al.h"
+#include "wire/esc_reg.h"
 #include "wire/foe.h"
 
 enum {
@@ -124,6 +126,34 @@ TEST(sim_mailbox_protocols, all_of_them_in_op_disturb_no_cycle)
 	}
 	check_undisturbed((uint64_t)ROUNDS * CYCLES);
 	CHECK(vm.result.phase_max_ns <= phase_idle_ns + 2000);
+	virtual_master_kill(&vm);
+	virtual_bench_done(&b);
+}
+
+TEST(sim_mailbox_protocols, all_of_them_are_served_in_safe_op)
+{
+	static const char *const settings[] = { "bus.target=safeop", NULL };
+	struct mailbox_request rq[REQUESTS];
+
+	virtual_bench_init(&b, &(struct virtual_spec){ .slaves = 2, .make = make, .seed = 13 });
+	virtual_master_init(&vm, &b, settings);
+	CHECK_EQ(virtual_master_bring_up(&vm), 0);
+	CHECK_EQ(atomic_load(&session_page(vm.session)->bus_state), BUS_SAFEOP);
+	make_requests(rq);
+	for (unsigned i = 0; i < REQUESTS; i++) {
+		submit(&rq[i]);
+	}
+	CHECK_EQ(virtual_master_run(&vm, 4000), SESSION_GOES_ON);
+	for (unsigned i = 0; i < REQUESTS; i++) {
+		CHECK_EQ(rq[i].result, 0);
+	}
+	CHECK_EQ(rq[0].len, FILE_BYTES);
+	CHECK_EQ(rq[1].len, TABLE_BYTES);
+	CHECK_EQ(rq[2].len, PING_BYTES);
+	CHECK_EQ(rq[3].len, 4);
+	CHECK_EQ(rq[4].len, sizeof(echo));
+	CHECK_EQ(rq[5].len, 4);
+	CHECK_EQ(segment_esc(b.segment, DRIVE)->reg[ESC_REG_AL_STATUS], AL_SAFEOP);
 	virtual_master_kill(&vm);
 	virtual_bench_done(&b);
 }
