@@ -18,7 +18,7 @@ SANITIZE = ["-fsanitize=address,undefined"] if os.environ.get("ECDAQ_FLAVOUR") =
 def daemon(run_dir: Path, *settings: str) -> subprocess.CompletedProcess[str]:
     words = [word for setting in settings for word in ("--set", setting)]
     return subprocess.run(
-        [BIN / "ecdaqd", "--interface", "lo", "--run-dir", run_dir / "run", *words],
+        [BIN / "ecdaqd", "--exit-on-failure", "--interface", "lo", "--run-dir", run_dir / "run", *words],
         env=environment(None),
         stdin=subprocess.DEVNULL,
         capture_output=True,
@@ -43,7 +43,7 @@ def last_line(result: subprocess.CompletedProcess[str]) -> str:
         ("blink.so", "expected a path with a slash"),
         ("/tmp", "is not a file"),
         (f"{PROGRAMS}/no_symbol.so", "has no symbol ecdaq_program"),
-        (f"{PROGRAMS}/other_abi.so", "was built for version 2 of ecdaq/control.h"),
+        (f"{PROGRAMS}/other_abi.so", "was built for version 3 of ecdaq/control.h"),
         (f"{PROGRAMS}/missing_symbol.so", "undefined symbol: function_that_is_nowhere"),
         (f"{PROGRAMS}/no_cycle.so", "ecdaq_program has no cycle()"),
     ],

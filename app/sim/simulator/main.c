@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* ecdaq-sim: the simulated segment on a network interface, in real time. */
+#include <assert.h>
 #include <errno.h>
 #include <inttypes.h>
 #include <sched.h>
@@ -266,6 +267,7 @@ static int serve(struct simulation *sim)
 	uint8_t frame[FRAME_BYTES];
 	char line[256];
 
+	assert(sim->fd >= 0);
 	while (!stop_requested()) {
 		int64_t t_ns = 0;
 		int n = wire_socket_receive(sim->fd, frame, sizeof(frame), live_on(sim), &t_ns);

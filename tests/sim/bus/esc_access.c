@@ -5,7 +5,6 @@
 #include <errno.h>
 
 #include "base/bytes.h"
-#include "bus/bus_internal.h"
 #include "harness/test.h"
 #include "sim/bus/bus_bench.h"
 #include "wire/esc_reg.h"
