@@ -124,8 +124,9 @@ void bus_lead_back(struct bus *bus, void (*emit)(void *ctx, const struct event *
 
 /**
  * Is the one device that answers to the reference clock's address the reference clock: by its
- * clock's offset and its identity? 1; 0; -EAGAIN: it does not answer, or two do. The frames of the
- * cycle go on. For exchange_doubts_reference().
+ * clock's offset and its identity? 1; 0; -EAGAIN: its EEPROM is still being read, it does not
+ * answer, or two do: call again. Takes at most six frames; those of the cycle go on. For
+ * exchange_doubts_reference().
  */
 int bus_reference_is_itself(struct bus *bus);
 

@@ -17,6 +17,7 @@
 
 #include "bus/bus.h"
 #include "bus/dc_topology.h"
+#include "bus/eeprom.h"
 #include "bus/error_counters.h"
 #include "bus/pdo.h"
 #include "mailbox/mailbox.h"
@@ -121,6 +122,15 @@ struct bus_identity {
 	uint16_t alias;
 };
 
+/* Reads it: a few frames at a time (bus/identity.h). */
+struct identity_reader {
+	int result; /* 1: being read; 0: done, or not begun; -errno */
+	struct bus_identity identity;
+	struct eeprom_command command;
+	uint8_t words[16]; /* vendor, product, revision, serial */
+	size_t len;        /* of them */
+};
+
 enum { GUESTS_MAX = 16 };
 
 enum guest_kind {
@@ -142,7 +152,8 @@ struct bus_guest {
 	int shut_by;        /* the slave whose port to it is closed; -1: it is on the wire */
 	uint8_t shut_port;
 	mono_t readable_by;
-	struct bus_identity identity;
+	struct bus_identity identity; /* vendor 0: not read yet */
+	struct identity_reader reader;
 };
 
 struct bus_emit {
@@ -174,7 +185,8 @@ struct bus {
 	size_t channel_count;
 	struct exchange_plan plan;
 	struct schedule schedule;
-	int reference;        /* position of the reference clock; -1: none */
+	int reference; /* position of the reference clock; -1: none */
+	struct identity_reader reference_reader;
 	int64_t reference_ns; /* its time as last read, and when */
 	mono_t reference_at;
 	int64_t sync0_start_ns; /* common grid; 0: SYNC0 was not started */

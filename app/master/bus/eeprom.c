@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "base/bytes.h"
-#include "bus/registers.h"
+#include "wire/esc_reg.h"
 
 enum step { STEP_OWNER, STEP_TAKE, STEP_COMMAND, STEP_POLL };
 
@@ -36,6 +36,12 @@ void eeprom_begin(struct eeprom_command *cmd, enum eeprom_operation operation, u
 	cmd->give_up = give_up;
 	cmd->step = STEP_OWNER;
 	cmd->problem = -EBUSY;
+}
+
+void eeprom_read_next(struct eeprom_command *cmd, uint32_t word)
+{
+	eeprom_begin(cmd, EEPROM_OP_READ, cmd->station, word, cmd->give_up);
+	cmd->step = STEP_COMMAND;
 }
 
 static struct access access_of(const struct eeprom_command *cmd, enum ecat_cmd what, uint16_t reg,

@@ -13,8 +13,7 @@
 #include <stdint.h>
 
 #include "base/clock.h"
-
-struct access;
+#include "bus/access.h"
 
 enum eeprom_operation { EEPROM_OP_READ, EEPROM_OP_WRITE, EEPROM_OP_RELOAD };
 
@@ -54,6 +53,8 @@ struct eeprom_command {
 /** Begin; @give_up bounds it. */
 void eeprom_begin(struct eeprom_command *cmd, enum eeprom_operation operation, uint16_t station,
 		  uint32_t word, mono_t give_up);
+/** Read @word next, right after a read that is done: the interface is the master's already. */
+void eeprom_read_next(struct eeprom_command *cmd, uint32_t word);
 /** The next register accesses, at most EEPROM_ACCESSES, into @ret. Returns how many. */
 size_t eeprom_prepare(struct eeprom_command *cmd, struct access *ret);
 /**

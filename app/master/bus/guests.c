@@ -10,12 +10,12 @@
 enum {
 	PARKING_FIRST = 0x7e00, /* station addresses of guests, one a guest */
 	FMMUS_CLEARED = 8,
-	IDENTIFIED_PER_CALL = 4,
 	LOOP_CLOSED = 3,
 };
 
 /* An EEPROM may still be loading; after that it is unreadable, and tried again in this interval. */
 #define LOADING_NS (2 * NS_PER_S)
+#define REREAD_NS NS_PER_S
 
 static int find_owner(const struct bus *bus, uint16_t address)
 {
@@ -267,25 +267,53 @@ static int is_identified(const struct bus_guest *guest)
 	return guest->identity.vendor != 0;
 }
 
-/* 1 if what it is was read, now or before. */
-static int read_identity(struct bus *bus, const struct walk *walk, struct bus_guest *guest,
-			 const struct bus_emit *emit)
+static int is_reading_due(const struct bus *bus, const struct bus_guest *guest)
 {
-	if (is_identified(guest)) {
-		return 1;
+	return !is_identified(guest) &&
+	       (guest->kind != GUEST_UNREADABLE || bus_now(bus).ns >= guest->readable_by.ns);
+}
+
+/* Of all that are on the wire, at the same time. */
+static void read_identities(struct bus *bus, const struct walk *walk)
+{
+	struct identity_reader *reader[GUESTS_MAX];
+	size_t count = 0;
+
+	for (size_t g = 0; g < GUESTS_MAX; g++) {
+		struct bus_guest *guest = &bus->guest[g];
+		mono_t give_up = guest->readable_by;
+
+		if (guest->kind == GUEST_NONE || !is_reading_due(bus, guest) ||
+		    walk_claims(walk, parking_of(bus, guest)) != 1) {
+			continue;
+		}
+		if (guest->kind == GUEST_UNREADABLE) {
+			give_up = mono_add(bus_now(bus), (span_t){ REREAD_NS });
+		}
+		if (guest->reader.result != 1) {
+			identity_begin(&guest->reader, parking_of(bus, guest), give_up);
+		}
+		reader[count++] = &guest->reader;
 	}
-	if (guest->kind == GUEST_UNREADABLE && bus_now(bus).ns < guest->readable_by.ns) {
-		return 0;
+	identity_step(bus, reader, count);
+	for (size_t g = 0; g < GUESTS_MAX; g++) {
+		struct bus_guest *guest = &bus->guest[g];
+
+		if (guest->kind != GUEST_NONE && guest->reader.result == 0) {
+			guest->identity = guest->reader.identity;
+		}
 	}
-	if (bus_identity_read(bus, parking_of(bus, guest), &guest->identity) == 0) {
-		return 1;
-	}
-	if (bus_now(bus).ns >= guest->readable_by.ns) {
+}
+
+/* Neither now nor until its time was over. */
+static void note_unreadable(struct bus *bus, const struct walk *walk, struct bus_guest *guest,
+			    const struct bus_emit *emit)
+{
+	if (guest->reader.result < 0 && bus_now(bus).ns >= guest->readable_by.ns) {
 		find_returned(bus, walk, guest, &guest->expected);
 		set_kind(bus, guest, GUEST_UNREADABLE, emit);
 		guest->readable_by = mono_add(bus_now(bus), (span_t){ LOADING_NS });
 	}
-	return 0;
 }
 
 static void judge(struct bus *bus, struct walk *walk, struct bus_guest *guest,
@@ -293,7 +321,8 @@ static void judge(struct bus *bus, struct walk *walk, struct bus_guest *guest,
 {
 	int r;
 
-	if (!read_identity(bus, walk, guest, emit)) {
+	if (!is_identified(guest)) {
+		note_unreadable(bus, walk, guest, emit);
 		return;
 	}
 	r = find_returned(bus, walk, guest, &guest->expected);
@@ -380,19 +409,17 @@ static void reopen(struct bus *bus, const struct walk *walk, size_t i, const str
 
 void guests_follow(struct bus *bus, struct walk *walk, const struct bus_emit *emit)
 {
-	unsigned identified = 0;
-
 	/* All of them first: what is addressed to a slave of ours must not reach them. */
 	for (size_t i = 0; i < walk->count; i++) {
 		if (walk->at[i].slave < 0) {
 			take_guest(bus, walk, i);
 		}
 	}
-	for (size_t i = 0; i < walk->count && identified < IDENTIFIED_PER_CALL; i++) {
+	read_identities(bus, walk);
+	for (size_t i = 0; i < walk->count; i++) {
 		struct bus_guest *guest = guest_of(bus, get_le16(walk->at[i].address));
 
 		if (walk->at[i].slave < 0 && guest != NULL) {
-			identified += is_identified(guest) ? 0 : 1;
 			judge(bus, walk, guest, emit);
 		}
 	}

@@ -9,115 +9,95 @@
 #include "bus/registers.h"
 
 enum {
-	STATUS_READS_8_BYTES = 1 << 6,
-	STATUS_COMMAND_READ = 1 << 8,
-	STATUS_CHECKSUM_ERROR = 1 << 11,
-	STATUS_NOT_LOADED = 1 << 12,
-	STATUS_NO_ACKNOWLEDGE = 1 << 13,
-	STATUS_BUSY = 1 << 15,
 	WORD_ALIAS = 4,
 	WORD_VENDOR = 8, /* then product, revision, serial, two words each */
-	IDENTITY_BYTES = 16,
-	POLLS_MAX = 20,
-	INTERFACE_BYTES = 14, /* 0x0502: control and status, address, data */
-	COMMAND_BYTES = 6,
 };
 
 #define IDENTIFICATION_NS (200 * NS_PER_MS)
 
-static int run_on(struct bus *bus, enum ecat_cmd cmd, uint16_t station, uint16_t reg, void *data,
-		  uint16_t len)
+void identity_begin(struct identity_reader *reader, uint16_t station, mono_t give_up)
 {
-	struct access access = { .cmd = cmd, .adp = station, .reg = reg, .len = len, .data = data };
-	int r = registers_run(bus, &access, 1);
-
-	return r < 0 ? r : access.wkc == 1 ? 0 : -EAGAIN;
+	*reader = (struct identity_reader){ .result = 1 };
+	eeprom_begin(&reader->command, EEPROM_OP_READ, station, WORD_VENDOR, give_up);
 }
 
-static int status_error(uint16_t status)
+/* All words are there; the command has the alias. */
+static int finish(struct identity_reader *reader)
 {
-	if ((status & STATUS_BUSY) != 0) {
-		return -EAGAIN;
-	}
-	if ((status & STATUS_NO_ACKNOWLEDGE) != 0) {
-		return -EREMOTEIO;
-	}
-	return (status & (STATUS_CHECKSUM_ERROR | STATUS_NOT_LOADED)) != 0 ? -EBADMSG : 0;
-}
+	const uint8_t *words = reader->words;
 
-/* From the PDI, if another master has given it to that. */
-static int take_interface(struct bus *bus, uint16_t station, uint16_t *ret_status)
-{
-	uint8_t force = 2;
-	uint8_t own = 0;
-	uint8_t status[2] = { 0 };
-	int r = run_on(bus, ECAT_CMD_FPWR, station, ESC_REG_EEPROM_CONFIG, &force, 1);
-
-	if (r == 0) {
-		r = run_on(bus, ECAT_CMD_FPWR, station, ESC_REG_EEPROM_CONFIG, &own, 1);
-	}
-	if (r == 0) {
-		r = run_on(bus, ECAT_CMD_FPRD, station, ESC_REG_EEPROM_CONTROL, status,
-			   sizeof(status));
-	}
-	if (r == 0) {
-		*ret_status = get_le16(status);
-		r = status_error(*ret_status);
-	}
-	return r;
-}
-
-static int read_words(struct bus *bus, uint16_t station, uint16_t word, uint8_t *ret, size_t len)
-{
-	uint8_t io[INTERFACE_BYTES] = { 0 };
-	int r;
-
-	put_le16(io, STATUS_COMMAND_READ);
-	put_le16(io + 2, word);
-	r = run_on(bus, ECAT_CMD_FPWR, station, ESC_REG_EEPROM_CONTROL, io, COMMAND_BYTES);
-	for (unsigned i = 0; i < POLLS_MAX && r == 0; i++) {
-		r = run_on(bus, ECAT_CMD_FPRD, station, ESC_REG_EEPROM_CONTROL, io, sizeof(io));
-		if (r == 0 && (get_le16(io) & STATUS_BUSY) == 0) {
-			r = status_error(get_le16(io));
-			if (r == 0 && get_le32(io + 2) == word) {
-				memcpy(ret, io + COMMAND_BYTES, len);
-				return 0;
-			}
-			return r < 0 ? r : -EAGAIN;
-		}
-	}
-	return r < 0 ? r : -EAGAIN;
-}
-
-int bus_identity_read(struct bus *bus, uint16_t station, struct bus_identity *ret)
-{
-	uint8_t words[IDENTITY_BYTES] = { 0 };
-	uint8_t alias[4] = { 0 };
-	uint16_t status = 0;
-	size_t len = 4;
-	int r = take_interface(bus, station, &status);
-
-	if ((status & STATUS_READS_8_BYTES) != 0) {
-		len = 8;
-	}
-	for (size_t at = 0; at < sizeof(words) && r == 0; at += len) {
-		r = read_words(bus, station, (uint16_t)(WORD_VENDOR + at / 2), words + at, len);
-	}
-	if (r == 0) {
-		r = read_words(bus, station, WORD_ALIAS, alias, sizeof(alias));
-	}
-	if (r < 0) {
-		return r;
-	}
 	if (get_le32(words) == 0 || get_le32(words) == UINT32_MAX) {
 		return -ENODATA;
 	}
-	*ret = (struct bus_identity){ .vendor = get_le32(words),
-				      .product = get_le32(words + 4),
-				      .revision = get_le32(words + 8),
-				      .serial = get_le32(words + 12),
-				      .alias = get_le16(alias) };
+	reader->identity = (struct bus_identity){ .vendor = get_le32(words),
+						  .product = get_le32(words + 4),
+						  .revision = get_le32(words + 8),
+						  .serial = get_le32(words + 12),
+						  .alias = get_le16(reader->command.data) };
 	return 0;
+}
+
+/* A command is done. */
+static int take_words(struct identity_reader *reader)
+{
+	struct eeprom_command *cmd = &reader->command;
+
+	if ((cmd->status & (EEPROM_CHECKSUM_ERROR | EEPROM_NOT_LOADED)) != 0) {
+		return -EBADMSG;
+	}
+	if (reader->len == sizeof(reader->words)) {
+		return finish(reader);
+	}
+	memcpy(reader->words + reader->len, cmd->data, (size_t)2 * cmd->words);
+	reader->len += (size_t)2 * cmd->words;
+	eeprom_read_next(cmd, reader->len == sizeof(reader->words)
+				      ? WORD_ALIAS
+				      : (uint32_t)(WORD_VENDOR + reader->len / 2));
+	return 1;
+}
+
+/* One frame for all that are being read. 1 if there is one still. */
+static int run_frame(struct bus *bus, struct identity_reader *const *reader, size_t count)
+{
+	struct access access[GUESTS_MAX * EEPROM_ACCESSES];
+	size_t first[GUESTS_MAX];
+	size_t n = 0;
+	int is_any = 0;
+	int r;
+
+	for (size_t i = 0; i < count; i++) {
+		first[i] = n;
+		if (reader[i]->result == 1) {
+			n += eeprom_prepare(&reader[i]->command, &access[n]);
+		}
+	}
+	if (n == 0) {
+		return 0;
+	}
+	r = registers_run(bus, access, n);
+	for (size_t i = 0; i < count; i++) {
+		struct identity_reader *rd = reader[i];
+
+		if (rd->result != 1) {
+			continue;
+		}
+		if (r < 0) {
+			rd->result = bus_now(bus).ns < rd->command.give_up.ns ? 1 : -ETIME;
+			continue;
+		}
+		rd->result = eeprom_take(&rd->command, &access[first[i]], bus_now(bus));
+		if (rd->result == 0) {
+			rd->result = take_words(rd);
+		}
+		is_any |= rd->result == 1;
+	}
+	return is_any;
+}
+
+void identity_step(struct bus *bus, struct identity_reader *const *reader, size_t count)
+{
+	for (unsigned i = 0; i < IDENTITY_FRAMES && run_frame(bus, reader, count); i++) {
+	}
 }
 
 int bus_is_same_device(const struct bus_slave *sl, const struct bus_identity *found)

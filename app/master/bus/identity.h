@@ -8,13 +8,18 @@
 
 #include "bus/bus_internal.h"
 
+/* Frames of one call of identity_step(), at most. */
+enum { IDENTITY_FRAMES = 4 };
+
+/** Begin to read it from the EEPROM of the device with station address @station; @give_up bounds
+ * it. */
+void identity_begin(struct identity_reader *reader, uint16_t station, mono_t give_up);
 /**
- * Read it from the EEPROM of the device with station address @station. 0; -EAGAIN: busy, loading,
- * or no single answer: try again; -EBADMSG: its checksum is wrong; -ENODATA: it is blank;
- * -EREMOTEIO: it does not acknowledge. @ret is untouched on failure. Takes a few frames for each of
- * three to five reads.
+ * Go on with @count readers, at most GUESTS_MAX, which share their frames. Their result: 1 being
+ * read; 0 identity is filled; -errno as eeprom_take(); -EBADMSG also: the EEPROM's checksum is
+ * wrong; -ENODATA it is blank; -ETIME no frame came back until the time was over.
  */
-int bus_identity_read(struct bus *bus, uint16_t station, struct bus_identity *ret);
+void identity_step(struct bus *bus, struct identity_reader *const *reader, size_t count);
 
 /** Vendor, product, revision, alias, and the serial number where the slave has one. */
 int bus_is_same_device(const struct bus_slave *sl, const struct bus_identity *found);

@@ -8,6 +8,9 @@
 #include "bus/guests.h"
 #include "bus/identity.h"
 
+/* For the EEPROM of the reference clock to be read. */
+#define REFERENCE_NS (2 * NS_PER_S)
+
 /* --- binding by what was written --- */
 
 /*
@@ -154,12 +157,24 @@ void bus_places_release(struct bus *bus)
 	}
 }
 
+/* Does the reference clock hold the offset that this session wrote? 1, 0; -EAGAIN. */
+static int has_offset(struct bus *bus, size_t pos)
+{
+	const struct bus_slave *sl = &bus->slave[pos];
+	uint8_t offset[8] = { 0 };
+
+	bus->error = NULL;
+	if (register_read(bus, pos, ESC_REG_DC_SYSTEM_TIME_OFFSET, offset, sizeof(offset)) < 0) {
+		return -EAGAIN;
+	}
+	return sl->is_clock_set && get_le64(offset) == (uint64_t)sl->clock_offset_ns;
+}
+
 int bus_reference_is_itself(struct bus *bus)
 {
 	const uint8_t to_pdi = 1;
-	struct bus_identity identity;
+	struct identity_reader *reader = &bus->reference_reader;
 	const struct bus_slave *sl;
-	uint8_t offset[8] = { 0 };
 	size_t pos;
 	int r;
 
@@ -168,15 +183,19 @@ int bus_reference_is_itself(struct bus *bus)
 	}
 	pos = (size_t)bus->reference;
 	sl = &bus->slave[pos];
-	bus->error = NULL;
-	r = register_read(bus, pos, ESC_REG_DC_SYSTEM_TIME_OFFSET, offset, sizeof(offset));
-	if (r < 0) {
+	r = has_offset(bus, pos);
+	if (r != 1) {
+		reader->result = 0;
+		return r;
+	}
+	if (reader->result != 1) {
+		identity_begin(reader, sl->info.station_addr,
+			       mono_add(bus_now(bus), (span_t){ REFERENCE_NS }));
+	}
+	identity_step(bus, &reader, 1);
+	if (reader->result == 1) {
 		return -EAGAIN;
 	}
-	if (!sl->is_clock_set || get_le64(offset) != (uint64_t)sl->clock_offset_ns) {
-		return 0;
-	}
-	r = bus_identity_read(bus, sl->info.station_addr, &identity);
 	register_write(bus, pos, ESC_REG_EEPROM_CONFIG, &to_pdi, sizeof(to_pdi));
-	return r < 0 ? -EAGAIN : bus_is_same_device(sl, &identity);
+	return reader->result < 0 ? -EAGAIN : bus_is_same_device(sl, &reader->identity);
 }

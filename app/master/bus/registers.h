@@ -10,19 +10,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "bus/access.h"
 #include "bus/bus_internal.h"
-#include "wire/datagram.h"
 #include "wire/esc_reg.h"
-
-struct access {
-	enum ecat_cmd cmd;
-	uint16_t adp;
-	uint16_t reg;
-	uint16_t len;
-	void *data;   /* written from and, where it was read, read into; NULL: zeros */
-	uint16_t wkc; /* out; APRD and FPRD with another than 1 have read nothing: 0 nobody answers,
-			 2 it is ambiguous */
-};
 
 /** Do all accesses in order. 0, or -errno if a frame did not come back at all. */
 int registers_run(struct bus *bus, struct access *access, size_t count);
