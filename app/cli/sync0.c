@@ -56,18 +56,33 @@ static void read_results(struct cli *cli, struct view *view)
 	feed_destroy(feed);
 }
 
+/* An optional slave that the master has not found. */
+static int is_absent(const struct sync0_line_status *ls)
+{
+	return ls->slave_pos == EVENT_NO_SLAVE;
+}
+
+/* "slave 1" */
+static const char *slave_text(const struct sync0_line_status *ls, char text[TEXT_BYTES])
+{
+	snprintf(text, TEXT_BYTES, is_absent(ls) ? "slave absent" : "slave %u", ls->slave_pos);
+	return text;
+}
+
 static void write_line(const struct view *view, uint32_t number)
 {
 	const struct sync0_line_status *ls = &view->page->line[number];
 	char name[TEXT_BYTES * 2];
 	char line[TEXT_BYTES * 4];
+	char slave[TEXT_BYTES];
 	char text[512];
 
-	printf("line %u     %s, slave %u, %s%s%s: %s%s\n", number + 1,
-	       text_plain(ls->slave, name, sizeof(name)), ls->slave_pos,
+	printf("line %u     %s, %s, %s%s%s: %s%s\n", number + 1,
+	       text_plain(ls->slave, name, sizeof(name)), slave_text(ls, slave),
 	       text_plain(ls->line, line, sizeof(line)), ls->is_oneshot ? ", one-shot" : "",
 	       ls->is_hte ? ", hardware timestamps" : "",
 	       !ls->is_open       ? "NOT OPEN"
+	       : is_absent(ls)    ? "NOT CHECKED"
 	       : GET(ls->is_lost) ? "LOST"
 				  : sync0_verdict_to_str(GET(ls->verdict)),
 	       GET(ls->edges) == 0 ? ", no window yet" : "");
@@ -185,7 +200,7 @@ static void write_line_json(struct json *js, const struct view *view, uint32_t n
 
 	json_object_begin(js, NULL);
 	json_u64(js, "line", number + 1);
-	json_u64(js, "slave", ls->slave_pos);
+	json_i64(js, "slave", is_absent(ls) ? -1 : (int64_t)ls->slave_pos);
 	json_text(js, "name", text_plain(ls->slave, text, sizeof(ls->slave)));
 	json_text(js, "gpio", text_plain(ls->line, text, sizeof(text)));
 	json_truth(js, "open", ls->is_open != 0);
@@ -238,13 +253,14 @@ static void write_json(const struct view *view)
 static void write_bars(const struct view *view)
 {
 	char name[TEXT_BYTES * 2];
+	char slave[TEXT_BYTES];
 
 	puts("difference of each SYNC0 period from nominal, including measurement "
 	     "noise");
 	for (uint32_t i = 0; i < view->lines; i++) {
 		const struct sync0_line_status *ls = &view->page->line[i];
 
-		printf("line %u, slave %u %s\n", i + 1, ls->slave_pos,
+		printf("line %u, %s %s\n", i + 1, slave_text(ls, slave),
 		       text_plain(ls->slave, name, sizeof(name)));
 		bars_print(&ls->deviation);
 	}

@@ -101,7 +101,9 @@ struct slave_info {
 	int32_t counter_channel; /* its conversion counter in the channel table; -1: none */
 	uint32_t input_bits;
 	uint32_t output_bits;
-	uint64_t reserved;
+	int32_t sync0_shift_ns; /* of its SYNC0 against the grid: SII and configuration */
+	uint16_t config_item;   /* of slaves[], from 1; 0: it is not configured */
+	uint16_t reserved;
 };
 
 static_assert(sizeof(struct slave_info) == 144, "part of the ring's format");

@@ -171,11 +171,23 @@ static void take_settings(struct bus *bus, size_t pos)
 	snprintf(sl->info.name, sizeof(sl->info.name), "%s", want->name);
 }
 
+/* Less than its cycle, with the sign that it was given. */
+static int32_t stated_shift(const struct bus_slave *sl)
+{
+	int64_t shift_ns = sl->sync0_shift_ns % sl->sync0_cycle_ns;
+
+	if (shift_ns > INT32_MAX || shift_ns < -INT32_MAX) {
+		shift_ns = fold_ns(shift_ns, sl->sync0_cycle_ns);
+	}
+	return (int32_t)shift_ns;
+}
+
 /* The EEPROM is loaded: only now does the chip have its clock. */
 static int describe(struct bus *bus, size_t pos)
 {
 	struct bus_slave *sl = &bus->slave[pos];
 	char damage[128] = "";
+	int r;
 
 	/* Damage is reported where what it hides is needed: SYNC mode, mapping. */
 	sii_parse(sl->sii, sl->sii_len, &bus->parsed, damage, sizeof(damage));
@@ -189,7 +201,9 @@ static int describe(struct bus *bus, size_t pos)
 			   sizeof(sl->info.name));
 	}
 	bus_soem_describe(bus, pos);
-	return bus_sync_mode(bus, pos, damage);
+	r = bus_sync_mode(bus, pos, damage);
+	sl->info.sync0_shift_ns = stated_shift(sl);
+	return r;
 }
 
 static int check_names(struct bus *bus)
@@ -263,6 +277,9 @@ static void bind_slaves(struct bus *bus)
 	}
 	compare_apply(bus->wanted, config, bus->slave_count, &bus->bound);
 	bus->cfg = &bus->bound;
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		bus->slave[i].info.config_item = (uint16_t)(config[i] + 1);
+	}
 	note_absent(bus, config);
 }
 

@@ -29,7 +29,7 @@ static void on_line(void *ctx, size_t line, const char *why)
 
 	if (why != NULL && line < 2 && ls->reason[0] == '\0') {
 		snprintf(ls->reason, sizeof(ls->reason), "line '%.90s' of slave %u: %.120s",
-			 gpio_lines_text(ls->lines, line), gpio_lines_slave(ls->lines, line), why);
+			 gpio_lines_text(ls->lines, line), gpio_lines_item(ls->lines, line), why);
 	}
 }
 

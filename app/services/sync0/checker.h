@@ -31,7 +31,7 @@ enum checker_mode {
 struct checker_line {
 	uint16_t slave_pos;
 	enum checker_mode mode;
-	int64_t shift_ns; /* configured shift of its SYNC0 */
+	int64_t shift_ns; /* of its SYNC0 against the grid */
 };
 
 struct checker_spec {

@@ -13,7 +13,7 @@ enum { EDGES = 256 };
 
 struct one_line {
 	struct gpio *gpio; /* NULL: not open */
-	uint16_t slave_pos;
+	uint16_t item;     /* of slaves[] */
 	const char *text;
 	int error;
 	char reason[GPIO_WHY_BYTES];
@@ -37,7 +37,7 @@ struct gpio_lines *gpio_lines_create(const struct config *cfg, const char *dev_d
 	l->dev_dir = dev_dir;
 	for (size_t i = 0; i < cfg->slave_count; i++) {
 		if (cfg->slave[i].sync0_line[0] != '\0' && l->count < LIMIT_SYNC0_LINES) {
-			l->line[l->count++] = (struct one_line){ .slave_pos = (uint16_t)i,
+			l->line[l->count++] = (struct one_line){ .item = (uint16_t)i,
 								 .text = cfg->slave[i].sync0_line };
 		}
 	}
@@ -65,9 +65,9 @@ size_t gpio_lines_count(const struct gpio_lines *l)
 	return l->count;
 }
 
-uint16_t gpio_lines_slave(const struct gpio_lines *l, size_t line)
+uint16_t gpio_lines_item(const struct gpio_lines *l, size_t line)
 {
-	return l->line[line].slave_pos;
+	return l->line[line].item;
 }
 
 const char *gpio_lines_text(const struct gpio_lines *l, size_t line)

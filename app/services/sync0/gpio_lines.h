@@ -19,7 +19,8 @@ typedef void (*gpio_lines_report)(void *ctx, size_t line, const char *why);
 struct gpio_lines *gpio_lines_create(const struct config *cfg, const char *dev_dir);
 void gpio_lines_destroy(struct gpio_lines *l);
 size_t gpio_lines_count(const struct gpio_lines *l);
-uint16_t gpio_lines_slave(const struct gpio_lines *l, size_t line);
+/** Of slaves[], from 0. */
+uint16_t gpio_lines_item(const struct gpio_lines *l, size_t line);
 const char *gpio_lines_text(const struct gpio_lines *l, size_t line);
 int gpio_lines_is_open(const struct gpio_lines *l, size_t line);
 /** Why it is not: the last error of gpio_open(), or -ENODEV: its chip is gone. */

@@ -32,7 +32,7 @@ struct judge_noise {
 	int64_t bias_error_ns; /* of that; of other lines, the bias itself is the error */
 };
 
-/** Fill verdict, check and is_resolved of @r. @shift_ns: configured SYNC0 shift of the line. */
+/** Fill verdict, check and is_resolved of @r. @shift_ns: SYNC0 shift of the line. */
 void judge(const struct judge_limits *limits, const struct judge_noise *noise, int64_t shift_ns,
 	   struct sync0_result *r);
 

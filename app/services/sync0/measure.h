@@ -12,7 +12,7 @@
 struct measure_spec {
 	int64_t period_ns;
 	int64_t origin_dc_ns; /* DC time of cycle 0 */
-	int64_t shift_ns;     /* configured for this line, and for the first */
+	int64_t shift_ns;     /* of this line, and of the first */
 	int64_t first_shift_ns;
 };
 

@@ -61,6 +61,7 @@ static int are_all_open(const struct watch *w)
 static void on_line(void *ctx, size_t line, const char *why)
 {
 	struct watch *w = ctx;
+	const struct watch_line *wl = &w->line[line];
 	struct sync0_line_status *ls = &output_page(w->out)->line[line];
 	char text[TEXT_BYTES];
 
@@ -69,7 +70,7 @@ static void on_line(void *ctx, size_t line, const char *why)
 	ls->is_hte = (uint32_t)gpio_lines_is_hte(w->lines, line);
 	if (why != NULL) {
 		snprintf(text, sizeof(text), "line '%.95s' of slave %u: %s", line_text(w, line),
-			 (unsigned)ls->slave_pos, why);
+			 wl->slave_pos == EVENT_NO_SLAVE ? wl->item : wl->slave_pos, why);
 		output_message(w->out, text);
 	} else if (are_all_open(w)) {
 		output_message(w->out, "");
@@ -80,19 +81,19 @@ void watch_name_lines(struct watch *w)
 {
 	struct sync0_status *page = output_page(w->out);
 
-	for (unsigned pos = 0; pos < LIMIT_SLAVES; pos++) {
-		struct sync0_line_status *ls;
+	for (size_t i = 0; i < w->line_count; i++) {
+		const struct watch_line *line = &w->line[i];
+		struct sync0_line_status *ls = &page->line[i];
+		const char *name = line->item < w->spec.cfg->slave_count
+					   ? w->spec.cfg->slave[line->item].name
+					   : "";
 
-		if (w->line_of_slave[pos] == 0) {
-			continue;
-		}
-		ls = &page->line[w->line_of_slave[pos] - 1];
-		ls->slave_pos = pos;
-		ls->is_open = (uint32_t)(w->lines == NULL && w->edges != NULL);
-		ls->is_oneshot = (uint32_t)config_is_oneshot(w->spec.cfg, (uint16_t)pos);
-		snprintf(ls->line, sizeof(ls->line), "%.95s",
-			 line_text(w, w->line_of_slave[pos] - 1));
-		snprintf(ls->slave, sizeof(ls->slave), "%.31s", w->spec.cfg->slave[pos].name);
+		ls->slave_pos = line->slave_pos;
+		ls->is_open = (uint32_t)(w->lines == NULL ? w->edges != NULL
+							  : gpio_lines_is_open(w->lines, i));
+		ls->is_oneshot = (uint32_t)config_is_oneshot(w->spec.cfg, line->item);
+		snprintf(ls->line, sizeof(ls->line), "%.95s", line_text(w, i));
+		snprintf(ls->slave, sizeof(ls->slave), "%.31s", name);
 	}
 	atomic_store_explicit(&page->line_count, (uint32_t)w->line_count, memory_order_relaxed);
 }
@@ -114,7 +115,9 @@ static int have_lines(struct watch *w, char *why)
 		return -errno;
 	}
 	for (size_t i = 0; i < gpio_lines_count(w->lines); i++) {
-		w->line_of_slave[gpio_lines_slave(w->lines, i)] = i + 1;
+		uint16_t item = gpio_lines_item(w->lines, i);
+
+		w->line[i] = (struct watch_line){ .item = item, .slave_pos = item };
 	}
 	w->line_count = gpio_lines_count(w->lines);
 	return 0;

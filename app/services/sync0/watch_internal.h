@@ -12,6 +12,14 @@
 #include "sync0/output.h"
 #include "sync0/watch.h"
 
+struct watch_line {
+	uint16_t item;      /* of slaves[], from 0; WATCH_NO_ITEM: it is not configured */
+	uint16_t slave_pos; /* EVENT_NO_SLAVE: it is absent. Before a session: as configured */
+	int64_t shift_ns;   /* of its SYNC0, as the master states it */
+};
+
+#define WATCH_NO_ITEM UINT16_C(0xffff)
+
 struct watch {
 	struct watch_spec spec;
 	struct output *out;
@@ -23,6 +31,7 @@ struct watch {
 	struct edge_file *edges;  /* the simulation's; NULL: not open */
 	struct calibration calibration;
 	uint64_t line_of_slave[LIMIT_SLAVES]; /* plus one; 0: none */
+	struct watch_line line[LIMIT_SYNC0_LINES];
 	size_t line_count;
 	int64_t since_ns;  /* edges are received from here on */
 	int64_t newest_ns; /* edge of the file */

@@ -43,58 +43,97 @@ static void on_deviation(void *ctx, size_t line, int64_t ns)
 	histogram_add(&output_page(w->out)->line[line].deviation, ns);
 }
 
-/* A simulation has an edge of every slave with DC: each is a line. */
+/* The line of a slave of this session; NULL: it has none. */
+static struct watch_line *line_of(struct watch *w, const struct slave_info *slave)
+{
+	uint16_t item = slave->config_item > 0 ? slave->config_item - 1 : WATCH_NO_ITEM;
+
+	if (w->lines == NULL) {
+		/* A simulation has an edge of every slave with DC: each is a line. */
+		if (!slave->has_dc || w->line_count == LIMIT_SYNC0_LINES) {
+			return NULL;
+		}
+		w->line[w->line_count].item = item;
+		return &w->line[w->line_count++];
+	}
+	for (size_t i = 0; i < w->line_count; i++) {
+		if (w->line[i].item == item) {
+			return &w->line[i];
+		}
+	}
+	return NULL;
+}
+
+static void report_absent(struct watch *w)
+{
+	char text[WATCH_WHY_BYTES];
+
+	for (size_t i = 0; i < w->line_count; i++) {
+		if (w->line[i].slave_pos == EVENT_NO_SLAVE) {
+			snprintf(text, sizeof(text),
+				 "line '%.95s' is not checked: slaves[%u] is absent",
+				 output_page(w->out)->line[i].line, w->line[i].item);
+			output_message(w->out, text);
+			return;
+		}
+	}
+}
+
+/* A slave is where the master has found it, which is not its place in slaves[] behind an absent
+ * one. */
 static void lines_of_session(struct watch *w)
 {
 	const struct sample_meta *meta = &master_table(w->master)->meta;
 	const struct slave_info *slave = master_table(w->master)->slaves;
 	struct sync0_status *page = output_page(w->out);
 
+	memset(w->line_of_slave, 0, sizeof(w->line_of_slave));
 	if (w->lines == NULL) {
-		memset(w->line_of_slave, 0, sizeof(w->line_of_slave));
 		w->line_count = 0;
-		for (uint32_t i = 0; i < meta->slave_count; i++) {
-			if (slave[i].has_dc && slave[i].slave_pos < LIMIT_SLAVES &&
-			    w->line_count < LIMIT_SYNC0_LINES) {
-				w->line_of_slave[slave[i].slave_pos] = ++w->line_count;
-			}
-		}
-		watch_name_lines(w);
+	}
+	for (size_t i = 0; i < w->line_count; i++) {
+		w->line[i].slave_pos = EVENT_NO_SLAVE;
 	}
 	for (uint32_t i = 0; i < meta->slave_count; i++) {
-		uint64_t line = slave[i].slave_pos < LIMIT_SLAVES
-					? w->line_of_slave[slave[i].slave_pos]
-					: 0;
+		struct watch_line *line = line_of(w, &slave[i]);
+
+		if (line != NULL) {
+			line->slave_pos = slave[i].slave_pos;
+			line->shift_ns = slave[i].sync0_shift_ns;
+			w->line_of_slave[line->slave_pos] = (uint64_t)(line - w->line) + 1;
+		}
+	}
+	watch_name_lines(w);
+	for (uint32_t i = 0; i < meta->slave_count; i++) {
+		uint64_t line = w->line_of_slave[slave[i].slave_pos];
 
 		if (line > 0) {
 			snprintf(page->line[line - 1].slave, sizeof(page->line[0].slave), "%.31s",
 				 slave[i].name);
 		}
 	}
+	report_absent(w);
 }
 
-static enum checker_mode mode_of(const struct watch *w, uint16_t pos)
+static enum checker_mode mode_of(const struct watch *w, size_t line)
 {
-	if (!watch_has_source(w) ||
-	    (w->lines != NULL && !gpio_lines_is_open(w->lines, w->line_of_slave[pos] - 1))) {
+	if (!watch_has_source(w) || w->line[line].slave_pos == EVENT_NO_SLAVE ||
+	    (w->lines != NULL && !gpio_lines_is_open(w->lines, line))) {
 		return CHECKER_OFF;
 	}
-	return config_is_oneshot(w->spec.cfg, pos) ? CHECKER_ONESHOT : CHECKER_PERIODIC;
+	return config_is_oneshot(w->spec.cfg, w->line[line].item) ? CHECKER_ONESHOT
+								  : CHECKER_PERIODIC;
 }
 
 static void fill_lines(const struct watch *w, struct checker_spec *spec)
 {
-	const struct config *cfg = w->spec.cfg;
-
 	spec->line_count = w->line_count;
-	for (uint16_t pos = 0; pos < LIMIT_SLAVES; pos++) {
-		if (w->line_of_slave[pos] > 0) {
-			spec->line[w->line_of_slave[pos] - 1] = (struct checker_line){
-				.slave_pos = pos,
-				.mode = mode_of(w, pos),
-				.shift_ns = cfg->slave[pos].sync0_shift_ns,
-			};
-		}
+	for (size_t i = 0; i < w->line_count; i++) {
+		spec->line[i] = (struct checker_line){
+			.slave_pos = w->line[i].slave_pos,
+			.mode = mode_of(w, i),
+			.shift_ns = w->line[i].shift_ns,
+		};
 	}
 }
 

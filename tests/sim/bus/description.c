@@ -345,6 +345,30 @@ TEST(description, sync_cycle_factors_and_shifts_of_a_mode_reach_the_slave)
 	bench_destroy(b);
 }
 
+/* What bus_slaves() states of the first slave. */
+static int32_t stated_shift_ns(struct bus_bench *b)
+{
+	size_t count;
+	int32_t shift_ns;
+
+	CHECK_EQ(bench_find(b), 0);
+	shift_ns = bus_slaves(b->bus, &count)[0].sync0_shift_ns;
+	bench_destroy(b);
+	return shift_ns;
+}
+
+TEST(description, the_stated_sync0_shift_is_that_of_the_sii_and_the_configuration)
+{
+	static const char *const settings[] = { "slaves[0].sync0_shift=-30us", NULL };
+
+	CHECK_EQ(stated_shift_ns(make_mode(1, 250000, 0, 0, 41)), 250000);
+	CHECK_EQ(stated_shift_ns(make_mode(1, 1250000, 0, 0, 42)), 250000);
+	CHECK_EQ(stated_shift_ns(make_mode(4, -1250000, 0, 0, 43)), -1250000);
+	CHECK_EQ(stated_shift_ns(bench_create(
+			 &(struct bench_spec){ .piccolos = 1, .seed = 44, .settings = settings })),
+		 -30000);
+}
+
 static void check_refused(struct bus_bench *b, const char *what)
 {
 	CHECK_EQ(bench_find(b), -ENOTSUP);

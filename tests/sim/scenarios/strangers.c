@@ -295,6 +295,8 @@ TEST(sim_strangers, an_absent_optional_slave_is_reported_and_the_others_work)
 	CHECK_EQ(state(), BUS_OP);
 	CHECK_EQ(atomic_load(&page()->slave_count), 2);
 	CHECK_STR(page()->slave[1].info.name, "c");
+	CHECK_EQ(page()->slave[0].info.config_item, 1);
+	CHECK_EQ(page()->slave[1].info.config_item, 3);
 	CHECK_STR(page()->message, "slaves[1] b is optional and absent");
 	/* It comes later: for this session it is a stranger. */
 	virtual_bench_fault(&b, "at=0s plug slave=1");

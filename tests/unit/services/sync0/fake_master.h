@@ -16,8 +16,10 @@ struct fake_master {
 	char path[128];
 	struct ring *ring;
 	int64_t period_ns;
-	int64_t cycle; /* next */
-	int64_t dc_ns; /* of its SYNC0; goes on over restarts */
+	int64_t cycle;    /* next */
+	int64_t dc_ns;    /* of its SYNC0; goes on over restarts */
+	int32_t shift_ns; /* of the second slave */
+	uint16_t absent;  /* items of slaves[] before the second slave */
 };
 
 /** Make "samples" in @dir, in place of one that is there. */

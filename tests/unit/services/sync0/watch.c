@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "base/event.h"
 #include "base/sync0.h"
 #include "harness/test.h"
 #include "reader/page.h"
@@ -25,6 +26,7 @@ struct watch_bench {
 	struct watch *watch;
 	FILE *edges; /* NULL: the file is not there */
 	int64_t now_ns;
+	int64_t late_ns;     /* of the second slave's pulses */
 	int64_t silent_from; /* cycle from which on the second slave has no pulse */
 	char why[WATCH_WHY_BYTES];
 };
@@ -136,7 +138,8 @@ static void write_cycle(uint64_t shot_ns)
 
 	for (int slave = 0; b.edges != NULL && slave < FAKE_SLAVES; slave++) {
 		if (slave == 0 || b.fake.cycle < b.silent_from) {
-			fprintf(b.edges, "%d %lld 0\n", slave, (long long)edge_ns);
+			fprintf(b.edges, "%d %lld 0\n", slave,
+				(long long)edge_ns + (slave == FAKE_SHOT_SLAVE ? b.late_ns : 0));
 		}
 	}
 	fake_master_push(&b.fake, shot_ns);
@@ -285,6 +288,67 @@ TEST(sync0_watch, a_time_that_is_still_to_come_is_no_edge)
 	CHECK(page()->windows >= 8);
 	CHECK(page()->line[1].edges >= 800);
 	CHECK_EQ(page()->alarms, 0);
+	end();
+}
+
+/* As of a slave whose SII has the shift: the configuration says nothing. */
+TEST(sync0_watch, the_shift_that_the_master_states_is_expected)
+{
+	begin();
+	b.late_ns = 200 * NS_PER_US;
+	b.fake.shift_ns = 200 * (int32_t)NS_PER_US;
+	start(NS_PER_MS);
+	run(2000);
+	CHECK(page()->windows >= 10);
+	CHECK(page()->line[1].edges >= 1000);
+	CHECK_EQ(page()->line[1].missing, 0);
+	CHECK_EQ(page()->alarms, 0);
+	end();
+	begin();
+	b.late_ns = 200 * NS_PER_US;
+	start(NS_PER_MS);
+	run(2000);
+	CHECK(page()->alarms > 0);
+	end();
+}
+
+/* The mode is that of the item, too. */
+TEST(sync0_watch, a_slave_behind_an_absent_one_has_the_settings_of_its_item)
+{
+	begin();
+	set("slaves[0].mode=periodic");
+	set("slaves[1].mode=oneshot");
+	set("slaves[2].mode=periodic");
+	b.fake.absent = 1;
+	start(NS_PER_MS);
+	run(500);
+	CHECK_EQ(page()->line[1].slave_pos, 1);
+	CHECK_EQ(page()->line[1].is_oneshot, 0);
+	CHECK(page()->line[1].edges > 0);
+	end();
+}
+
+TEST(sync0_watch, lines_belong_to_the_slaves_that_the_master_has_found)
+{
+	begin();
+	b.cfg.sync0_edges[0] = '\0';
+	set("slaves[0].sync0_line=chip:4");
+	set("slaves[1].sync0_line=chip:5");
+	set("slaves[1].name=absent");
+	set("slaves[2].sync0_line=chip:6");
+	CHECK_EQ(try_watch(&b.watch), 0);
+	CHECK_EQ(page()->line_count, 3);
+	CHECK_EQ(page()->line[2].slave_pos, 2); /* as configured, as long as there is no master */
+	b.fake.absent = 1;
+	fake_master_start(&b.fake, b.dir, NS_PER_MS);
+	run(500);
+	CHECK_EQ(page()->line[0].slave_pos, 0);
+	CHECK_STR(page()->line[0].slave, "a");
+	CHECK_EQ(page()->line[1].slave_pos, EVENT_NO_SLAVE);
+	CHECK_STR(page()->line[1].slave, "absent");
+	CHECK_EQ(page()->line[2].slave_pos, 1);
+	CHECK_STR(page()->line[2].slave, "b");
+	CHECK_STR(page()->line[2].line, "chip:6");
 	end();
 }
 
