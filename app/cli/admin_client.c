@@ -3,20 +3,41 @@
 
 #include <errno.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
 
 /* ecdaqd ends each request by a time-out of its own; these are a little longer. */
-enum { REPLY_TIMEOUT_S = 25, BRING_UP_TIMEOUT_S = 605 };
+enum { REPLY_TIMEOUT_S = 25, LONG_TIMEOUT_S = 605 };
 
 static int timeout_s(const struct admin_request *request)
 {
-	return request->verb == ADMIN_RESCAN || (request->verb == ADMIN_STATE &&
-						 request->slave_pos == ADMIN_ALL_SLAVES)
-		       ? BRING_UP_TIMEOUT_S
-		       : REPLY_TIMEOUT_S;
+	switch ((enum admin_verb)request->verb) {
+	case ADMIN_RESCAN:
+	case ADMIN_SII_READ:
+	case ADMIN_SII_WRITE:
+		return LONG_TIMEOUT_S;
+	case ADMIN_STATE:
+		return request->slave_pos == ADMIN_ALL_SLAVES ? LONG_TIMEOUT_S : REPLY_TIMEOUT_S;
+	case ADMIN_PING:
+	case ADMIN_SET:
+	case ADMIN_ONESHOT:
+	case ADMIN_SDO_READ:
+	case ADMIN_SDO_WRITE:
+	case ADMIN_STOP:
+	case ADMIN_CLEAR:
+	case ADMIN_CANCEL:
+	case ADMIN_DATA:
+	case ADMIN_REGISTER_READ:
+	case ADMIN_REGISTER_WRITE:
+	case ADMIN_SII_ALIAS:
+	case ADMIN_DIAGNOSIS:
+	case ADMIN_ERRORS_RESET:
+		break;
+	}
+	return REPLY_TIMEOUT_S;
 }
 
 static enum exit_code fail_connect(const struct cli *cli, const char *path, int err)
@@ -62,37 +83,100 @@ static int connect_to(const char *path, int reply_timeout_s)
 	return fd;
 }
 
-/* 0 with the last reply, or -errno; -EPROTO: not a reply; -ECONNRESET: ecdaqd went away. */
-static int exchange(int fd, const struct admin_request *request, struct admin_reply *ret_reply)
+static int post(int fd, const struct admin_request *message)
 {
-	struct admin_reply reply;
-	ssize_t n = send(fd, request, sizeof(*request), MSG_NOSIGNAL);
+	return send(fd, message, sizeof(*message), MSG_NOSIGNAL) < 0 ? -errno : 0;
+}
 
+/* The request, and what does not fit into its first message. */
+static int send_all(int fd, const struct admin_transfer *tr)
+{
+	struct admin_request message = *tr->request;
+	size_t sent = message.data_len;
+	int r;
+
+	if (tr->data != NULL) {
+		sent = tr->data_len < ADMIN_DATA_BYTES ? tr->data_len : ADMIN_DATA_BYTES;
+		memcpy(message.data, tr->data, sent);
+		message.data_len = (uint32_t)sent;
+		message.data_total = (uint32_t)tr->data_len;
+	}
+	r = post(fd, &message);
+	message.verb = ADMIN_DATA;
+	while (r == 0 && tr->data != NULL && sent < tr->data_len) {
+		size_t left = tr->data_len - sent;
+
+		message.data_offset = (uint32_t)sent;
+		message.data_len = (uint32_t)(left < ADMIN_DATA_BYTES ? left : ADMIN_DATA_BYTES);
+		memcpy(message.data, tr->data + sent, message.data_len);
+		r = post(fd, &message);
+		sent += message.data_len;
+	}
+	return r;
+}
+
+/* One message of @request's answer. 0 or -errno. */
+static int receive(int fd, const struct admin_request *request, struct admin_reply *ret_reply)
+{
+	ssize_t n;
+
+	do {
+		n = recv(fd, ret_reply, sizeof(*ret_reply), 0);
+	} while (n < 0 && errno == EINTR);
 	if (n < 0) {
 		return -errno;
 	}
-	do {
-		do {
-			n = recv(fd, &reply, sizeof(reply), 0);
-		} while (n < 0 && errno == EINTR);
-		if (n < 0) {
-			return -errno;
-		}
-		if (n == 0) {
-			return -ECONNRESET;
-		}
-		if ((size_t)n != sizeof(reply) || reply.magic != ADMIN_MAGIC ||
-		    reply.id != request->id || reply.data_len > ADMIN_DATA_BYTES) {
-			return -EPROTO;
-		}
-	} while (reply.kind != ADMIN_REPLY_DONE);
-	reply.text[sizeof(reply.text) - 1] = '\0';
-	*ret_reply = reply;
+	if (n == 0) {
+		return -ECONNRESET;
+	}
+	if ((size_t)n != sizeof(*ret_reply) || ret_reply->magic != ADMIN_MAGIC ||
+	    ret_reply->id != request->id || ret_reply->data_len > ADMIN_DATA_BYTES) {
+		return -EPROTO;
+	}
+	ret_reply->text[sizeof(ret_reply->text) - 1] = '\0';
 	return 0;
 }
 
-enum exit_code admin_ask(struct cli *cli, struct admin_request *request,
-			 struct admin_reply *ret_reply)
+/* Data of an answer in several messages, or of the only one. 0 or -errno. */
+static int gather(struct admin_transfer *tr, const struct admin_reply *reply)
+{
+	uint8_t *room;
+
+	if (reply->kind == ADMIN_REPLY_PROGRESS || reply->data_len == 0) {
+		return 0;
+	}
+	if (reply->data_offset != tr->answer_len || reply->data_total > ADMIN_TRANSFER_BYTES) {
+		return -EPROTO;
+	}
+	room = realloc(tr->answer, tr->answer_len + reply->data_len);
+	if (room == NULL) {
+		return -ENOMEM;
+	}
+	memcpy(room + tr->answer_len, reply->data, reply->data_len);
+	tr->answer = room;
+	tr->answer_len += reply->data_len;
+	return 0;
+}
+
+/* 0 with the last reply, or -errno; -EPROTO: not a reply; -ECONNRESET: ecdaqd went away. */
+static int exchange(int fd, struct admin_transfer *tr)
+{
+	int r = send_all(fd, tr);
+
+	while (r == 0) {
+		r = receive(fd, tr->request, &tr->reply);
+		r = r == 0 ? gather(tr, &tr->reply) : r;
+		if (r == 0 && tr->reply.kind == ADMIN_REPLY_DONE) {
+			return 0;
+		}
+		if (r == 0 && tr->reply.kind == ADMIN_REPLY_PROGRESS && tr->progress != NULL) {
+			tr->progress(tr);
+		}
+	}
+	return r;
+}
+
+enum exit_code admin_transfer(struct cli *cli, struct admin_transfer *tr)
 {
 	char path[CONFIG_PATH_BYTES];
 	enum exit_code result = cli_path(cli, CONFIG_RUN_ADMIN, path);
@@ -102,16 +186,16 @@ enum exit_code admin_ask(struct cli *cli, struct admin_request *request,
 	if (result != EXIT_CODE_OK) {
 		return result;
 	}
-	fd = connect_to(path, timeout_s(request));
+	fd = connect_to(path, timeout_s(tr->request));
 	if (fd < 0) {
 		return fail_connect(cli, path, -fd);
 	}
-	request->magic = ADMIN_MAGIC;
-	r = exchange(fd, request, ret_reply);
+	tr->request->magic = ADMIN_MAGIC;
+	r = exchange(fd, tr);
 	close(fd);
 	if (r == -EAGAIN) {
 		return cli_fail(cli, EXIT_CODE_FAILED, "ecdaqd: no answer within %d s",
-				timeout_s(request));
+				timeout_s(tr->request));
 	}
 	if (r == -EPROTO) {
 		return cli_fail(cli, EXIT_CODE_FAILED,
@@ -122,6 +206,41 @@ enum exit_code admin_ask(struct cli *cli, struct admin_request *request,
 				"ecdaqd: connection closed without an answer");
 	}
 	return r < 0 ? cli_fail(cli, EXIT_CODE_FAILED, "ecdaqd: %s", strerror(-r)) : EXIT_CODE_OK;
+}
+
+enum exit_code admin_transfer_do(struct cli *cli, struct admin_transfer *tr)
+{
+	enum exit_code result = admin_transfer(cli, tr);
+
+	return result == EXIT_CODE_OK ? admin_judge(cli, &tr->reply) : result;
+}
+
+void admin_transfer_done(struct admin_transfer *tr)
+{
+	free(tr->answer);
+	tr->answer = NULL;
+}
+
+void admin_show_progress(const struct admin_transfer *tr)
+{
+	if (isatty(STDERR_FILENO) && tr->reply.total != 0) {
+		fprintf(stderr, "\r%3u %%%s",
+			(unsigned)(UINT64_C(100) * tr->reply.done / tr->reply.total),
+			tr->reply.done >= tr->reply.total ? "\n" : "");
+	}
+}
+
+enum exit_code admin_ask(struct cli *cli, struct admin_request *request,
+			 struct admin_reply *ret_reply)
+{
+	struct admin_transfer tr = { .request = request };
+	enum exit_code result = admin_transfer(cli, &tr);
+
+	if (result == EXIT_CODE_OK) {
+		*ret_reply = tr.reply;
+	}
+	admin_transfer_done(&tr);
+	return result;
 }
 
 enum exit_code admin_judge(const struct cli *cli, const struct admin_reply *reply)

@@ -3,6 +3,9 @@
 #ifndef CLI_ADMIN_CLIENT_H
 #define CLI_ADMIN_CLIENT_H
 
+#include <stddef.h>
+#include <stdint.h>
+
 #include "base/admin_protocol.h"
 #include "cli/cli.h"
 
@@ -12,6 +15,26 @@
  */
 enum exit_code admin_ask(struct cli *cli, struct admin_request *request,
 			 struct admin_reply *ret_reply);
+
+/* A request with more data, or a longer answer, than one message has. */
+struct admin_transfer {
+	struct admin_request *request;
+	const uint8_t *data; /* to send, in place of request->data; NULL: none */
+	size_t data_len;
+	/** Called for each report: reply.done of reply.total. NULL: none is shown. */
+	void (*progress)(const struct admin_transfer *tr);
+	struct admin_reply reply; /* the last message */
+	uint8_t *answer;          /* all data of the answer; NULL: none */
+	size_t answer_len;
+};
+
+/** admin_ask() with them. Free the answer with admin_transfer_done(), after a failure, too. */
+enum exit_code admin_transfer(struct cli *cli, struct admin_transfer *tr);
+/** The same with admin_judge(). */
+enum exit_code admin_transfer_do(struct cli *cli, struct admin_transfer *tr);
+void admin_transfer_done(struct admin_transfer *tr);
+/** For progress: per cent on standard error, if that is a terminal. */
+void admin_show_progress(const struct admin_transfer *tr);
 
 /** EXIT_CODE_OK if @reply grants the request; else report why not: EXIT_CODE_REFUSED. */
 enum exit_code admin_judge(const struct cli *cli, const struct admin_reply *reply);

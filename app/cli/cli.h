@@ -55,13 +55,16 @@ enum exit_code cli_path(struct cli *cli, const char *file, char *ret_path);
 /* The verbs, one file each. */
 enum exit_code verb_channels(struct cli *cli, int argc, char **argv);
 enum exit_code verb_clear(struct cli *cli, int argc, char **argv);
+enum exit_code verb_crc(struct cli *cli, int argc, char **argv);
 enum exit_code verb_doctor(struct cli *cli, int argc, char **argv);
 enum exit_code verb_events(struct cli *cli, int argc, char **argv);
 enum exit_code verb_histogram(struct cli *cli, int argc, char **argv);
 enum exit_code verb_oneshot(struct cli *cli, int argc, char **argv);
+enum exit_code verb_reg(struct cli *cli, int argc, char **argv);
 enum exit_code verb_rescan(struct cli *cli, int argc, char **argv);
 enum exit_code verb_sdo(struct cli *cli, int argc, char **argv);
 enum exit_code verb_set(struct cli *cli, int argc, char **argv);
+enum exit_code verb_sii(struct cli *cli, int argc, char **argv);
 enum exit_code verb_slaves(struct cli *cli, int argc, char **argv);
 enum exit_code verb_state(struct cli *cli, int argc, char **argv);
 enum exit_code verb_status(struct cli *cli, int argc, char **argv);

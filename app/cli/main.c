@@ -101,6 +101,25 @@ static const struct verb verbs[] = {
 	  "LINT\n"
 	  "USINT UINT UDINT ULINT REAL LREAL, and for reading STRING.\n",
 	  verb_sdo },
+	{ "reg", "read|write SLAVE REGISTER [LENGTH|VALUE...]",
+	  "Read or write registers of a slave's ESC.",
+	  "ecdaq reg read piccolo0 0x0130         2 bytes: AL status\n"
+	  "ecdaq reg read 0 0x0300 20             20 bytes\n"
+	  "ecdaq reg write 0 0x0f80 1 2 0xff      3 bytes\n"
+	  "ecdaq reg write 0 0x0420 1000 -t UINT  a word\n\n"
+	  "While the bus is in operation, what the master needs unchanged is written with --force "
+	  "only.\n",
+	  verb_reg },
+	{ "sii", "read|write|alias SLAVE [FILE|ALIAS]", "Read or write a slave's EEPROM (SII).",
+	  "ecdaq sii read piccolo0 --output piccolo.bin\n"
+	  "ecdaq sii write piccolo0 piccolo.bin\n"
+	  "ecdaq sii alias piccolo0 1001\n\n"
+	  "An image is checked first and verified word by word; it is in effect after the slave's "
+	  "next\n"
+	  "power-on. The slave must be in INIT or PRE-OP.\n",
+	  verb_sii },
+	{ "crc", "[SLAVE...]", "Error counters in the registers of the slaves, port by port.",
+	  "Each stops at 255. Their sums since the start of ecdaqd: ecdaq slaves -v.\n", verb_crc },
 	{ "events", "", "What happened, oldest first.", NULL, verb_events },
 	{ "sync0", "[calibrate]", "Results of ecdaq-sync0: the SYNC0 pulses on GPIO lines.",
 	  "calibrate: the same signal is on the first two lines: measure the noise of this "

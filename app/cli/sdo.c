@@ -12,6 +12,7 @@
 #include "base/bytes.h"
 #include "cli/admin_client.h"
 #include "cli/cli.h"
+#include "cli/hex.h"
 #include "cli/source.h"
 #include "config/sdo_value.h"
 #include "program/json.h"
@@ -86,17 +87,6 @@ static uint64_t bits_of(const struct admin_reply *reply)
 	return get_le64(padded);
 }
 
-static void format_hex(const struct admin_reply *reply, char *buf, size_t buf_len)
-{
-	buf[0] = '\0';
-	for (size_t i = 0; i < reply->data_len && 3 * i + 4 < buf_len; i++) {
-		snprintf(buf + 3 * i, buf_len - 3 * i, "%02x ", reply->data[i]);
-	}
-	if (buf[0] != '\0') {
-		buf[strlen(buf) - 1] = '\0';
-	}
-}
-
 static void copy_string(const struct admin_reply *reply, int is_terminal, char *buf, size_t buf_len)
 {
 	size_t len = strnlen((const char *)reply->data, reply->data_len);
@@ -130,11 +120,11 @@ static void write_json_value(struct json *js, int type, uint64_t bits)
 static void show(const struct sdo *sdo, int type)
 {
 	const struct admin_reply *reply = &sdo->reply;
-	char hex[3 * ADMIN_DATA_BYTES + 1];
+	char hex[3 * ADMIN_DATA_BYTES];
 	char text[ADMIN_DATA_BYTES + 1];
 	struct json js;
 
-	format_hex(reply, hex, sizeof(hex));
+	hex_format(reply->data, reply->data_len, hex, sizeof(hex));
 	if (!sdo->is_json) {
 		if (type == SDO_TYPES) {
 			copy_string(reply, 1, text, sizeof(text));
@@ -232,7 +222,6 @@ static enum exit_code write_object(struct sdo *sdo, int type, const char *value)
 
 static enum exit_code run(struct sdo *sdo, const struct args *args)
 {
-	const struct status_page *page;
 	int is_write = strcmp(args->operands[0], "write") == 0;
 	enum exit_code result;
 	int type;
@@ -254,12 +243,7 @@ static enum exit_code run(struct sdo *sdo, const struct args *args)
 	if (result != EXIT_CODE_OK) {
 		return result;
 	}
-	result = source_status(sdo->cli, &page);
-	if (result != EXIT_CODE_OK) {
-		return result;
-	}
-	result = source_find_slave(sdo->cli, page, args->operands[1], &sdo->request.slave_pos);
-	source_status_close(page);
+	result = source_slave_pos(sdo->cli, args->operands[1], &sdo->request.slave_pos);
 	if (result != EXIT_CODE_OK) {
 		return result;
 	}

@@ -219,3 +219,15 @@ enum exit_code source_find_slave(const struct cli *cli, const struct status_page
 	*ret_pos = (uint16_t)pos;
 	return EXIT_CODE_OK;
 }
+
+enum exit_code source_slave_pos(struct cli *cli, const char *text, uint16_t *ret_pos)
+{
+	const struct status_page *page = NULL;
+	enum exit_code result = source_status(cli, &page);
+
+	if (result == EXIT_CODE_OK) {
+		result = source_find_slave(cli, page, text, ret_pos);
+		source_status_close(page);
+	}
+	return result;
+}

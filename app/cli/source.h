@@ -64,5 +64,7 @@ uint32_t source_slave_count(const struct status_page *page);
 /** The position that @text names, "piccolo0" or "1", or the code of a failure, reported. */
 enum exit_code source_find_slave(const struct cli *cli, const struct status_page *page,
 				 const char *text, uint16_t *ret_pos);
+/** The same of the status page as it is now. */
+enum exit_code source_slave_pos(struct cli *cli, const char *text, uint16_t *ret_pos);
 
 #endif

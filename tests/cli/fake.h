@@ -15,6 +15,7 @@
 
 enum { SLAVES = 2, ENTRIES = 6, CHANNELS = SLAVES * ENTRIES };
 enum { OUT_BYTES = 9, IN_BYTES = 13, IMAGE_BYTES = SLAVES * (OUT_BYTES + IN_BYTES) };
+enum { SII_BYTES = 2048 };
 enum { FIRST_CYCLE = 1000, STEP_NS = 1000000 };
 
 struct meta {
@@ -46,6 +47,10 @@ struct fake {
 	uint8_t image[IMAGE_BYTES];
 	uint16_t refresh_ms; /* 0x8000:2 */
 	int64_t armed_ns[SLAVES];
+	uint8_t reg[0x1000];     /* of slave 0 */
+	uint8_t sii[SII_BYTES];  /* of slave 0 */
+	uint8_t data[SII_BYTES]; /* of the request */
+	uint32_t data_len;
 };
 
 int64_t fake_clock_ns(clockid_t clock);

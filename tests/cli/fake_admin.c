@@ -14,12 +14,20 @@
 #include "fake.h"
 #include "image/image.h"
 #include "wire/al.h"
+#include "wire/sii.h"
 
 void fake_listen(struct fake *f)
 {
 	struct sockaddr_un address = { .sun_family = AF_UNIX };
 
 	f->listener = -1;
+	f->reg[0x0130] = AL_OP;
+	f->reg[0x0301] = 7;
+	for (unsigned i = 0; i < SII_BYTES; i++) {
+		f->sii[i] = (uint8_t)(i * 5 + i / 256);
+	}
+	put_le16(f->sii + SII_ALIAS_BYTE, 17);
+	f->sii[SII_CHECKSUM_BYTE] = sii_checksum(f->sii);
 	if (strcmp(f->admin, "none") == 0) {
 		return;
 	}
@@ -144,6 +152,63 @@ static void answer_state(struct fake *f, const struct admin_request *rq, struct 
 	reply->data_len = 1;
 }
 
+/* --- registers and EEPROM: of slave 0; slave 1 does not answer --- */
+
+static void answer_register(struct fake *f, const struct admin_request *rq,
+			    struct admin_reply *reply)
+{
+	if (rq->slave_pos != 0 || rq->address + rq->length > sizeof(f->reg)) {
+		refuse(reply, -ENXIO, "slave 1: 0x0130 does not answer: no such register");
+	} else if (rq->verb == ADMIN_REGISTER_READ) {
+		give(reply, f->reg + rq->address, rq->length);
+	} else if (rq->address == 0x0120 && rq->argument[1] == 0) {
+		refuse(reply, -EPERM, "slave 0: 0x0120: AL control: not written");
+	} else {
+		memcpy(f->reg + rq->address, f->data, f->data_len);
+	}
+}
+
+static void answer_written(struct admin_reply *reply, uint32_t compared, uint32_t written)
+{
+	give(reply, &(struct admin_sii_written){ .compared = compared, .written = written },
+	     sizeof(struct admin_sii_written));
+}
+
+static void answer_sii(struct fake *f, const struct admin_request *rq, struct admin_reply *reply)
+{
+	uint32_t differ = 0;
+
+	if (rq->slave_pos != 0) {
+		refuse(reply, -EPERM, "slave 1: it is in SAFE-OP or OP");
+	} else if (rq->verb == ADMIN_SII_ALIAS) {
+		differ = get_le16(f->sii + SII_ALIAS_BYTE) != rq->argument[0] ? 2 : 0;
+		put_le16(f->sii + SII_ALIAS_BYTE, (uint16_t)rq->argument[0]);
+		answer_written(reply, 8, differ);
+	} else if (rq->verb == ADMIN_SII_WRITE) {
+		for (uint32_t i = 0; i + 1 < f->data_len; i += 2) {
+			differ += memcmp(f->sii + i, f->data + i, 2) != 0;
+		}
+		memcpy(f->sii, f->data, f->data_len);
+		answer_written(reply, f->data_len / 2, differ);
+	}
+}
+
+static void answer_diagnosis(const struct fake *f, const struct admin_request *rq,
+			     struct admin_reply *reply)
+{
+	struct admin_diagnosis found = {
+		.port[0] = { .is_link = 1, .is_communicating = 1, .rx_errors = f->reg[0x0301] },
+		.has_processing_errors = 1,
+		.pdi_errors = 3
+	};
+
+	if (rq->slave_pos != 0) {
+		refuse(reply, -EIO, "slave 1: no frame came back");
+		return;
+	}
+	give(reply, &found, sizeof(found));
+}
+
 static void answer(struct fake *f, const struct admin_request *rq, struct admin_reply *reply)
 {
 	*reply = (struct admin_reply){ .magic = ADMIN_MAGIC, .id = rq->id };
@@ -174,10 +239,74 @@ static void answer(struct fake *f, const struct admin_request *rq, struct admin_
 	case ADMIN_STATE:
 		answer_state(f, rq, reply);
 		break;
+	case ADMIN_REGISTER_READ:
+	case ADMIN_REGISTER_WRITE:
+		answer_register(f, rq, reply);
+		break;
+	case ADMIN_SII_READ:
+	case ADMIN_SII_WRITE:
+	case ADMIN_SII_ALIAS:
+		answer_sii(f, rq, reply);
+		break;
+	case ADMIN_DIAGNOSIS:
+		answer_diagnosis(f, rq, reply);
+		break;
+	case ADMIN_ERRORS_RESET:
+		f->reg[0x0301] = 0;
+		break;
 	case ADMIN_CANCEL:
 	case ADMIN_DATA:
 		refuse(reply, -EINVAL, "not served here");
 		break;
+	}
+}
+
+/* The data of a request, from as many messages as it has. 0 or -1. */
+static int collect(struct fake *f, int fd, const struct admin_request *rq)
+{
+	struct admin_request more = *rq;
+
+	f->data_len = 0;
+	for (;;) {
+		if (more.data_len > ADMIN_DATA_BYTES ||
+		    f->data_len + more.data_len > sizeof(f->data)) {
+			return -1;
+		}
+		memcpy(f->data + f->data_len, more.data, more.data_len);
+		f->data_len += more.data_len;
+		if (f->data_len >= rq->data_total) {
+			return 0;
+		}
+		if (recv(fd, &more, sizeof(more), 0) != (ssize_t)sizeof(more) ||
+		    more.verb != ADMIN_DATA || more.id != rq->id ||
+		    more.data_offset != f->data_len) {
+			return -1;
+		}
+	}
+}
+
+static void post(int fd, const struct admin_reply *reply)
+{
+	if (send(fd, reply, sizeof(*reply), MSG_NOSIGNAL) < 0) {
+		perror("test_fake_daemon: send");
+	}
+}
+
+/* With progress before it, and in as many messages as it takes. */
+static void post_sii(const struct fake *f, int fd, struct admin_reply *reply)
+{
+	reply->kind = ADMIN_REPLY_PROGRESS;
+	reply->done = 1;
+	reply->total = 2;
+	post(fd, reply);
+	reply->data_total = sizeof(f->sii);
+	reply->data_len = ADMIN_DATA_BYTES;
+	for (uint32_t at = 0; at < sizeof(f->sii); at += ADMIN_DATA_BYTES) {
+		reply->kind = at + ADMIN_DATA_BYTES < sizeof(f->sii) ? ADMIN_REPLY_DATA
+								     : ADMIN_REPLY_DONE;
+		reply->data_offset = at;
+		memcpy(reply->data, f->sii + at, ADMIN_DATA_BYTES);
+		post(fd, reply);
 	}
 }
 
@@ -191,13 +320,16 @@ void fake_serve_client(struct fake *f)
 		return;
 	}
 	if (recv(fd, &request, sizeof(request), 0) == (ssize_t)sizeof(request) &&
-	    request.magic == ADMIN_MAGIC && strcmp(f->admin, "mute") != 0) {
+	    request.magic == ADMIN_MAGIC && collect(f, fd, &request) == 0 &&
+	    strcmp(f->admin, "mute") != 0) {
 		answer(f, &request, &reply);
 		if (strcmp(f->admin, "garbage") == 0) {
 			reply.magic ^= 1;
 		}
-		if (send(fd, &reply, sizeof(reply), MSG_NOSIGNAL) < 0) {
-			perror("test_fake_daemon: send");
+		if (request.verb == ADMIN_SII_READ && reply.result == 0) {
+			post_sii(f, fd, &reply);
+		} else {
+			post(fd, &reply);
 		}
 	}
 	close(fd);

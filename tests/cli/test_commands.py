@@ -198,3 +198,109 @@ def test_rescan_stops_a_bus_in_operation_only_by_force(daemon: Fake) -> None:
     fails(daemon("rescan"), REFUSED, "--force")
     assert works(daemon("rescan", "--force")) == ""
     assert json_of(daemon("rescan", "--force", "--json"))["state"] == "OP"
+
+
+def test_reg_reads_a_word_or_as_many_bytes_as_asked(daemon: Fake) -> None:
+    assert works(daemon("reg", "read", "piccolo0", "0x0130")) == "0x0008 8\n"
+    assert works(daemon("reg", "read", "0", "304", "1")) == "0x08 8\n"
+    assert works(daemon("reg", "read", "0", "0x130", "3")) == "0x0130  08 00 00\n"
+    lines = works(daemon("reg", "read", "0", "0x0000", "0x20")).splitlines()
+    assert [line[:6] for line in lines] == ["0x0000", "0x0010"]
+    assert json_of(daemon("reg", "read", "0", "0x0130", "--json")) == {
+        "slave": 0,
+        "register": 0x130,
+        "bytes": "08 00",
+        "value": 8,
+    }
+    assert json_of(daemon("reg", "read", "0", "0x0130", "3", "--json"))["value"] is None
+
+
+def test_reg_writes_bytes_or_values_of_a_type(daemon: Fake) -> None:
+    assert works(daemon("reg", "write", "0", "0x0f80", "1", "0xff", "3")) == ""
+    assert works(daemon("reg", "read", "0", "0x0f80", "3")) == "0x0f80  01 ff 03\n"
+    assert works(daemon("reg", "write", "0", "0x0f80", "0x1234", "5", "--type", "UINT")) == ""
+    assert works(daemon("reg", "read", "0", "0x0f80", "4")) == "0x00051234 332340\n"
+    fails(daemon("reg", "write", "0", "0x0120", "2"), REFUSED, "AL control: not written")
+    assert works(daemon("reg", "write", "0", "0x0120", "2", "--force")) == ""
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (["peek", "0", "0x0130"], USAGE, "peek: expected read or write"),
+        (["read", "0", "0x10000"], USAGE, "0x10000: expected a register, 0x0000 to 0xffff"),
+        (["read", "0", "AL"], USAGE, "AL: expected a register"),
+        (["read", "0", "0x0130", "0"], USAGE, "0: expected a length of 1 to 256 bytes"),
+        (["read", "0", "0x0130", "257"], USAGE, "257: expected a length of 1 to 256 bytes"),
+        (["read", "0", "0x0130", "1", "2"], USAGE, "read: expected SLAVE REGISTER [LENGTH]"),
+        (["read", "0", "0x0130", "--force"], USAGE, "--force: is an option of write"),
+        (["write", "0", "0x0130"], USAGE, "write: expected SLAVE REGISTER VALUE..."),
+        (["write", "0", "0x0f80", "256"], USAGE, "256: is not a valid USINT (--type for longer"),
+        (["write", "0", "0x0f80", "1", "-t", "WORD"], USAGE, "--type: WORD: expected one of"),
+        (["read", "piccolo1", "0x0130"], REFUSED, "does not answer"),
+        (["read", "nobody", "0x0130"], FAILED, "nobody: no slave of this name"),
+    ],
+)
+def test_a_failed_reg_is_reported_with_its_reason(
+    daemon: Fake, words: list[str], code: int, message: str
+) -> None:
+    fails(daemon("reg", *words), code, message)
+
+
+def test_sii_goes_to_a_file_and_back(daemon: Fake, tmp_path: Path) -> None:
+    image = tmp_path / "piccolo.bin"
+    assert works(daemon("sii", "read", "piccolo0", "--output", str(image))) == ""
+    data = bytearray(image.read_bytes())
+    assert len(data) == 2048
+    assert data[1024:1027] == bytes((i * 5 + i // 256) % 256 for i in range(1024, 1027))
+    lines = works(daemon("sii", "read", "0")).splitlines()
+    assert len(lines) == 128
+    assert lines[-1].startswith("0x07f0  ") and lines[-1].endswith(f"{data[-1]:02x}")
+    equal = works(daemon("sii", "write", "0", str(image)))
+    assert equal == "1024 words, all equal: nothing written\n"
+    data[2000] ^= 1
+    image.write_bytes(data)
+    answer = json_of(daemon("sii", "write", "0", str(image), "--json"))
+    assert answer == {"slave": 0, "words": 1024, "written": 1}
+    shown = json_of(daemon("sii", "read", "0", "--json"))
+    assert bytes.fromhex(shown["bytes"]) == data
+    assert (shown["alias"], shown["length"], shown["checksum_ok"]) == (17, 2048, True)
+    text = works(daemon("sii", "alias", "0", "0x12"))
+    assert text.startswith("8 words, 2 written and verified; in effect after the slave's next")
+    assert json_of(daemon("sii", "read", "0", "--json"))["alias"] == 0x12
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (["erase", "0"], USAGE, "erase: expected read, write or alias"),
+        (["read", "0", "file"], USAGE, "read: expected SLAVE"),
+        (["write", "0"], USAGE, "write: expected SLAVE FILE"),
+        (["read", "0", "--force"], USAGE, "read: has no option --force"),
+        (["alias", "0", "65536"], USAGE, "65536: expected an alias, 0 to 65535"),
+        (["write", "0", "/nowhere/x.bin"], FAILED, "/nowhere/x.bin: No such file"),
+        (["write", "0", "/dev/null"], FAILED, "/dev/null: expected 1 to 524288 bytes"),
+        (["read", "0", "--output", "/nowhere/x"], FAILED, "/nowhere/x: No such file"),
+        (["alias", "piccolo1", "1"], REFUSED, "it is in SAFE-OP or OP"),
+    ],
+)
+def test_a_failed_sii_is_reported_with_its_reason(
+    daemon: Fake, words: list[str], code: int, message: str
+) -> None:
+    fails(daemon("sii", *words), code, message)
+
+
+def test_crc_shows_the_counters_and_resets_them(daemon: Fake) -> None:
+    shown = json_of(daemon("crc", "piccolo0", "--json"))
+    assert [slave["name"] for slave in shown] == ["piccolo0"]
+    assert [port["receive_errors"] for port in shown[0]["port"]] == [7, 0, 0, 0]
+    assert (shown[0]["port"][0]["open"], shown[0]["pdi_errors"]) == (True, 3)
+    assert shown[0]["watchdog_pdi"] is None
+    assert "  7 receive errors" in works(daemon("crc", "0", "--reset"))
+    assert "  0 receive errors" in works(daemon("crc", "0"))
+
+
+def test_crc_goes_on_behind_a_slave_that_does_not_answer(daemon: Fake) -> None:
+    result = daemon("crc", "1", "0")
+    fails(result, REFUSED, "slave 1: no frame came back")
+    assert "0 piccolo0" in result.stdout

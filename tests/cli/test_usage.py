@@ -19,6 +19,9 @@ VERBS = {
     "state": "[STATE [SLAVE...|all]]",
     "rescan": "",
     "sdo": "read|write",
+    "reg": "read|write",
+    "sii": "read|write|alias",
+    "crc": "[SLAVE...]",
     "events": "",
     "sync0": "[calibrate]",
     "histogram": "wake|",
@@ -36,6 +39,9 @@ READING = [
     ["histogram", "wake"],
     ["state"],
     ["sdo", "read", "0", "0x1018:1"],
+    ["reg", "read", "0", "0x0130"],
+    ["sii", "read", "0"],
+    ["crc", "0"],
 ]
 
 

@@ -50,7 +50,7 @@ MODULES: dict[str, dict[str, set[str]]] = {
         "publish": READERS | {"keystore"},
         "sync0": READERS,
     },
-    "cli": {"cli": READERS | {"wire/al.h", "wire/sdo_abort.h"}},
+    "cli": {"cli": READERS | {"wire/al.h", "wire/sdo_abort.h", "wire/sii.h"}},
     "sim": {
         "firmware": {"base", "wire"},
         "segment": {"base", "wire"},

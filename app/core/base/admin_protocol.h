@@ -39,6 +39,15 @@ enum admin_verb {
 				ended; argument[1] 1: also in operation */
 	ADMIN_STATE = 11,    /* slave_pos to argument[0], an enum al_state; data: the AL state it is
 				in; ADMIN_ALL_SLAVES: the bus is led there, and stays there */
+	ADMIN_REGISTER_READ = 12,  /* slave_pos, address, length: up to ADMIN_REGISTER_BYTES */
+	ADMIN_REGISTER_WRITE = 13, /* slave_pos, address, data; argument[1] 1: also what the master
+				      needs unchanged while the bus is in operation */
+	ADMIN_SII_READ = 14,       /* slave_pos; data: the whole EEPROM */
+	ADMIN_SII_WRITE = 15,      /* slave_pos, data: the image; argument[1] 1: also in SAFE-OP and
+				      OP, and of another device; data: struct admin_sii_written */
+	ADMIN_SII_ALIAS = 16,      /* slave_pos, argument[0]; argument[1] and answer as SII_WRITE */
+	ADMIN_DIAGNOSIS = 17,      /* slave_pos; data: struct admin_diagnosis */
+	ADMIN_ERRORS_RESET = 18,   /* slave_pos: its error counters to zero */
 };
 
 /* Every slave with a one-shot output, all in one cycle or none. */
@@ -50,6 +59,8 @@ enum {
 	ADMIN_TEXT_BYTES = 256,
 	ADMIN_NAME_BYTES = 64,
 	ADMIN_ARGUMENTS = 4,
+	ADMIN_PORTS = 4,                 /* of a slave */
+	ADMIN_REGISTER_BYTES = 256,      /* in one access */
 	ADMIN_TRANSFER_BYTES = 16 << 20, /* in one request or answer: a firmware image */
 	ADMIN_TIMEOUT_MS_MAX = 3600 * 1000,
 };
@@ -105,6 +116,34 @@ struct admin_reply {
 	uint8_t data[ADMIN_DATA_BYTES];
 };
 
+/* Answer of ADMIN_SII_WRITE and ADMIN_SII_ALIAS, in words of 16 bits. */
+struct admin_sii_written {
+	uint32_t compared;
+	uint32_t written; /* that differed; 0: the EEPROM is unchanged */
+};
+
+/* Link and error counters of a port; a counter stops at 255. */
+struct admin_port {
+	uint8_t is_link;
+	uint8_t is_communicating;
+	uint8_t invalid_frames;
+	uint8_t rx_errors;
+	uint8_t forwarded_errors;
+	uint8_t lost_links;
+};
+
+/* Answer of ADMIN_DIAGNOSIS: the error counters in a slave's registers. */
+struct admin_diagnosis {
+	struct admin_port port[ADMIN_PORTS];
+	uint8_t has_processing_errors; /* the slave has the next two */
+	uint8_t processing_errors;
+	uint8_t pdi_errors;
+	uint8_t has_expirations; /* the slave has the next two */
+	uint8_t expirations_pd;  /* of the process data watchdog */
+	uint8_t expirations_pdi;
+};
+
+static_assert(sizeof(struct admin_diagnosis) <= ADMIN_DATA_BYTES, "it is one message");
 static_assert(sizeof(struct admin_request) == 136 + 64 * 72 + 1024, "both ends agree");
 static_assert(sizeof(struct admin_reply) == 56 + 256 + 1024, "both ends agree");
 

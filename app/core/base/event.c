@@ -129,9 +129,25 @@ static const char *al_name(int32_t state)
 /* enum admin_verb, which base does not see. */
 static const char *command_name(int32_t verb)
 {
-	static const char *const names[] = { "none",     "ping",      "set",    "oneshot",
-					     "SDO read", "SDO write", "stop",   "clear",
-					     "cancel",   "data",      "rescan", "AL state" };
+	static const char *const names[] = { "none",
+					     "ping",
+					     "set",
+					     "oneshot",
+					     "SDO read",
+					     "SDO write",
+					     "stop",
+					     "clear",
+					     "cancel",
+					     "data",
+					     "rescan",
+					     "AL state",
+					     "register read",
+					     "register write",
+					     "SII read",
+					     "SII write",
+					     "SII alias",
+					     "diagnosis",
+					     "error counter reset" };
 
 	return verb >= 0 && verb < (int32_t)(sizeof(names) / sizeof(names[0])) ? names[verb]
 									       : "unknown";

@@ -351,6 +351,12 @@ static void report_sdo(const struct admin_target *t, struct admin_pending *pendi
 	}
 }
 
+/* It changes something, which is an event. */
+static int is_command(enum admin_verb verb)
+{
+	return verb != ADMIN_REGISTER_READ && verb != ADMIN_SII_READ && verb != ADMIN_DIAGNOSIS;
+}
+
 static void run_on_bus(const struct admin_target *t, struct admin_pending *pending)
 {
 	const struct admin_request *rq = &pending->request;
@@ -363,8 +369,11 @@ static void run_on_bus(const struct admin_target *t, struct admin_pending *pendi
 	if (!is_all && !has_slave(t, pending)) {
 		return;
 	}
-	emit(t, EVENT_COMMAND, is_all ? EVENT_NO_SLAVE : rq->slave_pos, rq->argument[0],
-	     (int32_t)rq->verb, (int32_t)pending->uid);
+	if (is_command((enum admin_verb)rq->verb)) {
+		emit(t, EVENT_COMMAND, is_all ? EVENT_NO_SLAVE : rq->slave_pos,
+		     rq->verb == ADMIN_REGISTER_WRITE ? rq->address : rq->argument[0],
+		     (int32_t)rq->verb, (int32_t)pending->uid);
+	}
 	t->bus_request(t->ctx, pending);
 }
 
@@ -416,6 +425,13 @@ void admin_command_run(const struct admin_target *target, struct admin_pending *
 		return;
 	case ADMIN_RESCAN:
 	case ADMIN_STATE:
+	case ADMIN_REGISTER_READ:
+	case ADMIN_REGISTER_WRITE:
+	case ADMIN_SII_READ:
+	case ADMIN_SII_WRITE:
+	case ADMIN_SII_ALIAS:
+	case ADMIN_DIAGNOSIS:
+	case ADMIN_ERRORS_RESET:
 		run_on_bus(target, pending);
 		return;
 	case ADMIN_CANCEL:
@@ -439,6 +455,14 @@ int64_t admin_command_timeout_ns(const struct admin_request *request)
 	case ADMIN_STATE:
 		return request->slave_pos == ADMIN_ALL_SLAVES ? ADMIN_BRING_UP_TIMEOUT_NS
 							      : ADMIN_TIMEOUT_NS;
+	case ADMIN_SII_READ:
+	case ADMIN_SII_WRITE:
+		return ADMIN_SII_TIMEOUT_NS;
+	case ADMIN_REGISTER_READ:
+	case ADMIN_REGISTER_WRITE:
+	case ADMIN_SII_ALIAS:
+	case ADMIN_DIAGNOSIS:
+	case ADMIN_ERRORS_RESET:
 	case ADMIN_PING:
 	case ADMIN_SDO_READ:
 	case ADMIN_SDO_WRITE:

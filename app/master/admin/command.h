@@ -22,6 +22,8 @@ enum { ADMIN_ONESHOT_MARGIN_CYCLES = 5 };
 /* Timeout of the cycle's answer to a set of outputs; of any other request that names none. */
 #define ADMIN_CYCLE_TIMEOUT_NS (1 * NS_PER_S)
 #define ADMIN_TIMEOUT_NS (20 * NS_PER_S)
+/* A whole EEPROM, word by word. */
+#define ADMIN_SII_TIMEOUT_NS (600 * NS_PER_S)
 /* All time-outs of a bring-up together may be longer; then the client is told so. */
 #define ADMIN_BRING_UP_TIMEOUT_NS (600 * NS_PER_S)
 /* Latest time of a one-shot from now: a later one is probably a typing error. */
@@ -45,8 +47,8 @@ struct admin_target {
 	 * there is no bus.
 	 */
 	void (*sdo)(void *ctx, struct admin_pending *pending);
-	/** Start ADMIN_RESCAN, or ADMIN_STATE of a slave that exists or of all. NULL while a
-	 * bring-up is under way. */
+	/** Start ADMIN_RESCAN, ADMIN_STATE of a slave that exists or of all, or a request to the
+	 * registers or the EEPROM of a slave that exists. NULL while a bring-up is under way. */
 	void (*bus_request)(void *ctx, struct admin_pending *pending);
 	void (*stop)(void *ctx);
 	void (*clear)(void *ctx);

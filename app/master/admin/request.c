@@ -53,6 +53,18 @@ static int check_slave(const struct admin_request *rq, char *why)
 	return 0;
 }
 
+static int check_registers(const struct admin_request *rq, uint32_t len, char *why)
+{
+	if (len == 0 || len > ADMIN_REGISTER_BYTES || rq->address > UINT16_MAX ||
+	    rq->data_total > rq->data_len) {
+		snprintf(why, ADMIN_TEXT_BYTES,
+			 "%u bytes at 0x%x: expected 1 to %d bytes at 0x0000 to 0xffff", len,
+			 rq->address, ADMIN_REGISTER_BYTES);
+		return -EINVAL;
+	}
+	return check_slave(rq, why);
+}
+
 static int check_verb(const struct admin_request *rq, char *why)
 {
 	switch ((enum admin_verb)rq->verb) {
@@ -76,7 +88,20 @@ static int check_verb(const struct admin_request *rq, char *why)
 			return refuse(why, -EINVAL, "argument[0] must be an AL state");
 		}
 		return rq->slave_pos == ADMIN_ALL_SLAVES ? 0 : check_slave(rq, why);
+	case ADMIN_REGISTER_READ:
+		return check_registers(rq, rq->length, why);
+	case ADMIN_REGISTER_WRITE:
+		return check_registers(rq, rq->data_len, why);
+	case ADMIN_SII_ALIAS:
+		if (rq->argument[0] > UINT16_MAX) {
+			return refuse(why, -EINVAL, "argument[0] must be an alias up to 65535");
+		}
+		return check_slave(rq, why);
 	case ADMIN_SDO_READ:
+	case ADMIN_SII_READ:
+	case ADMIN_SII_WRITE:
+	case ADMIN_DIAGNOSIS:
+	case ADMIN_ERRORS_RESET:
 		return check_slave(rq, why);
 	case ADMIN_SDO_WRITE:
 		if (rq->data_len == 0) {

@@ -18,7 +18,7 @@ enum { READS_PER_PASS = 16, OPEN_PER_CLIENT = 8 };
 /* One more client than ADMIN_CLIENTS, so that PING and STOP always find a place. */
 enum { CLIENT_SLOTS = ADMIN_CLIENTS + 1, URGENT = ADMIN_CLIENTS };
 /* Data of requests that are held at the same time. */
-#define UPLOAD_BYTES_MAX (2u * ADMIN_TRANSFER_BYTES)
+#define UPLOAD_BYTES_MAX (UINT64_C(2) * ADMIN_TRANSFER_BYTES)
 /* A client that takes no message of an answer for this long is closed. */
 #define STALL_NS (2 * NS_PER_S)
 
@@ -450,7 +450,8 @@ static int attend(const struct pass *pass, struct admin_pending *pending)
 	if ((pending->state == ADMIN_PENDING_OPEN || pending->state == ADMIN_PENDING_COLLECTING) &&
 	    pending->client != NULL && pass->now.ns >= pending->give_up.ns) {
 		end_early(pass, pending, -ETIMEDOUT,
-			  pending->poll != NULL
+			  pending->request.verb == ADMIN_SET ||
+					  pending->request.verb == ADMIN_ONESHOT
 				  ? "withdrawn: no frame came back with the values in "
 				    "time, or the outputs are at fail-safe"
 				  : "not answered in time");

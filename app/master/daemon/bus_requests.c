@@ -6,7 +6,6 @@
 #include <errno.h>
 
 #include "base/bytes.h"
-#include "bus/esc_access.h"
 #include "daemon/session.h"
 #include "daemon/session_internal.h"
 #include "wire/al.h"
@@ -152,6 +151,8 @@ void session_bus_request(void *ctx, struct admin_pending *pending)
 			return;
 		}
 		restart(s, pending);
+	} else if (pending->request.verb != ADMIN_STATE) {
+		session_esc_request(s, pending);
 	} else if (pending->request.slave_pos == ADMIN_ALL_SLAVES) {
 		change_all(s, pending);
 	} else {

@@ -43,6 +43,7 @@ struct session {
 	mono_t served;                 /* newest pass of the admin socket */
 	mono_t operator_at;            /* newest request to the bus or a slave; 0: none */
 	struct admin_pending *restart; /* that asked for a bring-up; NULL: nobody */
+	struct admin_pending *sii;     /* that works on an EEPROM; NULL: none */
 	int is_riding;                 /* the cycle owns the transport and the event ring */
 	int is_link_up;
 	enum bus_state state;
@@ -116,8 +117,12 @@ int session_watch_held(struct session *s);
 /** No frame comes back: the page does not show AL states that were true before. */
 void session_forget_states(struct session *s);
 
-/** ADMIN_RESCAN, ADMIN_STATE. */
+/** ADMIN_RESCAN, ADMIN_STATE, and what session_esc_request() does. */
 void session_bus_request(void *ctx, struct admin_pending *pending);
+/** ADMIN_REGISTER_..., ADMIN_SII_..., ADMIN_DIAGNOSIS, ADMIN_ERRORS_RESET. */
+void session_esc_request(struct session *s, struct admin_pending *pending);
+/** The bus goes: end the request that works on an EEPROM. */
+void session_sii_end(struct session *s);
 /** Answer whoever asked for the bring-up that has ended; @failure NULL: it succeeded. */
 void session_restart_done(struct session *s, const struct failure *failure);
 

@@ -92,6 +92,7 @@ void session_drop(struct session *session)
 		ring_destroy(s->samples);
 		s->samples = NULL;
 	}
+	session_sii_end(s);
 	bus_destroy(s->bus);
 	s->bus = NULL;
 	if (s->line != NULL) {

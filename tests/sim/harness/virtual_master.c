@@ -12,9 +12,10 @@
 #include "sim/harness/run_dir.h"
 
 enum {
-	SERVICE_CYCLES = 10, /* the service loop runs once in so many cycles */
-	REPLY_CYCLES = 2000, /* an answer has to come within so many */
-	SETTLE_CYCLES = 100, /* behind the bring-up, before a test begins to count */
+	SERVICE_CYCLES = 10,     /* the service loop runs once in so many cycles */
+	REPLY_CYCLES = 2000,     /* an answer has to come within so many */
+	TRANSFER_CYCLES = 60000, /* the same of one with much data */
+	SETTLE_CYCLES = 100,     /* behind the bring-up, before a test begins to count */
 };
 
 #define FNV_START UINT64_C(0xcbf29ce484222325)
@@ -449,7 +450,7 @@ void virtual_master_print_events(const struct virtual_master *vm, uint64_t count
 
 /* --- admin --- */
 
-static int connect_admin(const struct virtual_master *vm)
+int virtual_master_connect(const struct virtual_master *vm)
 {
 	struct sockaddr_un address = { .sun_family = AF_UNIX };
 	int fd = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
@@ -459,11 +460,61 @@ static int connect_admin(const struct virtual_master *vm)
 	return fd;
 }
 
+/* The request with its data, in as many messages as it takes. */
+static void send_request(int fd, const struct admin_request *request, const uint8_t *data,
+			 size_t len)
+{
+	struct admin_request message = *request;
+	size_t sent = 0;
+
+	if (data == NULL) {
+		CHECK_EQ(send(fd, &message, sizeof(message), 0), sizeof(message));
+		return;
+	}
+	message.data_total = (uint32_t)len;
+	do {
+		size_t left = len - sent;
+
+		message.data_offset = (uint32_t)sent;
+		message.data_len = (uint32_t)(left < ADMIN_DATA_BYTES ? left : ADMIN_DATA_BYTES);
+		memcpy(message.data, data + sent, message.data_len);
+		CHECK_EQ(send(fd, &message, sizeof(message), 0), sizeof(message));
+		message.verb = ADMIN_DATA;
+		sent += message.data_len;
+	} while (sent < len);
+}
+
+struct admin_reply virtual_master_transfer(struct virtual_master *vm,
+					   const struct admin_request *request,
+					   struct virtual_transfer *tr)
+{
+	struct admin_reply reply;
+	int fd = virtual_master_connect(vm);
+
+	send_request(fd, request, tr->data, tr->data_len);
+	for (int i = 0; i < TRANSFER_CYCLES / SERVICE_CYCLES; i++) {
+		if (virtual_master_run(vm, SERVICE_CYCLES) == SESSION_RESTART) {
+			virtual_master_bring_up(vm);
+		}
+		while (recv(fd, &reply, sizeof(reply), MSG_DONTWAIT) == (ssize_t)sizeof(reply)) {
+			tr->reports += (unsigned)(reply.kind == ADMIN_REPLY_PROGRESS);
+			CHECK(reply.data_len <= sizeof(tr->answer) - tr->answer_len);
+			memcpy(tr->answer + tr->answer_len, reply.data, reply.data_len);
+			tr->answer_len += reply.data_len;
+			if (reply.kind == ADMIN_REPLY_DONE) {
+				close(fd);
+				return reply;
+			}
+		}
+	}
+	test_fail(__FILE__, __LINE__, "no reply to verb %u", request->verb);
+}
+
 struct admin_reply virtual_master_ask(struct virtual_master *vm,
 				      const struct admin_request *request)
 {
 	struct admin_reply reply;
-	int fd = connect_admin(vm);
+	int fd = virtual_master_connect(vm);
 
 	CHECK_EQ(send(fd, request, sizeof(*request), 0), sizeof(*request));
 	for (int i = 0; i < REPLY_CYCLES / SERVICE_CYCLES; i++) {

@@ -97,4 +97,21 @@ void virtual_master_print_events(const struct virtual_master *vm, uint64_t count
 struct admin_reply virtual_master_ask(struct virtual_master *vm,
 				      const struct admin_request *request);
 
+/** A connection to the admin socket; the caller closes it. */
+int virtual_master_connect(const struct virtual_master *vm);
+
+/* Data with a request and its answer, beyond one message. Zero it first. */
+struct virtual_transfer {
+	const uint8_t *data; /* NULL: those of the request */
+	size_t data_len;
+	size_t answer_len;
+	unsigned reports; /* of progress */
+	uint8_t answer[8192];
+};
+
+/** virtual_master_ask() with them. */
+struct admin_reply virtual_master_transfer(struct virtual_master *vm,
+					   const struct admin_request *request,
+					   struct virtual_transfer *tr);
+
 #endif

@@ -330,3 +330,46 @@ TEST(admin, stop_and_clear_are_passed_on_and_logged_with_their_user)
 	CHECK_EQ(fake.event[1].arg[0], ADMIN_CLEAR);
 	CHECK_EQ(fake.event[1].arg[1], USER);
 }
+
+static void take(void *ctx, struct admin_pending *pending)
+{
+	struct fake *fake = ctx;
+
+	fake->pending = pending;
+	admin_pending_complete(pending, 0);
+}
+
+TEST(admin, requests_to_registers_and_eeproms_reach_the_bus_and_those_that_write_are_events)
+{
+	static const struct {
+		enum admin_verb verb;
+		unsigned events;
+	} verbs[] = { { ADMIN_REGISTER_READ, 0 }, { ADMIN_REGISTER_WRITE, 1 },
+		      { ADMIN_SII_READ, 0 },      { ADMIN_SII_WRITE, 1 },
+		      { ADMIN_SII_ALIAS, 1 },     { ADMIN_DIAGNOSIS, 0 },
+		      { ADMIN_ERRORS_RESET, 1 } };
+
+	for (size_t i = 0; i < sizeof(verbs) / sizeof(verbs[0]); i++) {
+		struct fake fake;
+		struct admin_target target;
+		struct admin_request rq = fake_request(verbs[i].verb);
+
+		fake_init(&fake);
+		target = fake_target(&fake);
+		rq.slave_pos = 1;
+		rq.address = 0x0120;
+		CHECK_EQ(start(&target, &rq)->reply.result, -EBUSY); /* of a bring-up */
+		target.bus_request = take;
+		CHECK_EQ(fake.events, 0);
+		CHECK_EQ(start(&target, &rq)->reply.result, 0);
+		CHECK(fake.pending != NULL && fake.pending->request.verb == verbs[i].verb);
+		CHECK_EQ(fake.events, verbs[i].events);
+		if (verbs[i].verb == ADMIN_REGISTER_WRITE) {
+			CHECK_EQ(fake.event[0].value, 0x0120);
+		}
+		fake.pending = NULL;
+		rq.slave_pos = 2;
+		CHECK_EQ(start(&target, &rq)->reply.result, -ENODEV);
+		CHECK(fake.pending == NULL);
+	}
+}

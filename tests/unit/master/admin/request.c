@@ -116,3 +116,44 @@ TEST(admin, slave_positions_beyond_the_limit_and_empty_writes_are_refused)
 	rq.is_relative = 2;
 	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
 }
+
+TEST(admin, a_register_access_is_1_to_256_bytes_in_64_kib)
+{
+	struct admin_request rq = fake_request(ADMIN_REGISTER_READ);
+	struct admin_request got;
+	char why[ADMIN_TEXT_BYTES];
+
+	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+	CHECK_STR(why, "0 bytes at 0x0: expected 1 to 256 bytes at 0x0000 to 0xffff");
+	rq.length = ADMIN_REGISTER_BYTES;
+	rq.address = UINT16_MAX;
+	CHECK_EQ(parse(&rq, &got, why), 0);
+	rq.length++;
+	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+	rq.length = 1;
+	rq.address++;
+	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+	rq = fake_request(ADMIN_REGISTER_WRITE);
+	rq.length = 1; /* of a read */
+	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+	rq.data_len = ADMIN_REGISTER_BYTES;
+	CHECK_EQ(parse(&rq, &got, why), 0);
+	rq.data_total = ADMIN_REGISTER_BYTES + 1; /* more would follow */
+	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+	rq.data_total = 0;
+	rq.slave_pos = LIMIT_SLAVES;
+	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+}
+
+TEST(admin, an_alias_has_16_bits)
+{
+	struct admin_request rq = fake_request(ADMIN_SII_ALIAS);
+	struct admin_request got;
+	char why[ADMIN_TEXT_BYTES];
+
+	rq.argument[0] = UINT16_MAX;
+	CHECK_EQ(parse(&rq, &got, why), 0);
+	rq.argument[0]++;
+	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+	CHECK_STR(why, "argument[0] must be an alias up to 65535");
+}

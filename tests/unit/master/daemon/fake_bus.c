@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "bus/esc_access.h"
 #include "mailbox/mailbox.h"
 
 enum { IMAGE_BYTES = 3, ROUND_TRIP_NS = 20000 };
@@ -412,4 +413,85 @@ int exchange_doubts_reference(const struct exchange *ex)
 void exchange_confirm_reference(struct exchange *ex)
 {
 	(void)ex;
+}
+
+/* --- esc_access.h: no slave of this bus answers --- */
+
+static int no_answer(char *error)
+{
+	snprintf(error, BUS_ERROR_BYTES, "does not answer");
+	return -ENXIO;
+}
+
+int esc_access_read(struct bus *bus, size_t pos, uint16_t reg, uint8_t *ret_data, size_t len,
+		    char *error)
+{
+	(void)bus;
+	(void)pos;
+	(void)reg;
+	(void)ret_data;
+	(void)len;
+	return no_answer(error);
+}
+
+int esc_access_write(struct bus *bus, size_t pos, uint16_t reg, const uint8_t *data, size_t len,
+		     enum esc_guard guard, char *error)
+{
+	(void)bus;
+	(void)pos;
+	(void)reg;
+	(void)data;
+	(void)len;
+	(void)guard;
+	return no_answer(error);
+}
+
+int esc_diagnosis_read(struct bus *bus, size_t pos, struct esc_diagnosis *ret, char *error)
+{
+	(void)bus;
+	(void)pos;
+	(void)ret;
+	return no_answer(error);
+}
+
+int esc_errors_reset(struct bus *bus, size_t pos, char *error)
+{
+	(void)bus;
+	(void)pos;
+	return no_answer(error);
+}
+
+int sii_job_read(struct sii_job *job, struct bus *bus, size_t pos, uint8_t *image, size_t capacity)
+{
+	(void)bus;
+	(void)pos;
+	(void)image;
+	(void)capacity;
+	return no_answer(job->error);
+}
+
+int sii_job_write(struct sii_job *job, struct bus *bus, size_t pos, const uint8_t *image,
+		  size_t len_bytes, enum esc_guard guard)
+{
+	(void)bus;
+	(void)pos;
+	(void)image;
+	(void)len_bytes;
+	(void)guard;
+	return no_answer(job->error);
+}
+
+int sii_job_alias(struct sii_job *job, struct bus *bus, size_t pos, uint16_t alias,
+		  enum esc_guard guard)
+{
+	(void)bus;
+	(void)pos;
+	(void)alias;
+	(void)guard;
+	return no_answer(job->error);
+}
+
+int sii_job_step(struct sii_job *job)
+{
+	return no_answer(job->error);
 }
