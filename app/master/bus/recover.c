@@ -467,7 +467,7 @@ void bus_recover_describe(const struct bus *bus, size_t pos, char *ret_text, siz
 	char attempts[64];
 
 	ret_text[0] = '\0';
-	if (sl->is_lost) {
+	if (sl->is_lost || sl->misses > 0) {
 		snprintf(ret_text, text_bytes, "slave %zu (%s): does not answer", pos,
 			 sl->info.name);
 		return;
@@ -475,6 +475,8 @@ void bus_recover_describe(const struct bus *bus, size_t pos, char *ret_text, siz
 	if (sl->trouble_code != 0) {
 		bus_describe_refusal(sl->al_status, sl->trouble_code, wanted_state(sl), why,
 				     sizeof(why));
+	} else if (sl->step == RECOVERY_BACK) {
+		snprintf(why, sizeof(why), "answers again"); /* its AL status is the old one */
 	} else {
 		snprintf(why, sizeof(why), "is in %s%s", bus_al_name(sl->al_status),
 			 sl->attempts > 0 && sl->trouble_step != RECOVERY_NONE

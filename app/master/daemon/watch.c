@@ -203,6 +203,9 @@ static void follow_silence(struct session *s)
 
 	if (line_unchanged(s->line) > s->unchanged_seen) {
 		snprintf(report.trouble, sizeof(report.trouble), "%s", LINE_UNCHANGED_TEXT);
+	} else if (!s->is_link_up) {
+		snprintf(report.trouble, sizeof(report.trouble), "interface %s has no link",
+			 s->spec.cfg->interface);
 	}
 	session_forget_states(s);
 	follow_bus(s, &report);

@@ -17,6 +17,7 @@ from measure.page import NotMeasuredError, Subject
 SCENARIOS = "build/release/tests/sim/scenarios"
 LOCK_TEST = "sim_clocks.lock_phase_and_sync0_hold_from_a_hundred_starts"
 SECONDS = os.environ.get("ECDAQ_DDS_SECONDS", "60")
+TRIALS = os.environ.get("ECDAQ_FAULT_TRIALS", "20")
 CUTS = os.environ.get("ECDAQ_POWER_CUTS", "3")
 
 
@@ -29,6 +30,7 @@ def run(command: list[str], keep: str, root: Path) -> list[str]:
         "ECDAQ_FLAVOUR": "release",
         "ECDAQ_DDS_SECONDS": SECONDS,
         "ECDAQ_POWER_CUTS": CUTS,
+        "ECDAQ_FAULT_TRIALS": TRIALS,
         "PYTHONDONTWRITEBYTECODE": "1",
     }
     result = subprocess.run(
@@ -44,6 +46,13 @@ def run(command: list[str], keep: str, root: Path) -> list[str]:
 
 def program(*words: str, keep: str = ".") -> tuple[str, Callable[[Path], list[str]]]:
     return " ".join(words), partial(run, list(words), keep)
+
+
+def fault_matrix(root: Path) -> list[str]:
+    """The table of sim_fault_matrix in the order of its source: it runs the last row first."""
+    lines = run([f"{SCENARIOS}/sim_fault_matrix"], r"^(?!passed|\d+ passed)\S", root)
+    head = "median and worst of each; ms from the mend (else the fault) to OP"
+    return [head, "", *lines[:1], *reversed(lines[1:])]
 
 
 def pytest(*words: str, keep: str) -> tuple[str, Callable[[Path], list[str]]]:
@@ -73,6 +82,13 @@ ALL = (
         "lock",
         "Distributed clocks from 100 starts",
         program(f"{SCENARIOS}/sim_clocks", LOCK_TEST, keep="worst of"),
+        is_quick=True,
+    ),
+    Subject(
+        "faults",
+        f"Faults and recovery, {TRIALS} buses each (ECDAQ_FAULT_TRIALS)",
+        (f"{SCENARIOS}/sim_fault_matrix",),
+        fault_matrix,
         is_quick=True,
     ),
     subject(

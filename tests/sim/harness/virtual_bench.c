@@ -4,6 +4,7 @@
 #include "base/prng.h"
 #include "devices/fb1111_piccolo.h"
 #include "harness/test.h"
+#include "wire/datagram.h"
 
 enum {
 	DEFAULT_SLAVES = 2,
@@ -119,6 +120,24 @@ int64_t virtual_bench_edge_ns(const struct virtual_bench *bench, unsigned slave,
 	return sc->past_slot[slave][slot % VIRTUAL_EDGES] == slot
 		       ? sc->past_ns[slave][slot % VIRTUAL_EDGES]
 		       : 0;
+}
+
+void virtual_bench_write(struct virtual_bench *bench, uint16_t station, uint16_t address,
+			 uint8_t value)
+{
+	static const uint8_t source[6] = { 0x10 };
+	uint8_t frame[ECAT_FRAME_MAX_BYTES];
+	struct ecat_frame_builder fb;
+	uint8_t *data;
+	int64_t back_ns;
+
+	ecat_frame_begin(&fb, frame, source);
+	data = ecat_frame_add(&fb, ECAT_CMD_FPWR, 0, station, address, 1);
+	CHECK(data != NULL);
+	*data = value;
+	CHECK_EQ(segment_frame(bench->segment, virtual_bench_now_ns(bench), frame,
+			       ecat_frame_end(&fb), &back_ns),
+		 0);
 }
 
 void virtual_bench_measure(struct virtual_bench *bench)

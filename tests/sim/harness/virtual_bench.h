@@ -66,6 +66,9 @@ int64_t virtual_bench_now_ns(const struct virtual_bench *bench);
  * too long ago (VIRTUAL_EDGES). */
 int64_t virtual_bench_edge_ns(const struct virtual_bench *bench, unsigned slave,
 			      int64_t dc_time_ns);
+/** Write one byte of the registers of the slave with @station address, behind the master's back. */
+void virtual_bench_write(struct virtual_bench *bench, uint16_t station, uint16_t address,
+			 uint8_t value);
 /** Discard the measurements and start new ones. */
 void virtual_bench_measure(struct virtual_bench *bench);
 

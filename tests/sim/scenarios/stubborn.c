@@ -7,10 +7,9 @@
 #include "harness/test.h"
 #include "sim/harness/virtual_master.h"
 #include "wire/al.h"
-#include "wire/datagram.h"
 #include "wire/esc_reg.h"
 
-enum { SII_VENDOR_BYTE = 0x10, SII_PRODUCT_BYTE = 0x14, SII_ALIAS_BYTE = 0x08 };
+enum { SII_VENDOR_BYTE = 0x10, SII_PRODUCT_BYTE = 0x14, SII_ALIAS_BYTE = 0x08, SM_ACTIVATE = 6 };
 
 static struct virtual_bench b;
 static struct virtual_master vm;
@@ -382,28 +381,13 @@ TEST(sim_stubborn, a_slave_that_restarts_by_itself_is_back_soon)
 	close_all();
 }
 
-/* Row 8: behind the master's back a SyncManager is switched off. */
-static void switch_off_sync_manager(uint16_t station, unsigned sm)
-{
-	static const uint8_t source[6] = { 0x10 };
-	uint8_t frame[ECAT_FRAME_MAX_BYTES];
-	struct ecat_frame_builder fb;
-	int64_t back_ns;
-
-	ecat_frame_begin(&fb, frame, source);
-	CHECK(ecat_frame_add(&fb, ECAT_CMD_FPWR, 0, station,
-			     (uint16_t)(ESC_REG_SM + sm * ESC_SM_BYTES + 6), 1) != NULL);
-	CHECK_EQ(segment_frame(b.segment, virtual_bench_now_ns(&b), frame, ecat_frame_end(&fb),
-			       &back_ns),
-		 0);
-}
-
+/* Row 8 */
 TEST(sim_stubborn, a_slave_whose_output_sync_manager_was_switched_off_is_set_up_again)
 {
 	unsigned ms = 0;
 
 	open_with("bus.recovery_attempts=10");
-	switch_off_sync_manager(0x1002, 2);
+	virtual_bench_write(&b, 0x1002, ESC_REG_SM + 2 * ESC_SM_BYTES + SM_ACTIVATE, 0);
 	virtual_master_run(&vm, 300);
 	while (state() != BUS_OP && ms < 5000) {
 		virtual_master_run(&vm, 10);
