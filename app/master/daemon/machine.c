@@ -90,19 +90,21 @@ static void end_stuck(void *ctx, int64_t busy_ns)
 static int start_cycle(void *ctx, struct cycle *cycle, struct failure *failure)
 {
 	struct program *pg = ctx;
-	int r = supervisor_start(&pg->supervisor, &(struct supervisor_spec){
-							  .control = session_control(pg->session),
-							  .limit_ns = pg->cfg.control_stuck_ns,
-							  .stuck = end_stuck,
-							  .ctx = pg,
-						  });
+	int r = control_watchdog_start(&pg->control_watchdog,
+				       &(struct control_watchdog_spec){
+					       .control = session_control(pg->session),
+					       .limit_ns = pg->cfg.control_stuck_ns,
+					       .stuck = end_stuck,
+					       .ctx = pg,
+				       });
 
 	if (r < 0) {
-		return failure_set(failure, EXIT_CODE_RESOURCES, r, "supervisor: %s", strerror(-r));
+		return failure_set(failure, EXIT_CODE_RESOURCES, r, "control watchdog: %s",
+				   strerror(-r));
 	}
 	r = realtime_cycle_start(&pg->realtime, cycle, failure);
 	if (r < 0) {
-		supervisor_stop(&pg->supervisor);
+		control_watchdog_stop(&pg->control_watchdog);
 		return r;
 	}
 	if (pg->realtime.is_pinned) {
@@ -116,7 +118,7 @@ static int end_cycle(void *ctx)
 	struct program *pg = ctx;
 	int r = realtime_cycle_end(&pg->realtime);
 
-	supervisor_stop(&pg->supervisor);
+	control_watchdog_stop(&pg->control_watchdog);
 	return r;
 }
 

@@ -5,10 +5,10 @@
 #define DAEMON_MACHINE_H
 
 #include "config/config.h"
+#include "daemon/control_watchdog.h"
 #include "daemon/notify.h"
 #include "daemon/realtime.h"
 #include "daemon/session.h"
-#include "daemon/supervisor.h"
 #include "link/packet_socket.h"
 
 /* Command-line settings that are not in the configuration. */
@@ -24,7 +24,7 @@ struct program {
 	struct config cfg;
 	struct notify notify;
 	struct realtime realtime;
-	struct supervisor supervisor;
+	struct control_watchdog control_watchdog;
 	struct session *session;
 	int interface_claim;
 	int has_been_up;
