@@ -18,7 +18,15 @@ SANITIZE = ["-fsanitize=address,undefined"] if os.environ.get("ECDAQ_FLAVOUR") =
 def daemon(run_dir: Path, *settings: str) -> subprocess.CompletedProcess[str]:
     words = [word for setting in settings for word in ("--set", setting)]
     return subprocess.run(
-        [BIN / "ecdaqd", "--exit-on-failure", "--interface", "lo", "--run-dir", run_dir / "run", *words],
+        [
+            BIN / "ecdaqd",
+            "--exit-on-failure",
+            "--interface",
+            "lo",
+            "--run-dir",
+            run_dir / "run",
+            *words,
+        ],
         env=environment(None),
         stdin=subprocess.DEVNULL,
         capture_output=True,
