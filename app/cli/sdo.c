@@ -23,7 +23,7 @@ struct sdo {
 	const char *type; /* as given; NULL: none */
 	int is_json;
 	struct admin_request request;
-	struct admin_reply reply;
+	struct admin_transfer transfer;
 };
 
 /* "0x1018:1": hexadecimal with 0x, else decimal; the subindex may be left out. */
@@ -51,19 +51,20 @@ static int parse_object(const char *text, uint16_t *ret_index, uint8_t *ret_subi
 /* Send the request; report an abort with its text. */
 static enum exit_code ask(struct sdo *sdo)
 {
-	enum exit_code result = admin_ask(sdo->cli, &sdo->request, &sdo->reply);
+	const struct admin_reply *reply = &sdo->transfer.reply;
+	enum exit_code result = admin_transfer(sdo->cli, &sdo->transfer);
 
-	if (result == EXIT_CODE_OK && sdo->reply.result < 0 && sdo->reply.sdo_abort != 0) {
+	if (result == EXIT_CODE_OK && reply->result < 0 && reply->sdo_abort != 0) {
 		return cli_fail(sdo->cli, EXIT_CODE_REFUSED,
 				"slave %u: 0x%04x:%02x: SDO abort 0x%08x: %s",
 				sdo->request.slave_pos, sdo->request.index, sdo->request.subindex,
-				sdo->reply.sdo_abort, sdo_abort_to_str(sdo->reply.sdo_abort));
+				reply->sdo_abort, sdo_abort_to_str(reply->sdo_abort));
 	}
-	return result == EXIT_CODE_OK ? admin_judge(sdo->cli, &sdo->reply) : result;
+	return result == EXIT_CODE_OK ? admin_judge(sdo->cli, reply) : result;
 }
 
 /* The type that data of @len bytes are shown in when none was given; -1: none fits. */
-static int type_by_length(uint32_t len)
+static int type_by_length(size_t len)
 {
 	switch (len) {
 	case 1:
@@ -79,19 +80,21 @@ static int type_by_length(uint32_t len)
 	}
 }
 
-static uint64_t bits_of(const struct admin_reply *reply)
+static uint64_t bits_of(const struct admin_transfer *tr)
 {
 	uint8_t padded[8] = { 0 };
 
-	memcpy(padded, reply->data, reply->data_len > 8 ? 8 : reply->data_len);
+	if (tr->answer_len > 0) {
+		memcpy(padded, tr->answer, tr->answer_len > 8 ? 8 : tr->answer_len);
+	}
 	return get_le64(padded);
 }
 
-static void copy_string(const struct admin_reply *reply, int is_terminal, char *buf, size_t buf_len)
+static void copy_string(const struct admin_transfer *tr, int is_terminal, char *buf, size_t buf_len)
 {
-	size_t len = strnlen((const char *)reply->data, reply->data_len);
+	const char *text = tr->answer_len > 0 ? (const char *)tr->answer : "";
 
-	snprintf(buf, buf_len, "%.*s", (int)len, (const char *)reply->data);
+	snprintf(buf, buf_len, "%.*s", (int)strnlen(text, tr->answer_len), text);
 	for (char *p = buf; is_terminal && *p != '\0'; p++) {
 		if ((unsigned char)*p < 0x20 || *p == 0x7f) {
 			*p = '?';
@@ -116,46 +119,65 @@ static void write_json_value(struct json *js, int type, uint64_t bits)
 	}
 }
 
-/* @type: an enum sdo_type, SDO_TYPES for a string, -1 for none. */
-static void show(const struct sdo *sdo, int type)
+/* @type as show() has it; @text has room for all bytes in hex. */
+static void show_text(const struct sdo *sdo, int type, char *text, size_t text_len)
 {
-	const struct admin_reply *reply = &sdo->reply;
-	char hex[3 * ADMIN_DATA_BYTES];
-	char text[ADMIN_DATA_BYTES + 1];
+	const struct admin_transfer *tr = &sdo->transfer;
+	uint64_t bits = bits_of(tr);
+
+	if (type == SDO_TYPES) {
+		copy_string(tr, 1, text, text_len);
+	} else if (type >= 0 && sdo->type != NULL) {
+		sdo_value_format((enum sdo_type)type, bits, text, text_len);
+	} else if (type >= 0) {
+		snprintf(text, text_len, "0x%0*" PRIx64 " %" PRIu64, (int)(2 * tr->answer_len),
+			 bits, bits);
+	} else {
+		hex_format(tr->answer, tr->answer_len, text, text_len);
+	}
+	puts(text);
+}
+
+static void show_json(const struct sdo *sdo, int type, char *text, size_t text_len)
+{
+	const struct admin_transfer *tr = &sdo->transfer;
 	struct json js;
 
-	hex_format(reply->data, reply->data_len, hex, sizeof(hex));
-	if (!sdo->is_json) {
-		if (type == SDO_TYPES) {
-			copy_string(reply, 1, text, sizeof(text));
-			puts(text);
-		} else if (type >= 0 && sdo->type != NULL) {
-			sdo_value_format((enum sdo_type)type, bits_of(reply), text, sizeof(text));
-			puts(text);
-		} else if (type >= 0) {
-			printf("0x%0*" PRIx64 " %" PRIu64 "\n", (int)(2 * reply->data_len),
-			       bits_of(reply), bits_of(reply));
-		} else {
-			puts(hex);
-		}
-		return;
-	}
 	json_init(&js, stdout);
 	json_object_begin(&js, NULL);
 	json_u64(&js, "slave", sdo->request.slave_pos);
 	json_u64(&js, "index", sdo->request.index);
 	json_u64(&js, "subindex", sdo->request.subindex);
-	json_text(&js, "bytes", hex);
+	hex_format(tr->answer, tr->answer_len, text, text_len);
+	json_text(&js, "bytes", text);
 	if (type == SDO_TYPES) {
-		copy_string(reply, 0, text, sizeof(text));
+		copy_string(tr, 0, text, text_len);
 		json_text(&js, "value", text);
 	} else if (type >= 0) {
-		write_json_value(&js, type, bits_of(reply));
+		write_json_value(&js, type, bits_of(tr));
 	} else {
 		json_null(&js, "value");
 	}
 	json_object_end(&js);
 	json_end_line(&js);
+}
+
+/* @type: an enum sdo_type, SDO_TYPES for a string, -1 for none. */
+static enum exit_code show(const struct sdo *sdo, int type)
+{
+	size_t text_len = 3 * sdo->transfer.answer_len + 64;
+	char *text = malloc(text_len);
+
+	if (text == NULL) {
+		return cli_fail(sdo->cli, EXIT_CODE_FAILED, "out of memory");
+	}
+	if (sdo->is_json) {
+		show_json(sdo, type, text, text_len);
+	} else {
+		show_text(sdo, type, text, text_len);
+	}
+	free(text);
+	return EXIT_CODE_OK;
 }
 
 static enum exit_code find_type(const struct sdo *sdo, int *ret_type)
@@ -185,16 +207,15 @@ static enum exit_code read_object(struct sdo *sdo, int type)
 		return result;
 	}
 	if (type < 0) {
-		type = type_by_length(sdo->reply.data_len);
+		type = type_by_length(sdo->transfer.answer_len);
 	} else if (type != SDO_TYPES &&
-		   sdo_type_bytes((enum sdo_type)type) != sdo->reply.data_len) {
+		   sdo_type_bytes((enum sdo_type)type) != sdo->transfer.answer_len) {
 		return cli_fail(sdo->cli, EXIT_CODE_FAILED,
-				"--type: the object has %u bytes, %s has %u", sdo->reply.data_len,
-				sdo_type_to_str((enum sdo_type)type),
+				"--type: the object has %zu bytes, %s has %u",
+				sdo->transfer.answer_len, sdo_type_to_str((enum sdo_type)type),
 				sdo_type_bytes((enum sdo_type)type));
 	}
-	show(sdo, type);
-	return EXIT_CODE_OK;
+	return show(sdo, type);
 }
 
 static enum exit_code write_object(struct sdo *sdo, int type, const char *value)
@@ -265,5 +286,9 @@ enum exit_code verb_sdo(struct cli *cli, int argc, char **argv)
 	if (!cli_parse(cli, &args, argc, argv, &result)) {
 		return result;
 	}
-	return run(&sdo, &args);
+	sdo.transfer =
+		(struct admin_transfer){ .request = &sdo.request, .progress = admin_show_progress };
+	result = run(&sdo, &args);
+	admin_transfer_done(&sdo.transfer);
+	return result;
 }

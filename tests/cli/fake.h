@@ -51,6 +51,7 @@ struct fake {
 	uint8_t sii[SII_BYTES];  /* of slave 0 */
 	uint8_t data[SII_BYTES]; /* of the request */
 	uint32_t data_len;
+	int is_long; /* the answer is sii[] */
 };
 
 int64_t fake_clock_ns(clockid_t clock);

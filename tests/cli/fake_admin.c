@@ -104,6 +104,8 @@ static void answer_read(struct fake *f, const struct admin_request *rq, struct a
 		give(reply, bytes, 4);
 	} else if (rq->index == 0x1008 && rq->subindex == 0) {
 		give(reply, "FB1111-Piccolo", 14);
+	} else if (rq->index == 0x2000) {
+		f->is_long = 1;
 	} else if (rq->index == 0x8000 && rq->subindex == 2) {
 		put_le16(bytes, f->refresh_ms);
 		give(reply, bytes, 2);
@@ -293,7 +295,7 @@ static void post(int fd, const struct admin_reply *reply)
 }
 
 /* With progress before it, and in as many messages as it takes. */
-static void post_sii(const struct fake *f, int fd, struct admin_reply *reply)
+static void post_long(const struct fake *f, int fd, struct admin_reply *reply)
 {
 	reply->kind = ADMIN_REPLY_PROGRESS;
 	reply->done = 1;
@@ -322,12 +324,13 @@ void fake_serve_client(struct fake *f)
 	if (recv(fd, &request, sizeof(request), 0) == (ssize_t)sizeof(request) &&
 	    request.magic == ADMIN_MAGIC && collect(f, fd, &request) == 0 &&
 	    strcmp(f->admin, "mute") != 0) {
+		f->is_long = request.verb == ADMIN_SII_READ;
 		answer(f, &request, &reply);
 		if (strcmp(f->admin, "garbage") == 0) {
 			reply.magic ^= 1;
 		}
-		if (request.verb == ADMIN_SII_READ && reply.result == 0) {
-			post_sii(f, fd, &reply);
+		if (f->is_long && reply.result == 0) {
+			post_long(f, fd, &reply);
 		} else {
 			post(fd, &reply);
 		}

@@ -124,6 +124,14 @@ def test_sdo_read_as_json(daemon: Fake) -> None:
     assert text["value"] == "FB1111-Piccolo"
 
 
+def test_sdo_read_shows_the_whole_of_a_long_object(daemon: Fake) -> None:
+    image = bytes.fromhex(json_of(daemon("sii", "read", "0", "--json"))["bytes"])
+    assert len(image) == 2048
+    assert bytes.fromhex(works(daemon("sdo", "read", "0", "0x2000"))) == image
+    answer = json_of(daemon("sdo", "read", "0", "0x2000", "--json"))
+    assert (bytes.fromhex(answer["bytes"]), answer["value"]) == (image, None)
+
+
 def test_sdo_write_is_read_back(daemon: Fake) -> None:
     assert works(daemon("sdo", "write", "0", "0x8000:2", "250", "--type", "UINT")) == ""
     assert works(daemon("sdo", "read", "0", "0x8000:2", "--type", "UINT")) == "250\n"
