@@ -52,6 +52,9 @@ class Namespace:
         self.enter = ["nsenter", "--target", str(self.holder.pid), "--net", "--mount"]
         if os.geteuid() != 0:
             self.enter += ["--user", "--preserve-credentials"]
+        self.make_link()
+
+    def make_link(self) -> None:
         self.run("ip", "link", "add", "ecat0", "type", "veth", "peer", "name", "ecsim0")
         for nic in ("ecat0", "ecsim0"):
             self.run("sysctl", "-qw", f"net.ipv6.conf.{nic}.disable_ipv6=1", check=False)
