@@ -63,7 +63,7 @@ static enum ecat_cmd command_of(const struct exchange_plan *plan, unsigned chunk
 	case EXCHANGE_LRD:
 		return ECAT_CMD_LRD;
 	}
-	assert(!"unreachable exchange_kind");
+	assert(0 && "unreachable exchange_kind");
 	return ECAT_CMD_NOP;
 }
 

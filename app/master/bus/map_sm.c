@@ -162,6 +162,5 @@ int bus_map_sm(struct bus *bus, size_t pos, uint32_t *total_bytes)
 	}
 	soem->Obits = (uint16)out;
 	soem->Ibits = (uint16)in;
-	soem->configindex = 1; /* SOEM: the mapping is known, do not read it */
 	return 0;
 }

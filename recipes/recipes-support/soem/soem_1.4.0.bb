@@ -10,10 +10,8 @@ LIC_FILES_CHKSUM = "file://${WORKDIR}/SOEM.txt;md5=9e0f3a6879e76ac16053729f3b05a
 PYPI_PACKAGE = "pysoem"
 PYPI_VERSION = "1.1.13"
 PYPI_SHA256 = "4be98d8531e492f2ee5d21f6ef51e51493a10ee1322ed22e909c91a8bcfff950"
-SRC_URI = "file://0001-coe-bound-sdo-transfers.patch \
-           file://0002-sii-walk-forward-only.patch \
-           file://0003-mailbox-wait-after-emergency.patch \
-           file://0004-config-bound-fmmus.patch \
+SRC_URI = "file://0004-config-bound-fmmus.patch \
+           file://0005-config-map-what-is-known.patch \
            file://SOEM.txt"
 FILESEXTRAPATHS:prepend := "${ECDAQ_TOP}/app/third_party/patches:${ECDAQ_TOP}/LICENSES:"
 S = "${WORKDIR}/soem"

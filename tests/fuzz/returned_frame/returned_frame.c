@@ -1,15 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Whatever comes back from the wire. The first byte chooses who meets it: the cyclic exchange, a
- * service transaction, or SOEM's SDO transfer through our NIC layer. Then records follow; each is
- * one frame: raw bytes, or the frame sent last, marked by a slave, with some of its bytes changed.
+ * Whatever comes back from the wire. The first byte chooses who meets it: the cyclic exchange or a
+ * service transaction. Then records follow; each is one frame: raw bytes, or the frame sent last,
+ * marked by a slave, with some of its bytes changed.
  */
-#include "nicdrv.h"
-
-#include "ethercatmain.h"
-
-#include "ethercatcoe.h"
-
 #include <assert.h>
 #include <errno.h>
 #include <stdlib.h>
@@ -23,9 +17,8 @@ enum {
 	RAW,
 	CHANGED,
 	RECORD_KINDS,
-	MODES = 3,
+	MODES = 2,
 	RUNS = 64,
-	SDO_BYTES = 256,
 	IMAGE_BYTES = 64,
 	OUTPUT_BYTES = 20
 };
@@ -36,8 +29,6 @@ struct wire {
 	int64_t now_ns;
 	uint8_t sent[LIMIT_FRAME_BYTES];
 	size_t sent_len;
-	int is_answering; /* every frame gets an answer by itself, WKC 1, data from the input */
-	int has_answer;
 };
 
 static uint8_t next_byte(struct wire *w)
@@ -56,7 +47,6 @@ static int wire_send(void *ctx, const uint8_t *frame, size_t len)
 	assert(len <= sizeof(w->sent));
 	memcpy(w->sent, frame, len);
 	w->sent_len = len;
-	w->has_answer = 1;
 	return 0;
 }
 
@@ -91,31 +81,12 @@ static int changed_frame(struct wire *w, uint8_t *frame)
 	return (int)len;
 }
 
-static int own_answer(struct wire *w, uint8_t *frame)
-{
-	struct ecat_datagram dg;
-	size_t pos = 0;
-
-	memcpy(frame, w->sent, w->sent_len);
-	frame[6] |= 0x02;
-	while (ecat_frame_next(frame, w->sent_len, &pos, &dg) == 1) {
-		for (size_t i = 0; i < dg.data_len && w->left > 0 && dg.cmd == ECAT_CMD_FPRD; i++) {
-			dg.data[i] = next_byte(w);
-		}
-		dg.wkc[0] = 1;
-	}
-	return (int)w->sent_len;
-}
-
 static int wire_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadline, mono_t *ret_at)
 {
 	struct wire *w = ctx;
 	int len = -EAGAIN;
 
-	if (w->is_answering && w->has_answer && w->sent_len <= capacity) {
-		w->has_answer = 0;
-		len = own_answer(w, frame);
-	} else if (!w->is_answering && w->left > 0) {
+	if (w->left > 0) {
 		len = next_byte(w) % RECORD_KINDS == RAW || w->sent_len > capacity
 			      ? raw_frame(w, frame, capacity)
 			      : changed_frame(w, frame);
@@ -211,50 +182,6 @@ static void meet_transaction(struct wire *w, struct line *line)
 	}
 }
 
-static void meet_sdo(struct wire *w, struct line *line)
-{
-	static ecx_portt port;
-	static ec_slavet slaves[2];
-	static ec_eringt errors;
-	int slave_count = 1;
-	boolean has_error = FALSE;
-	ecx_contextt context = {
-		.port = &port,
-		.slavelist = slaves,
-		.slavecount = &slave_count,
-		.maxslave = 2,
-		.elist = &errors,
-		.ecaterror = &has_error,
-	};
-	uint8_t *value = malloc(SDO_BYTES); /* its end is watched */
-	uint8_t out[SDO_BYTES] = { 0 };
-
-	line_bind(line);
-	memset(slaves, 0, sizeof(slaves));
-	memset(&errors, 0, sizeof(errors));
-	ecx_setupnic(&port, "", 0);
-	slaves[1].configadr = 0x1001;
-	slaves[1].mbx_l = slaves[1].mbx_rl = 128;
-	slaves[1].mbx_wo = 0x1000;
-	slaves[1].mbx_ro = 0x1080;
-	w->is_answering = 1;
-	while (w->left > 0 && value != NULL) {
-		int size = SDO_BYTES;
-		int r;
-
-		if (next_byte(w) % 2 == 0) {
-			r = ecx_SDOread(&context, 1, 0x1008, 0, FALSE, &size, value, 20000);
-		} else {
-			r = ecx_SDOwrite(&context, 1, 0x1008, 0, FALSE, size, out, 20000);
-		}
-		if (r > 0 && (size < 0 || size > SDO_BYTES)) {
-			abort();
-		}
-	}
-	free(value);
-	line_bind(NULL);
-}
-
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
@@ -264,8 +191,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 		.now = wire_now, .tai_ns = wire_tai, .sleep_until = wire_sleep, .ctx = &w
 	};
 	struct transport transport = { .send = wire_send, .receive = wire_receive, .ctx = &w };
-	void (*const meet[MODES])(struct wire *, struct line *) = { meet_exchange, meet_transaction,
-								    meet_sdo };
+	void (*const meet[MODES])(struct wire *, struct line *) = { meet_exchange, meet_transaction };
 	struct line *line;
 
 	if (line_create(platform, transport, &line) < 0) {
