@@ -13,15 +13,7 @@
 #include "link/line.h"
 #include "wire/datagram.h"
 
-enum {
-	RAW,
-	CHANGED,
-	RECORD_KINDS,
-	MODES = 2,
-	RUNS = 64,
-	IMAGE_BYTES = 64,
-	OUTPUT_BYTES = 20
-};
+enum { RAW, CHANGED, RECORD_KINDS, MODES = 2, RUNS = 64, IMAGE_BYTES = 64, OUTPUT_BYTES = 20 };
 
 struct wire {
 	const uint8_t *data; /* the input */
@@ -191,7 +183,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 		.now = wire_now, .tai_ns = wire_tai, .sleep_until = wire_sleep, .ctx = &w
 	};
 	struct transport transport = { .send = wire_send, .receive = wire_receive, .ctx = &w };
-	void (*const meet[MODES])(struct wire *, struct line *) = { meet_exchange, meet_transaction };
+	void (*const meet[MODES])(struct wire *, struct line *) = { meet_exchange,
+								    meet_transaction };
 	struct line *line;
 
 	if (line_create(platform, transport, &line) < 0) {

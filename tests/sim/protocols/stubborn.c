@@ -20,8 +20,9 @@ enum {
 
 enum protocol { FOE_IN, FOE_OUT, SOE_IN, SOE_OUT, EOE_IP, AOE_IN, AOE_OUT, VOE_ECHO, PROTOCOLS };
 
-static const char *const names[PROTOCOLS] = { "FoE read",    "FoE write", "SoE read",  "SoE write",
-					      "EoE get IP",  "AoE read",  "AoE write", "VoE",
+static const char *const names[PROTOCOLS] = {
+	"FoE read",   "FoE write", "SoE read",  "SoE write",
+	"EoE get IP", "AoE read",  "AoE write", "VoE",
 };
 static const char *const drives[] = { "all", "all", NULL };
 
@@ -42,11 +43,10 @@ static struct mailbox_request make(enum protocol protocol)
 	case SOE_OUT:
 		rq.protocol = &soe_protocol;
 		rq.capacity = TABLE_BYTES;
-		rq.with.soe =
-			(struct soe_parameters){ .operation = protocol == SOE_IN ? SOE_READ
-										 : SOE_WRITE,
-						 .elements = SOE_ELEMENT_VALUE,
-						 .idn = TABLE };
+		rq.with.soe = (struct soe_parameters){ .operation = protocol == SOE_IN ? SOE_READ
+										       : SOE_WRITE,
+						       .elements = SOE_ELEMENT_VALUE,
+						       .idn = TABLE };
 		break;
 	case EOE_IP:
 		rq.protocol = &eoe_protocol;
@@ -56,11 +56,10 @@ static struct mailbox_request make(enum protocol protocol)
 	case AOE_OUT:
 		rq.protocol = &aoe_protocol;
 		rq.capacity = 4;
-		rq.with.aoe =
-			(struct aoe_parameters){ .command = protocol == AOE_IN ? AOE_READ
-									       : AOE_WRITE,
-						 .group = AOE_GROUP_SDO,
-						 .offset = aoe_sdo_offset(0x607a, 0) };
+		rq.with.aoe = (struct aoe_parameters){ .command = protocol == AOE_IN ? AOE_READ
+										     : AOE_WRITE,
+						       .group = AOE_GROUP_SDO,
+						       .offset = aoe_sdo_offset(0x607a, 0) };
 		break;
 	case VOE_ECHO:
 	case PROTOCOLS:
@@ -84,21 +83,26 @@ static void fill(uint8_t seed)
 
 static size_t length_of(enum protocol protocol)
 {
-	static const size_t len[PROTOCOLS] = { [FOE_IN] = FILE_BYTES,   [FOE_OUT] = FILE_BYTES,
-					       [SOE_IN] = TABLE_BYTES,  [SOE_OUT] = TABLE_BYTES,
-					       [AOE_IN] = 4,            [AOE_OUT] = 4,
-					       [VOE_ECHO] = ECHO_BYTES, [EOE_IP] = 0 };
+	static const size_t len[PROTOCOLS] = { [FOE_IN] = FILE_BYTES,
+					       [FOE_OUT] = FILE_BYTES,
+					       [SOE_IN] = TABLE_BYTES,
+					       [SOE_OUT] = TABLE_BYTES,
+					       [AOE_IN] = 4,
+					       [AOE_OUT] = 4,
+					       [VOE_ECHO] = ECHO_BYTES,
+					       [EOE_IP] = 0 };
 
 	return len[protocol];
 }
 
 /* What was written by a request of the pair comes back by the other one. */
-static void check_works(struct protocol_bench *b, unsigned pos, enum protocol protocol, uint8_t seed)
+static void check_works(struct protocol_bench *b, unsigned pos, enum protocol protocol,
+			uint8_t seed)
 {
-	static const enum protocol writer[PROTOCOLS] = { [FOE_IN] = FOE_OUT,  [FOE_OUT] = FOE_OUT,
-							 [SOE_IN] = SOE_OUT,  [SOE_OUT] = SOE_OUT,
-							 [AOE_IN] = AOE_OUT,  [AOE_OUT] = AOE_OUT,
-							 [EOE_IP] = EOE_IP, [VOE_ECHO] = VOE_ECHO };
+	static const enum protocol writer[PROTOCOLS] = {
+		[FOE_IN] = FOE_OUT, [FOE_OUT] = FOE_OUT, [SOE_IN] = SOE_OUT, [SOE_OUT] = SOE_OUT,
+		[AOE_IN] = AOE_OUT, [AOE_OUT] = AOE_OUT, [EOE_IP] = EOE_IP,  [VOE_ECHO] = VOE_ECHO
+	};
 	enum protocol out = writer[protocol];
 	static uint8_t expected[FILE_BYTES];
 	struct mailbox_request rq;
