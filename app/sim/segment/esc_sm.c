@@ -234,7 +234,8 @@ static struct esc_sm *sm_at(struct esc *esc, size_t addr, size_t *len)
 		struct esc_sm *sm = &esc->sm[i];
 		size_t end = (size_t)sm->start + sm->len;
 
-		if ((!sm->is_active && !sm->is_locked) || sm->start < ESC_REG_PROCESS_RAM || addr >= end) {
+		if ((!sm->is_active && !sm->is_locked) || sm->start < ESC_REG_PROCESS_RAM ||
+		    addr >= end) {
 			continue;
 		}
 		if (addr >= sm->start) {
