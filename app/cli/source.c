@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "cli/source.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -226,6 +227,7 @@ enum exit_code source_slave_pos(struct cli *cli, const char *text, uint16_t *ret
 	enum exit_code result = source_status(cli, &page);
 
 	if (result == EXIT_CODE_OK) {
+		assert(page != NULL);
 		result = source_find_slave(cli, page, text, ret_pos);
 		source_status_close(page);
 	}

@@ -24,6 +24,12 @@ def test_it_waits_for_the_first_slave_and_goes_on_by_itself(
     assert segment.stop("daemon") == 0
 
 
+def slave_states(segment: Segment) -> set[str]:
+    """Also "unknown", until a slave was looked at."""
+    shown = json.loads(segment.ecdaq("state", "--json").stdout)
+    return {slave["state"] for slave in shown["slave"]}
+
+
 def test_a_refused_start_up_sdo_can_be_looked_into(make_segment: Callable[..., Segment]) -> None:
     segment = make_segment(settings={"bus.presence": "any"})
     file = segment.folder / "ecdaq.yaml"
@@ -37,7 +43,7 @@ def test_a_refused_start_up_sdo_can_be_looked_into(make_segment: Callable[..., S
     shown = json.loads(segment.ecdaq("state", "--json").stdout)
     assert (shown["state"], shown["target"]) == ("PREOP", "OP")
     assert "0x9999" in shown["message"]
-    assert {slave["state"] for slave in shown["slave"]} == {"PRE-OP"}
+    wait_for("PRE-OP", lambda: slave_states(segment) == {"PRE-OP"}, 60)
     assert segment.ecdaq("sdo", "read", "a", "0x1018:1").stdout.startswith("0x")
     segment.ecdaq("state", "INIT", "a")
     got = segment.ecdaq("rescan", check=False)

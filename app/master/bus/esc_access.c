@@ -95,6 +95,7 @@ int esc_access_read(struct bus *bus, size_t pos, uint16_t reg, uint8_t *ret_data
 	return r;
 }
 
+/* NOLINTNEXTLINE(readability-function-size): the interface of esc_access.h */
 int esc_access_write(struct bus *bus, size_t pos, uint16_t reg, const uint8_t *data, size_t len,
 		     enum esc_guard guard, char *error)
 {

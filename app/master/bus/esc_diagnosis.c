@@ -73,7 +73,7 @@ static void take(const struct raw *raw, const struct access *ac, struct esc_diag
 	ret->is_pdi_watchdog_alive = ret->dl_status >> 1 & 1;
 	ret->is_enhanced_link = ret->dl_status >> 2 & 1;
 	ret->has_processing_errors = ac[ERRORS].wkc == 1;
-	ret->processing_errors = raw->errors[3 * ESC_PORTS];
+	ret->processing_errors = raw->errors[(size_t)3 * ESC_PORTS];
 	ret->pdi_errors = raw->errors[3 * ESC_PORTS + 1];
 	ret->has_eeprom = ac[EEPROM].wkc == 1;
 	ret->eeprom_status = get_le16(raw->eeprom);

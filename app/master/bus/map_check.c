@@ -7,7 +7,6 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "base/bytes.h"
 #include "bus/bus_internal.h"
 #include "bus/registers.h"
 

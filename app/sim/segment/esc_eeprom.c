@@ -151,7 +151,7 @@ static int64_t busy_ns(struct esc *esc, int64_t t_ns, uint16_t control)
 	}
 	esc->is_eeprom_deaf = t_ns < esc->eeprom_writing_until_ns;
 	if (esc->is_eeprom_deaf) {
-		return I2C_OVERHEAD_BYTES * I2C_BYTE_NS;
+		return (int64_t)I2C_OVERHEAD_BYTES * I2C_BYTE_NS;
 	}
 	return command == EEPROM_WRITE
 		       ? WRITE_NS

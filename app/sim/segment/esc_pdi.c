@@ -115,19 +115,18 @@ static void write_al_status(struct esc *esc, int64_t t_ns, uint8_t value)
 	const struct esc_al_fault *fault = &esc->al_fault;
 	uint8_t state = value & AL_STATE_MASK;
 	uint8_t from = esc->reg[ESC_REG_AL_STATUS] & AL_STATE_MASK;
+	int is_change = (value & AL_ERROR) == 0 && state != from;
 
 	if (esc->al_late_ns != 0 && value == esc->al_late_status) {
 		return; /* requested again meanwhile */
 	}
 	esc->al_late_ns = 0;
 	esc->is_al_refused = 0;
-	if ((value & AL_ERROR) != 0 || state == from) {
-		set_al_status(esc, value);
-	} else if (state == fault->refused_state) {
+	if (is_change && state == fault->refused_state) {
 		esc->is_al_refused = 1;
 		set_al_status(esc, from | AL_ERROR);
 		put_le16(esc->reg + ESC_REG_AL_STATUS_CODE, fault->refused_code);
-	} else if (state == fault->slow_state) {
+	} else if (is_change && state == fault->slow_state) {
 		esc->al_late_ns = t_ns + fault->slow_ns;
 		esc->al_late_status = value;
 	} else {

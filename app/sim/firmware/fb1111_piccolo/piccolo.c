@@ -5,7 +5,7 @@
 
 #include "al.h"
 #include "esc_register.h"
-#include "foe.h"
+#include "image.h"
 #include "mailbox.h"
 #include "objects.h"
 #include "pdo.h"
