@@ -4,7 +4,10 @@
  * broken; and a stop request ends every step of the bring-up.
  */
 #include <errno.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
+#include "base/admin_protocol.h"
 #include "base/bytes.h"
 #include "harness/test.h"
 #include "sim/harness/virtual_master.h"
@@ -89,6 +92,28 @@ TEST(stop, a_cable_that_is_out_is_not_waited_for)
 TEST(stop, frame_timeouts_of_a_slow_network_do_not_add_up)
 {
 	CHECK(run_and_stop("bus.frame_timeout=100ms", "at=0s cut slave=0", 0) < 0);
+}
+
+TEST(stop, a_dead_mailbox_with_a_request_in_it_is_not_waited_for)
+{
+	struct admin_request rq = { .magic = ADMIN_MAGIC,
+				    .verb = ADMIN_SDO_READ,
+				    .id = 1,
+				    .slave_pos = 1,
+				    .index = 0x1018,
+				    .subindex = 1 };
+	int fd;
+
+	open_bench("bus.mailbox_timeout=60s");
+	virtual_master_settle(&vm);
+	fd = virtual_master_connect(&vm);
+	virtual_bench_fault(&b, "at=0s mailbox-stuck slave=1 for=100s");
+	CHECK_EQ(send(fd, &rq, sizeof(rq), 0), sizeof(rq));
+	virtual_master_run(&vm, RUN_CYCLES);
+	CHECK(recv(fd, &rq, sizeof(rq), MSG_DONTWAIT | MSG_PEEK) < 0); /* it still waits */
+	CHECK_EQ(stop_in_time(3), 0);
+	close(fd);
+	close_bench();
 }
 
 /* A stop request @after_ns into the bring-up. */
