@@ -51,6 +51,8 @@ SHARED_STATE = (
     "remote_board",
 )
 SHARED_STATE_TESTS = f"^({'|'.join(SHARED_STATE)})[.]"
+# whole.* runs all tests of a program in one process, once more: in the release flavour only.
+ONE_BY_ONE = ("-E", "^whole[.]")
 CONTROL_TESTS = r"^(control|sim_control|sim_loopback)[.]"
 SYNC0_TESTS = r"^sync0(_gpio|_watch)?\."
 
@@ -262,7 +264,7 @@ def booted(name: str, *options: str) -> Suite:
 GROUPS: dict[str, list[Suite]] = {
     "unit": [
         ctest("unit", "release", "-LE", "^long$"),
-        ctest("unit", "asan", "-LE", "^long$"),
+        ctest("unit", "asan", "-LE", "^long$", *ONE_BY_ONE),
         replace(ctest("unit", "tsan", "-R", SHARED_STATE_TESTS), run=run_shared_state),
     ],
     "tidy": [pytest("tidy", "release")],
@@ -276,7 +278,7 @@ GROUPS: dict[str, list[Suite]] = {
     "sim": [
         ctest("sim", "release", "-LE", "^long$"),
         pytest("sim", "release"),
-        ctest("sim", "asan", "-LE", "^long$"),
+        ctest("sim", "asan", "-LE", "^long$", *ONE_BY_ONE),
     ],
     "fuzz": [Suite("fuzz", "fuzz", run_fuzz)],
     "recipes": [pytest("recipes", "release")],
