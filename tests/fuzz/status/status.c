@@ -77,8 +77,8 @@ static void read_others(unsigned which, const uint8_t *data, size_t size)
 	} else {
 		make(SYNC0_STATUS_MAGIC, sizeof(sync0), data, size);
 		if (page_read_sync0(path, &sync0) == 0) {
-			assert(sync0.line_count <= LIMIT_SLAVES);
-			for (uint32_t i = 0; i < LIMIT_SLAVES; i++) {
+			assert(sync0.line_count <= LIMIT_SYNC0_LINES);
+			for (uint32_t i = 0; i < LIMIT_SYNC0_LINES; i++) {
 				IS_TEXT(sync0.line[i].slave);
 				IS_TEXT(sync0.line[i].line);
 			}
