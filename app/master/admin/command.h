@@ -24,7 +24,7 @@ enum { ADMIN_ONESHOT_MARGIN_CYCLES = 5 };
 #define ADMIN_TIMEOUT_NS (20 * NS_PER_S)
 /* A whole EEPROM, word by word. */
 #define ADMIN_SII_TIMEOUT_NS (600 * NS_PER_S)
-/* All time-outs of a bring-up together may be longer; then the client is told so. */
+/* All timeouts of a bring-up together may be longer; the client then gets a timeout error. */
 #define ADMIN_BRING_UP_TIMEOUT_NS (600 * NS_PER_S)
 /* Latest time of a one-shot from now: a later one is probably a typing error. */
 #define ADMIN_ONESHOT_AHEAD_NS (3600 * NS_PER_S)

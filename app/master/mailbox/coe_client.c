@@ -138,7 +138,7 @@ static int compose(struct mailbox_request *rq, uint8_t *data, size_t capacity)
 
 /* --- answers --- */
 
-/* A reply that breaks the protocol: the slave is told so. */
+/* A reply that breaks the protocol: send the slave an abort. */
 static int reject(struct mailbox_request *rq, uint32_t abort)
 {
 	rq->state.coe.abort = abort;

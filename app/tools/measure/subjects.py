@@ -51,7 +51,7 @@ def program(*words: str, keep: str = ".") -> tuple[str, Callable[[Path], list[st
 def fault_matrix(root: Path) -> list[str]:
     """The table of sim_fault_matrix in the order of its source: it runs the last row first."""
     lines = run([f"{SCENARIOS}/sim_fault_matrix"], r"^(?!passed|\d+ passed)\S", root)
-    head = "median and worst of each; ms from the mend (else the fault) to OP"
+    head = "median and maximum; ms to OP from the end of the fault, or from its start"
     return [head, "", *lines[:1], *reversed(lines[1:])]
 
 

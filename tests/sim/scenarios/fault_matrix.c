@@ -116,7 +116,7 @@ TEST(sim_fault_matrix, the_cable_at_the_master)
 {
 	check_row(&(struct fault_row){ .name = "cable at the master, 500 ms",
 				       .breaks = { "at=0s cut slave=0" },
-				       .mends = { "at=0s heal slave=0" },
+				       .repairs = { "at=0s heal slave=0" },
 				       .out_ms = 500,
 				       .event = EVENT_LINK,
 				       .slave = EVENT_NO_SLAVE,
@@ -131,7 +131,7 @@ static void cable_between(const char *name, const char *datagrams)
 	check_row(&(struct fault_row){ .name = name,
 				       .setting = datagrams,
 				       .breaks = { "at=0s cut slave=1" },
-				       .mends = { "at=0s heal slave=1" },
+				       .repairs = { "at=0s heal slave=1" },
 				       .out_ms = 500,
 				       .event = EVENT_SLAVE_LOST,
 				       .slave = 1,
@@ -161,7 +161,7 @@ static void power_cycle(const char *name, const char *setting, unsigned slave)
 	check_row(&(struct fault_row){ .name = name,
 				       .setting = setting,
 				       .breaks = { off },
-				       .mends = { on },
+				       .repairs = { on },
 				       .out_ms = 500,
 				       .event = EVENT_SLAVE_LOST,
 				       .slave = (uint16_t)slave,
@@ -239,10 +239,10 @@ TEST(sim_fault_matrix, two_slaves_are_exchanged)
 				       .prepare = make_c_another_product,
 				       .breaks = { POWER_CYCLE_B, POWER_CYCLE_C },
 				       .break_it = swap_b_and_c,
-				       .mends = { POWER_CYCLE_B, POWER_CYCLE_C },
-				       .mend_it = swap_b_and_c,
+				       .repairs = { POWER_CYCLE_B, POWER_CYCLE_C },
+				       .repair_it = swap_b_and_c,
 				       .out_ms = 2000,
-				       .mend_takes_ms = 300,
+				       .repair_takes_ms = 300,
 				       .must_be_out = 1,
 				       .event = EVENT_STRANGER,
 				       .slave = EVENT_NO_SLAVE,
@@ -264,17 +264,17 @@ static void restore_product(struct fault_trial *t)
 	write_sii(t, 1, SII_PRODUCT_BYTE, PICCOLO_PRODUCT);
 }
 
-/* Slave b is without power for 300 ms and comes back with another EEPROM; the same to mend it. */
+/* Slave b is without power for 300 ms and comes back with another EEPROM; the same to repair it. */
 static void other_eeprom(const char *name, void (*change)(struct fault_trial *t),
 			 void (*restore)(struct fault_trial *t), uint16_t event, const char *words)
 {
 	check_row(&(struct fault_row){ .name = name,
 				       .breaks = { POWER_CYCLE_B },
 				       .break_it = change,
-				       .mends = { POWER_CYCLE_B },
-				       .mend_it = restore,
+				       .repairs = { POWER_CYCLE_B },
+				       .repair_it = restore,
 				       .out_ms = 2000,
-				       .mend_takes_ms = 300,
+				       .repair_takes_ms = 300,
 				       .must_be_out = 1,
 				       .event = event,
 				       .slave = 1,
@@ -402,7 +402,7 @@ static void not_retried(const char *name, const char *fault, int64_t code)
 {
 	check_row(&(struct fault_row){ .name = name,
 				       .breaks = { fault },
-				       .mend_it = ask_clear,
+				       .repair_it = ask_clear,
 				       .out_ms = 3000,
 				       .must_be_out = 1,
 				       .event = EVENT_SLAVE_ALARM,
@@ -451,7 +451,7 @@ static void ask_dead_mailbox(struct fault_trial *t)
 static void ask_until_answered(struct fault_trial *t)
 {
 	while (read_vendor(t) < 0) {
-		CHECK(virtual_bench_now_ns(&t->b) < t->mended_ns + 10 * NS_PER_S);
+		CHECK(virtual_bench_now_ns(&t->b) < t->repaired_ns + 10 * NS_PER_S);
 	}
 	t->served_ns = virtual_bench_now_ns(&t->b);
 }
@@ -461,7 +461,7 @@ TEST(sim_fault_matrix, a_mailbox_is_stuck_while_a_request_is_pending)
 	check_row(&(struct fault_row){ .name = "mailbox stuck, with a request",
 				       .breaks = { "at=0s mailbox-stuck slave=1 for=2500ms" },
 				       .break_it = ask_dead_mailbox,
-				       .mend_it = ask_until_answered,
+				       .repair_it = ask_until_answered,
 				       .out_ms = 2500,
 				       .least_ms = 20,
 				       .worst_ms = 150 });

@@ -107,7 +107,7 @@ static void step(struct fault_trial *t, const struct fault_row *row)
 	}
 	t->was_out += !is_op(t);
 	t->rounds += was_op && !is_op(t);
-	if (t->mended_ns != 0 && !is_op(t)) {
+	if (t->repaired_ns != 0 && !is_op(t)) {
 		t->not_op_ns = virtual_bench_now_ns(&t->b);
 	}
 }
@@ -123,7 +123,7 @@ static void stay_out(struct fault_trial *t, const struct fault_row *row)
 		}
 	}
 	if (row->must_be_out && is_op(t)) {
-		test_fail(__FILE__, __LINE__, "%s, seed %llu: in OP before it was mended",
+		test_fail(__FILE__, __LINE__, "%s, seed %llu: in OP before it was repaired",
 			  row->name, (unsigned long long)t->seed);
 	}
 }
@@ -190,14 +190,14 @@ void fault_trial_run(struct fault_trial *t, const struct fault_row *row, uint64_
 	open_bus(t, row);
 	break_it(t, row);
 	if (row->out_ms == 0) {
-		t->mended_ns = virtual_bench_now_ns(&t->b);
+		t->repaired_ns = virtual_bench_now_ns(&t->b);
 	} else {
 		stay_out(t, row);
-		do_lines(t, row->mends);
-		t->mended_ns =
-			virtual_bench_now_ns(&t->b) + (int64_t)row->mend_takes_ms * NS_PER_MS;
-		if (row->mend_it != NULL) {
-			row->mend_it(t);
+		do_lines(t, row->repairs);
+		t->repaired_ns =
+			virtual_bench_now_ns(&t->b) + (int64_t)row->repair_takes_ms * NS_PER_MS;
+		if (row->repair_it != NULL) {
+			row->repair_it(t);
 		}
 	}
 	wait_until_well(t, row);
@@ -212,5 +212,5 @@ double fault_trial_back_ms(const struct fault_trial *t)
 {
 	int64_t end_ns = t->served_ns != 0 ? t->served_ns : t->not_op_ns;
 
-	return end_ns > t->mended_ns ? (double)(end_ns - t->mended_ns) * 1e-6 : 0;
+	return end_ns > t->repaired_ns ? (double)(end_ns - t->repaired_ns) * 1e-6 : 0;
 }

@@ -126,7 +126,7 @@ TEST(eeprom, a_wrong_checksum_leaves_the_slave_without_its_application)
 	CHECK_EQ(bench_read16(b, BENCH_STATION, ESC_REG_DL_STATUS) & 1, 0);
 	bench_pdi_read(b, 0, ESC_REG_TYPE, type, 1);
 	CHECK_EQ(type[0], 0);
-	/* The master can still mend it: write the right checksum, reload. */
+	/* The master can still repair it: write the right checksum, reload. */
 	bench_write16(b, BENCH_STATION, ESC_REG_EEPROM_DATA, (uint16_t)(b->sii[0][14] ^ 1));
 	CHECK_EQ(command(b, WRITE | ENABLE, 7), 1);
 	wait_idle(b);
