@@ -23,7 +23,7 @@ static int line_of(const struct option_lines *lines, const char *name)
 {
 	const struct option *option = option_find(name);
 
-	return lines == NULL || option == NULL ? 0 : lines->line[option - option_table];
+	return lines == NULL || option == NULL ? 0 : lines->line[option_place(option)];
 }
 
 static int check_relations(const struct config *cfg, const struct option_lines *lines,

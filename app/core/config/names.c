@@ -19,9 +19,8 @@ int option_is_section(const char *name)
 {
 	size_t len = strlen(name);
 
-	for (size_t i = 0; i < option_count; i++) {
-		if (strncmp(option_table[i].name, name, len) == 0 &&
-		    option_table[i].name[len] == '.') {
+	for (size_t i = 0; i < option_count(); i++) {
+		if (strncmp(option_at(i)->name, name, len) == 0 && option_at(i)->name[len] == '.') {
 			return 1;
 		}
 	}
@@ -94,8 +93,8 @@ const char *option_suggest(const char *name)
 	if (strlen(name) > OPTION_KEY_BYTES) {
 		return NULL;
 	}
-	for (size_t i = 0; i < option_count; i++) {
-		consider(&guess, name, option_table[i].name);
+	for (size_t i = 0; i < option_count(); i++) {
+		consider(&guess, name, option_at(i)->name);
 	}
 	for (size_t i = 0; i < option_section_count; i++) {
 		consider(&guess, name, option_sections[i].name);

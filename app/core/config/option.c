@@ -9,9 +9,9 @@
 
 const struct option *option_find(const char *name)
 {
-	for (size_t i = 0; i < option_count; i++) {
-		if (strcmp(option_table[i].name, name) == 0) {
-			return &option_table[i];
+	for (size_t i = 0; i < option_count(); i++) {
+		if (strcmp(option_at(i)->name, name) == 0) {
+			return option_at(i);
 		}
 	}
 	return NULL;
@@ -29,8 +29,8 @@ void option_fill_defaults(const char *prefix, void *base)
 {
 	char reason[OPTION_WHY_BYTES];
 
-	for (size_t i = 0; i < option_count; i++) {
-		const struct option *option = &option_table[i];
+	for (size_t i = 0; i < option_count(); i++) {
+		const struct option *option = option_at(i);
 
 		if (is_under(option, prefix) && option->default_value != NULL) {
 			int r = option_parse(option, option->default_value, base, reason);

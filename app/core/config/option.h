@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The one option table (options.c): parser, --set, sample file and reference page all come from it.
- * Defaults and bounds are written as in the file ("1ms") and go through the same
- * parser as the file. Private to config/ and to the generator of the pages. Context: blocking.
+ * The one option table (options.c, with the rows in options_*.c): parser, --set, sample file and
+ * reference page all come from it. Defaults and bounds are written as in the file ("1ms") and go
+ * through the same parser as the file. Private to config/ and to the generator of the pages.
+ * Context: blocking.
  */
 #ifndef CONFIG_OPTION_H
 #define CONFIG_OPTION_H
@@ -41,8 +42,12 @@ struct option {
 	const char *prose;
 };
 
-extern const struct option option_table[];
-extern const size_t option_count;
+/** Rows of the table. */
+size_t option_count(void);
+/** The row at @place, in the order of the file; NULL behind the last one. */
+const struct option *option_at(size_t place);
+/** The place of @option, a row of the table. */
+size_t option_place(const struct option *option);
 
 enum { OPTION_LIMIT = 128, OPTION_WHY_BYTES = CONFIG_WHY_BYTES, OPTION_KEY_BYTES = 96 };
 

@@ -65,8 +65,8 @@ static void write_rows(const char *prefix, FILE *out)
 	fputs("\n| option | default | range | plain number in | what it is |\n"
 	      "| --- | --- | --- | --- | --- |\n",
 	      out);
-	for (size_t i = 0; i < option_count; i++) {
-		const struct option *option = &option_table[i];
+	for (size_t i = 0; i < option_count(); i++) {
+		const struct option *option = option_at(i);
 
 		if (name_under(option, prefix) == NULL) {
 			continue;
@@ -153,8 +153,8 @@ static void write_section(const struct option_section *section, FILE *out)
 	write_comment("#", section->prose, out);
 	fprintf(out, "%s:\n", section->name);
 	snprintf(prefix, sizeof(prefix), "%s.", section->name);
-	for (size_t i = 0; i < option_count; i++) {
-		const struct option *option = &option_table[i];
+	for (size_t i = 0; i < option_count(); i++) {
+		const struct option *option = option_at(i);
 		const char *name = name_under(option, prefix);
 
 		if (name == NULL) {
@@ -197,8 +197,8 @@ static void write_example(const char *prefix, const char *indent, FILE *out)
 	};
 	const char *dash = "- ";
 
-	for (size_t i = 0; i < option_count; i++) {
-		const struct option *option = &option_table[i];
+	for (size_t i = 0; i < option_count(); i++) {
+		const struct option *option = option_at(i);
 		const char *name = name_under(option, prefix);
 		const char *value = option->default_value;
 

@@ -50,7 +50,7 @@ static int read_scalar(struct walk *walk, const struct scope *scope, const struc
 		       const char *shown, const yaml_node_t *node)
 {
 	char reason[OPTION_WHY_BYTES] = "";
-	int *line = &walk->lines.line[option - option_table];
+	int *line = &walk->lines.line[option_place(option)];
 
 	if (scope->base == walk->cfg && *line != 0) {
 		snprintf(reason, sizeof(reason), "is already set in line %d", *line);
@@ -83,12 +83,12 @@ static int check_required(struct walk *walk, const struct scope *scope, const ya
 	size_t len = strlen(scope->pattern);
 	char key[OPTION_KEY_BYTES];
 
-	for (size_t i = 0; i < option_count; i++) {
-		const char *rest = option_table[i].name + len;
+	for (size_t i = 0; i < option_count(); i++) {
+		const char *rest = option_at(i)->name + len;
 		int is_there = 0;
 
-		if (strncmp(option_table[i].name, scope->pattern, len) != 0 ||
-		    strchr(rest, '.') != NULL || option_table[i].default_value != NULL) {
+		if (strncmp(option_at(i)->name, scope->pattern, len) != 0 ||
+		    strchr(rest, '.') != NULL || option_at(i)->default_value != NULL) {
 			continue;
 		}
 		for (yaml_node_pair_t *p = node->data.mapping.pairs.start;
@@ -155,7 +155,7 @@ static int read_sdo(struct walk *walk, const yaml_node_t *node, unsigned slave, 
 		char key[64];
 
 		snprintf(key, sizeof(key), "%svalue", shown);
-		return walk_fail(walk, walk->lines.line[value - option_table], key, reason);
+		return walk_fail(walk, walk->lines.line[option_place(value)], key, reason);
 	}
 	walk->cfg->sdo_count++;
 	return 0;
@@ -318,10 +318,10 @@ static int read_mapping(struct walk *walk, const struct scope *scope, const yaml
 /* The line of what @assignment sets is no longer the one to blame. */
 static void forget_line(struct walk *walk, const char *assignment)
 {
-	for (size_t i = 0; i < option_count; i++) {
-		size_t len = strlen(option_table[i].name);
+	for (size_t i = 0; i < option_count(); i++) {
+		size_t len = strlen(option_at(i)->name);
 
-		if (strncmp(option_table[i].name, assignment, len) == 0 && assignment[len] == '=') {
+		if (strncmp(option_at(i)->name, assignment, len) == 0 && assignment[len] == '=') {
 			walk->lines.line[i] = 0;
 		}
 	}
@@ -350,8 +350,7 @@ int walk_document(struct walk *walk)
 	int line = 0;
 	int r = read_root(walk);
 
-	if (r == 0 && walk->cfg->slave_count > 0 &&
-	    walk->lines.line[presence - option_table] == 0) {
+	if (r == 0 && walk->cfg->slave_count > 0 && walk->lines.line[option_place(presence)] == 0) {
 		walk->cfg->bus_presence = CONFIG_EXACT_SLAVES;
 	}
 	for (size_t i = 0; r == 0 && i < walk->set_count; i++) {

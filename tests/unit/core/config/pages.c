@@ -57,13 +57,12 @@ TEST(config, every_option_is_on_the_reference_page_and_has_prose)
 	char *page = generated(pages_write_reference);
 	char row[128];
 
-	for (size_t i = 0; i < option_count; i++) {
-		snprintf(row, sizeof(row), "| `%s` |", option_table[i].name);
+	for (size_t i = 0; i < option_count(); i++) {
+		snprintf(row, sizeof(row), "| `%s` |", option_at(i)->name);
 		if (strstr(page, row) == NULL) {
-			test_fail(__FILE__, __LINE__, "%s is not on the page",
-				  option_table[i].name);
+			test_fail(__FILE__, __LINE__, "%s is not on the page", option_at(i)->name);
 		}
-		CHECK(strlen(option_table[i].prose) > 8);
+		CHECK(strlen(option_at(i)->prose) > 8);
 	}
 	free(page);
 }
@@ -76,8 +75,8 @@ TEST(config, every_option_has_sound_bounds_and_a_default_within_them)
 	} base;
 	char why[OPTION_WHY_BYTES];
 
-	for (size_t i = 0; i < option_count; i++) {
-		const struct option *option = &option_table[i];
+	for (size_t i = 0; i < option_count(); i++) {
+		const struct option *option = option_at(i);
 		int is_number = option->type != OPTION_SWITCH && option->type != OPTION_WORD &&
 				option->type != OPTION_TEXT && option->type != OPTION_NAME;
 
@@ -99,10 +98,10 @@ TEST(config, every_option_has_sound_bounds_and_a_default_within_them)
 
 TEST(config, no_two_options_fill_the_same_field)
 {
-	for (size_t i = 0; i < option_count; i++) {
+	for (size_t i = 0; i < option_count(); i++) {
 		for (size_t j = 0; j < i; j++) {
-			const struct option *a = &option_table[i];
-			const struct option *b = &option_table[j];
+			const struct option *a = option_at(i);
+			const struct option *b = option_at(j);
 			size_t a_list = strcspn(a->name, "[");
 			int is_same_base =
 				strncmp(a->name, b->name, a_list + 1) == 0 ||
@@ -139,8 +138,8 @@ TEST(config, sample_names_every_option)
 	char *text = generated(pages_write_sample);
 	char line[128];
 
-	for (size_t i = 0; i < option_count; i++) {
-		snprintf(line, sizeof(line), "%s: ", strrchr(option_table[i].name, '.') + 1);
+	for (size_t i = 0; i < option_count(); i++) {
+		snprintf(line, sizeof(line), "%s: ", strrchr(option_at(i)->name, '.') + 1);
 		CHECK(strstr(text, line) != NULL);
 	}
 	free(text);
