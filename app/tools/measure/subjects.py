@@ -49,10 +49,12 @@ def program(*words: str, keep: str = ".") -> tuple[str, Callable[[Path], list[st
 
 
 def fault_matrix(root: Path) -> list[str]:
-    """The table of sim_fault_matrix in the order of its source: it runs the last row first."""
+    """The table of sim_fault_matrix in the order of its source (it runs the last row first), and
+    the time to fail-safe outputs while the service thread is busy."""
     lines = run([f"{SCENARIOS}/sim_fault_matrix"], r"^(?!passed|\d+ passed)\S", root)
+    safe = run([f"{SCENARIOS}/sim_fail_safe_busy"], "fail-safe outputs", root)
     head = "median and maximum; ms to OP from the end of the fault, or from its start"
-    return [head, "", *lines[:1], *reversed(lines[1:])]
+    return [head, "", *lines[:1], *reversed(lines[1:]), "", *safe]
 
 
 def pytest(*words: str, keep: str) -> tuple[str, Callable[[Path], list[str]]]:
@@ -87,7 +89,7 @@ ALL = (
     Subject(
         "faults",
         f"Faults and recovery, {TRIALS} buses each (ECDAQ_FAULT_TRIALS)",
-        (f"{SCENARIOS}/sim_fault_matrix",),
+        (f"{SCENARIOS}/sim_fault_matrix", f"{SCENARIOS}/sim_fail_safe_busy"),
         fault_matrix,
         is_quick=True,
     ),

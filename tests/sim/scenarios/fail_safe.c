@@ -6,60 +6,18 @@
 #include <errno.h>
 #include <stdlib.h>
 
-#include "base/bytes.h"
 #include "base/event.h"
 #include "base/prng.h"
 #include "harness/test.h"
-#include "sim/harness/virtual_master.h"
+#include "sim/scenarios/output_watch.h"
 #include "wire/al.h"
-#include "wire/datagram.h"
-#include "wire/esc_reg.h"
 
 enum { PERIOD_NS = 1000000, PHASES = 100, OUTPUT_AL_ERROR_CODE = 0x001a };
 
 static struct virtual_bench b;
 static struct virtual_master vm;
 
-/* What came back on the wire since watch_wire(), in order. */
-static struct {
-	int64_t since_ns;
-	int64_t newest_live_ns; /* a frame with the output set, until the first without */
-	int64_t first_safe_ns;  /* the first with all outputs at fail-safe; 0: none */
-	int64_t first_al_ns;    /* the first that shows a slave out of OP; 0: none */
-	unsigned live;
-	unsigned safe;
-} wire;
-
-static void read_frame(struct virtual_master *v, const uint8_t *frame, size_t len)
-{
-	int64_t now_ns = virtual_bench_now_ns(v->bench);
-	struct ecat_datagram dg;
-	uint8_t copy[1600];
-	size_t pos = 0;
-
-	CHECK(len <= sizeof(copy));
-	memcpy(copy, frame, len);
-	while (ecat_frame_next(copy, len, &pos, &dg) == 1) {
-		if (dg.cmd == ECAT_CMD_LRW && (dg.data[0] & 1) != 0) {
-			wire.live++;
-			wire.newest_live_ns =
-				wire.first_safe_ns == 0 ? now_ns : wire.newest_live_ns;
-		} else if (dg.cmd == ECAT_CMD_LRW) {
-			wire.safe++;
-			wire.first_safe_ns = wire.first_safe_ns == 0 ? now_ns : wire.first_safe_ns;
-		} else if (dg.cmd == ECAT_CMD_BRD && dg.ado == ESC_REG_AL_STATUS &&
-			   get_le16(dg.data) != AL_OP && wire.first_al_ns == 0) {
-			wire.first_al_ns = now_ns;
-		}
-	}
-}
-
-static void watch_wire(void)
-{
-	memset(&wire, 0, sizeof(wire));
-	wire.since_ns = virtual_bench_now_ns(&b);
-	vm.each_frame = read_frame;
-}
+static struct output_watch wire;
 
 static struct admin_reply set_led(const char *channel, uint64_t raw)
 {
@@ -79,7 +37,7 @@ static void open_live(unsigned slaves, uint64_t seed, const char *setting)
 		&b, &(struct virtual_spec){ .slaves = slaves, .seed = seed, .ppm = { 30, -40 } });
 	virtual_master_init(&vm, &b, settings);
 	virtual_master_settle(&vm);
-	CHECK_EQ(set_led("a.led", 1).result, 0);
+	output_watch_set(&vm, "a.led", 1);
 	virtual_master_run(&vm, 20);
 	virtual_master_forget(&vm);
 }
@@ -161,7 +119,7 @@ static int64_t time_to_safe(int64_t after_ns, int with_sdo)
 
 	snprintf(line, sizeof(line), "at=%lldns al-error slave=0 code=0x%04x", (long long)after_ns,
 		 OUTPUT_AL_ERROR_CODE);
-	watch_wire();
+	output_watch_begin(&wire, &vm);
 	fall_ns = wire.since_ns + after_ns;
 	virtual_bench_fault(&b, line);
 	if (with_sdo) {
@@ -176,7 +134,7 @@ static int64_t time_to_safe(int64_t after_ns, int with_sdo)
 	CHECK(wire.safe >= 5);
 	CHECK(wire.first_al_ns > fall_ns);
 	CHECK_EQ(wire.newest_live_ns, wire.first_al_ns);
-	vm.each_frame = NULL;
+	output_watch_end(&vm);
 	return wire.first_safe_ns - fall_ns;
 }
 
@@ -238,13 +196,13 @@ TEST(sim_fail_safe, no_sample_is_good_from_the_cycle_on_that_shows_a_slave_out_o
 TEST(sim_fail_safe, without_the_monitor_the_service_thread_still_makes_outputs_safe)
 {
 	open_live(2, 8, "bus.monitor=off");
-	watch_wire();
+	output_watch_begin(&wire, &vm);
 	virtual_bench_fault(&b, "at=0s al-error slave=0 code=0x001a");
 	virtual_master_run(&vm, 150);
 	CHECK_EQ(atomic_load(&stats()->op_lost), 0);
 	CHECK(wire.live > 2);
 	CHECK(wire.safe > 2);
-	vm.each_frame = NULL;
+	output_watch_end(&vm);
 	wait_for_op(1000);
 	close_all();
 }
@@ -256,7 +214,7 @@ TEST(sim_fail_safe, a_slave_without_power_is_missed_in_one_cycle)
 	struct event ev;
 
 	open_live(2, 9, NULL);
-	watch_wire();
+	output_watch_begin(&wire, &vm);
 	virtual_bench_fault(&b, "at=0s power-off slave=1");
 	virtual_master_run(&vm, 2);
 	CHECK_EQ(virtual_master_sample(&vm)->flags & SAMPLE_NOT_OP, SAMPLE_NOT_OP);
@@ -267,7 +225,7 @@ TEST(sim_fail_safe, a_slave_without_power_is_missed_in_one_cycle)
 	virtual_master_run(&vm, 2);
 	CHECK(wire.live <= 2);
 	CHECK(wire.safe >= 1);
-	vm.each_frame = NULL;
+	output_watch_end(&vm);
 	virtual_bench_fault(&b, "at=0s power-on slave=1");
 	wait_for_op(3000);
 	CHECK_EQ(atomic_load(&stats()->slaves_found), 2);
@@ -285,11 +243,11 @@ TEST(sim_fail_safe, a_stranger_is_counted_in_one_cycle_and_leaves_our_outputs_al
 	virtual_master_init(&vm, &b,
 			    (const char *const[]){ "slaves[0].name=a", "slaves[1].name=b", NULL });
 	virtual_master_settle(&vm);
-	CHECK_EQ(set_led("a.led", 1).result, 0);
+	output_watch_set(&vm, "a.led", 1);
 	CHECK_EQ(atomic_load(&stats()->slaves_found), 2);
 	CHECK_EQ(atomic_load(&stats()->cycles_with_stranger), 0);
 	virtual_master_run(&vm, 20);
-	watch_wire();
+	output_watch_begin(&wire, &vm);
 	virtual_bench_fault(&b, "at=0s plug slave=2");
 	steps = atomic_load(&stats()->cycles);
 	virtual_master_run(&vm, 2);
@@ -371,10 +329,10 @@ TEST(sim_fail_safe, an_overrun_with_policy_stop_sends_fail_safe_values_first)
 	open_live(2, 5, "cycle.overrun=stop");
 	virtual_master_run(&vm, 50);
 	in_process_stall(b.host, 3 * PERIOD_NS);
-	watch_wire();
+	output_watch_begin(&wire, &vm);
 	CHECK_EQ(virtual_master_run(&vm, 20), -ETIME);
 	CHECK(wire.live <= 1); /* the frame that was due when it was late */
 	CHECK(wire.safe >= 3);
-	vm.each_frame = NULL;
+	output_watch_end(&vm);
 	close_all();
 }
