@@ -74,3 +74,45 @@ def test_a_tool_finds_the_fault(tmp_path: Path, name: str, text: str, command: l
     result = tools.run([*command, name, *tail], cwd=tmp_path)
     assert result.returncode != 0, result.stdout + result.stderr
     assert name in result.stdout + result.stderr
+
+
+NINJA = """
+rule cc
+  command = gcc -MD -MF $out.d -o $out -c $in
+  depfile = $out.d
+  deps = gcc
+build a.o: cc ../a.c
+"""
+
+
+def build_sample(root: Path, monkeypatch: pytest.MonkeyPatch) -> str | None:
+    """The key of a.c, which includes a.h, in the tree @root after a build."""
+    monkeypatch.setattr(tools, "ROOT", root)
+    (root / "build").mkdir(exist_ok=True)
+    (root / "build" / "build.ninja").write_text(NINJA)
+    (root / "a.c").write_text('#include "a.h"\nint a = A;\n')
+    tools.run(["ninja", "-C", str(root / "build")])
+    return sample_key(root)
+
+
+def sample_key(root: Path) -> str | None:
+    tools.compiled_from.cache_clear()
+    tools.digest.cache_clear()
+    command = ["gcc", "-o", "a.o", "-c", str(root / "a.c")]
+    return tools.tidy_key("a.c", command, root / "build")
+
+
+def test_a_verdict_is_remembered_for_the_text_of_a_file_and_its_headers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here, there = tmp_path / "here", tmp_path / "there"
+    for root in (here, there):
+        root.mkdir()
+        (root / "a.h").write_text("#define A 1\n")
+    key = build_sample(here, monkeypatch)
+    assert key
+    (here / "a.h").write_text("#define A 2\n")
+    assert sample_key(here) is None, "changed since the build, which may know too few headers"
+    other = build_sample(here, monkeypatch)
+    assert other not in (None, key)
+    assert build_sample(there, monkeypatch) == key, "wherever the tree is"

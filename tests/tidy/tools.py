@@ -50,40 +50,48 @@ def compile_commands(build: Path) -> dict[str, list[str]]:
     return commands
 
 
-def tidy_key(name: str, command: list[str], build: Path) -> str:
-    """What clang-tidy's verdict on a file depends on: the file, its headers, the checks."""
-    listed = run([*command[:1], "-MM", *strip_output(command[1:])], cwd=build).stdout
-    headers = re.findall(r"\S+\.h\b", listed)
-    configs = [parent / ".clang-tidy" for parent in (ROOT / name).parents]
-    digest = hashlib.sha256(clang_tidy_version().encode() + " ".join(command).encode())
-    for path in [ROOT / name, *sorted(build / h for h in headers), *configs]:
-        if path.is_file() and path.is_relative_to(ROOT):
-            digest.update(path.read_bytes())
-    return digest.hexdigest()
+@cache
+def compiled_from(build: Path) -> dict[str, list[Path]]:
+    """The files that the last build read for each object, as Ninja keeps them."""
+    listed = run(["ninja", "-C", str(build), "--quiet", "-t", "deps"]).stdout
+    blocks = re.findall(r"^(\S+): #deps .*\(VALID\)\n((?:    .+\n)*)", listed, re.MULTILINE)
+    return {
+        target: [Path(os.path.normpath(build / line.strip())) for line in files.splitlines()]
+        for target, files in blocks
+    }
 
 
-def strip_output(arguments: list[str]) -> list[str]:
-    """The arguments without those that name what is written."""
-    kept = []
-    skip = False
-    for argument in arguments:
-        if skip:
-            skip = False
-        elif argument in ("-o", "-MF", "-MT"):
-            skip = True
-        elif argument not in ("-c", "-MD"):
-            kept.append(argument)
-    return kept
+@cache
+def digest(path: Path) -> bytes:
+    return hashlib.sha256(path.read_bytes()).digest()
+
+
+def tidy_key(name: str, command: list[str], build: Path) -> str | None:
+    """What clang-tidy's verdict on a file depends on: the file, its headers, the checks, but not
+    where the tree is. None if a file has changed since the build, which then knows no headers."""
+    target = command[command.index("-o") + 1]
+    files = compiled_from(build).get(target, [])
+    own = {path for path in files if path.is_relative_to(ROOT)}
+    built_ns = (build / target).stat().st_mtime_ns if files else 0
+    if ROOT / name not in own or any(
+        not path.exists() or path.stat().st_mtime_ns > built_ns for path in own
+    ):
+        return None
+    configs = [folder / ".clang-tidy" for folder in (ROOT / name).parents]
+    own |= {path for path in configs if path.is_file() and path.is_relative_to(ROOT)}
+    called = " ".join([clang_tidy_version(), *command]).replace(str(ROOT), "")
+    return hashlib.sha256(called.encode() + b"".join(map(digest, sorted(own)))).hexdigest()
 
 
 def clang_tidy(name: str, command: list[str], build: Path) -> str:
     """What clang-tidy finds in a file; nothing if it found nothing in the same text before."""
-    stamp = CACHE / tidy_key(name, command, build)
-    if stamp.exists():
+    key = tidy_key(name, command, build)
+    if key and (CACHE / key).exists():
         return ""
     result = run(["clang-tidy", "--quiet", "-p", str(build), name])
     if result.returncode == 0:
-        CACHE.mkdir(parents=True, exist_ok=True)
-        stamp.touch()
+        if key:
+            CACHE.mkdir(parents=True, exist_ok=True)
+            (CACHE / key).touch()
         return ""
     return result.stdout + result.stderr
