@@ -357,6 +357,13 @@ static int is_command(enum admin_verb verb)
 	return verb != ADMIN_REGISTER_READ && verb != ADMIN_SII_READ && verb != ADMIN_DIAGNOSIS;
 }
 
+int admin_command_takes_frame(enum admin_verb verb)
+{
+	return verb == ADMIN_STATE || verb == ADMIN_REGISTER_READ || verb == ADMIN_REGISTER_WRITE ||
+	       verb == ADMIN_SII_READ || verb == ADMIN_SII_WRITE || verb == ADMIN_SII_ALIAS ||
+	       verb == ADMIN_DIAGNOSIS || verb == ADMIN_ERRORS_RESET;
+}
+
 static void run_on_bus(const struct admin_target *t, struct admin_pending *pending)
 {
 	const struct admin_request *rq = &pending->request;

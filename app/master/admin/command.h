@@ -22,6 +22,8 @@ enum { ADMIN_ONESHOT_MARGIN_CYCLES = 5 };
 /* Timeout of the cycle's answer to a set of outputs; of any other request that names none. */
 #define ADMIN_CYCLE_TIMEOUT_NS (1 * NS_PER_S)
 #define ADMIN_TIMEOUT_NS (20 * NS_PER_S)
+/* From one message with data of a request to the next. */
+#define ADMIN_DATA_TIMEOUT_NS (2 * NS_PER_S)
 /* A whole EEPROM, word by word. */
 #define ADMIN_SII_TIMEOUT_NS (600 * NS_PER_S)
 /* All timeouts of a bring-up together may be longer; the client then gets a timeout error. */
@@ -75,6 +77,9 @@ void admin_command_run(const struct admin_target *target, struct admin_pending *
  * SDO that failed.
  */
 void admin_command_report(const struct admin_target *target, struct admin_pending *pending);
+
+/** 1 if each step of a request of @verb waits for a frame of its own: one of them in a pass. */
+int admin_command_takes_frame(enum admin_verb verb);
 
 /** How long a request of @verb may stay open if it does not say. */
 int64_t admin_command_timeout_ns(const struct admin_request *request);

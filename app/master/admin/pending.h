@@ -24,6 +24,7 @@ struct client; /* of the server */
 enum admin_pending_state {
 	ADMIN_PENDING_FREE,
 	ADMIN_PENDING_COLLECTING, /* its data are not complete */
+	ADMIN_PENDING_QUEUED,     /* complete, and waiting for its turn on the bus */
 	ADMIN_PENDING_OPEN,       /* executing */
 	ADMIN_PENDING_COMPLETE,   /* its answer is being sent */
 };

@@ -36,6 +36,8 @@ struct admin_server {
 	int board_fd;
 	struct client client[CLIENT_SLOTS];
 	struct admin_pending pending[ADMIN_PENDING];
+	size_t first;       /* of pending[], in the next pass */
+	int is_frame_taken; /* in this pass */
 };
 
 /* One pass. */
@@ -120,7 +122,9 @@ void admin_server_cancel_all(struct admin_server *server)
 	for (size_t i = 0; i < ADMIN_PENDING; i++) {
 		struct admin_pending *pending = &server->pending[i];
 
-		if (pending->state == ADMIN_PENDING_OPEN && !pending->is_cancelled) {
+		if (pending->state == ADMIN_PENDING_QUEUED) {
+			admin_pending_complete(pending, -ECANCELED);
+		} else if (pending->state == ADMIN_PENDING_OPEN && !pending->is_cancelled) {
 			pending->is_cancelled = 1;
 			if (pending->cancel != NULL) {
 				pending->cancel(pending);
@@ -270,12 +274,40 @@ static struct admin_pending *find_place(const struct pass *pass, struct client *
 	return place;
 }
 
+/* 1 if @pending may go on in this pass: however many clients ask for frames, the bus is not kept
+ * waiting for more than one of them. */
+static int take_turn(struct admin_server *server, const struct admin_pending *pending)
+{
+	if (!admin_command_takes_frame((enum admin_verb)pending->request.verb)) {
+		return 1;
+	}
+	if (server->is_frame_taken) {
+		return 0;
+	}
+	server->is_frame_taken = 1;
+	server->first = (size_t)(pending - server->pending) + 1;
+	return 1;
+}
+
+static void start(const struct pass *pass, struct admin_pending *pending)
+{
+	if (!take_turn(pass->server, pending)) {
+		pending->state = ADMIN_PENDING_QUEUED;
+		return;
+	}
+	pending->state = ADMIN_PENDING_OPEN;
+	admin_command_run(pass->target, pending);
+}
+
 static void execute(const struct pass *pass, struct admin_pending *pending)
 {
-	pending->give_up =
-		mono_add(pass->now, (span_t){ admin_command_timeout_ns(&pending->request) });
+	int64_t limit_ns = pending->state == ADMIN_PENDING_OPEN
+				   ? admin_command_timeout_ns(&pending->request)
+				   : ADMIN_DATA_TIMEOUT_NS;
+
+	pending->give_up = mono_add(pass->now, (span_t){ limit_ns });
 	if (pending->state == ADMIN_PENDING_OPEN) {
-		admin_command_run(pass->target, pending);
+		start(pass, pending);
 	}
 	if (pending->state == ADMIN_PENDING_COMPLETE) {
 		send_answer(pass, pending);
@@ -441,20 +473,39 @@ static void serve_offer(const struct admin_server *server)
 	}
 }
 
+static const char *late_text(const struct admin_pending *pending)
+{
+	if (pending->state == ADMIN_PENDING_COLLECTING) {
+		return "the rest of its data did not come in time";
+	}
+	return pending->request.verb == ADMIN_SET || pending->request.verb == ADMIN_ONESHOT
+		       ? "withdrawn: no frame came back with the values in time, or the outputs "
+			 "are at fail-safe"
+		       : "not answered in time";
+}
+
+static void go_on(const struct pass *pass, struct admin_pending *pending)
+{
+	if (pending->state == ADMIN_PENDING_QUEUED) {
+		start(pass, pending);
+	} else if (pending->state == ADMIN_PENDING_OPEN && pending->poll != NULL &&
+		   take_turn(pass->server, pending)) {
+		pending->poll(pending, pass->target);
+	}
+}
+
+static int is_open(const struct admin_pending *pending)
+{
+	return pending->state == ADMIN_PENDING_OPEN || pending->state == ADMIN_PENDING_QUEUED;
+}
+
 /* 1 if it has to be looked at again soon. */
 static int attend(const struct pass *pass, struct admin_pending *pending)
 {
-	if (pending->state == ADMIN_PENDING_OPEN && pending->poll != NULL) {
-		pending->poll(pending, pass->target);
-	}
-	if ((pending->state == ADMIN_PENDING_OPEN || pending->state == ADMIN_PENDING_COLLECTING) &&
+	go_on(pass, pending);
+	if ((is_open(pending) || pending->state == ADMIN_PENDING_COLLECTING) &&
 	    pending->client != NULL && pass->now.ns >= pending->give_up.ns) {
-		end_early(pass, pending, -ETIMEDOUT,
-			  pending->request.verb == ADMIN_SET ||
-					  pending->request.verb == ADMIN_ONESHOT
-				  ? "withdrawn: no frame came back with the values in "
-				    "time, or the outputs are at fail-safe"
-				  : "not answered in time");
+		end_early(pass, pending, -ETIMEDOUT, late_text(pending));
 	}
 	if (pending->state == ADMIN_PENDING_OPEN && pending->client != NULL &&
 	    pending->has_progress) {
@@ -463,15 +514,17 @@ static int attend(const struct pass *pass, struct admin_pending *pending)
 	if (pending->state == ADMIN_PENDING_COMPLETE) {
 		send_answer(pass, pending);
 	}
-	return pending->state == ADMIN_PENDING_OPEN || pending->state == ADMIN_PENDING_COMPLETE;
+	return is_open(pending) || pending->state == ADMIN_PENDING_COMPLETE;
 }
 
 unsigned admin_server_service(struct admin_server *server, const struct admin_target *target,
 			      mono_t now)
 {
 	const struct pass pass = { .server = server, .target = target, .now = now };
+	size_t first = server->first;
 	unsigned waiting = 0;
 
+	server->is_frame_taken = 0;
 	serve_offer(server);
 	accept_clients(&pass);
 	for (size_t i = 0; i < CLIENT_SLOTS; i++) {
@@ -484,7 +537,7 @@ unsigned admin_server_service(struct admin_server *server, const struct admin_ta
 		}
 	}
 	for (size_t i = 0; i < ADMIN_PENDING; i++) {
-		waiting += (unsigned)attend(&pass, &server->pending[i]);
+		waiting += (unsigned)attend(&pass, &server->pending[(first + i) % ADMIN_PENDING]);
 	}
 	return waiting;
 }

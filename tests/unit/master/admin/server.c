@@ -582,6 +582,146 @@ TEST(admin_server, a_client_has_eight_requests_open_at_most_and_ids_are_its_own)
 	bench_close(&b);
 }
 
+TEST(admin_server, data_that_were_announced_and_do_not_come_end_the_request_after_two_seconds)
+{
+	struct bench b;
+	struct admin_request rq = fake_request(ADMIN_SII_WRITE);
+	int fd;
+
+	bench_open(&b);
+	fd = bench_connect(&b);
+	rq.id = 3;
+	rq.data_total = ADMIN_TRANSFER_BYTES;
+	rq.data_len = ADMIN_DATA_BYTES;
+	ask(fd, &rq);
+	service(&b);
+	rq.verb = ADMIN_DATA;
+	rq.data_offset = ADMIN_DATA_BYTES;
+	b.now.ns += ADMIN_DATA_TIMEOUT_NS - 1;
+	ask(fd, &rq); /* the next part has a time of its own */
+	service(&b);
+	b.now.ns += ADMIN_DATA_TIMEOUT_NS - 1;
+	service(&b);
+	CHECK(!has_answer(fd));
+	b.now.ns += 1;
+	service(&b);
+	CHECK_EQ(answer(fd).result, -ETIMEDOUT);
+	CHECK_EQ(b.fake.frames, 0);
+	close(fd);
+	bench_close(&b);
+}
+
+/* --- clients that ask for too much --- */
+
+/* @count clients, each with as many requests of @verb as it may have open. */
+static void connect_and_flood(struct bench *b, int *ret_fd, int count, enum admin_verb verb)
+{
+	struct admin_request rq = fake_request(verb);
+
+	rq.length = 1;
+	rq.argument[0] = 2;
+	for (int i = 0; i < count; i++) {
+		ret_fd[i] = bench_connect(b);
+		for (rq.id = 0; rq.id < 8; rq.id++) {
+			ask(ret_fd[i], &rq);
+		}
+	}
+}
+
+TEST(admin_server, requests_for_frames_get_one_in_a_pass_and_none_is_forgotten)
+{
+	enum { CLIENTS = 7, OPEN = 8 * CLIENTS };
+	struct bench b;
+	struct admin_request rq = fake_request(ADMIN_DIAGNOSIS);
+	int fd[CLIENTS];
+	int other;
+	unsigned passes = 0;
+
+	bench_open(&b);
+	connect_and_flood(&b, fd, CLIENTS, ADMIN_STATE);
+	other = bench_connect(&b);
+	CHECK_EQ(service(&b), OPEN);
+	CHECK_EQ(b.fake.frames, 1);
+	ask(other, &rq);
+	while (!has_answer(other)) {
+		service(&b);
+		CHECK_EQ(b.fake.frames, 2 + passes);
+		passes++;
+	}
+	CHECK(passes <= ADMIN_PENDING);
+	CHECK_EQ(answer(other).result, 0);
+	b.now.ns += ADMIN_TIMEOUT_NS;
+	service(&b);
+	for (int i = 0; i < CLIENTS; i++) {
+		for (int n = 0; n < 8; n++) {
+			CHECK_EQ(answer(fd[i]).result, -ETIMEDOUT);
+		}
+		close(fd[i]);
+	}
+	close(other);
+	bench_close(&b);
+}
+
+TEST(admin_server, requests_that_wait_for_their_frame_can_be_cancelled_and_lose_their_client)
+{
+	struct bench b;
+	struct admin_request cancel = fake_request(ADMIN_CANCEL);
+	int fd[2];
+
+	bench_open(&b);
+	connect_and_flood(&b, fd, 2, ADMIN_REGISTER_READ);
+	CHECK_EQ(service(&b), 15);
+	CHECK_EQ(b.fake.frames, 1);
+	CHECK_EQ(answer(fd[0]).result, 0);
+	cancel.id = 7;
+	ask(fd[0], &cancel);
+	close(fd[1]);
+	service(&b);
+	CHECK_EQ(b.fake.frames, 2);
+	admin_server_cancel_all(b.server);
+	CHECK_EQ(service(&b), 0);
+	CHECK_EQ(b.fake.frames, 2);
+	for (int n = 0; n < 7; n++) {
+		int result = answer(fd[0]).result;
+
+		CHECK(result == (n == 1 ? 0 : -ECANCELED) || result == (n == 0 ? -ECANCELED : 0));
+	}
+	CHECK(!has_answer(fd[0]));
+	close(fd[0]);
+	bench_close(&b);
+}
+
+TEST(admin_server, a_client_with_a_thousand_requests_delays_no_other)
+{
+	struct bench b;
+	struct admin_request rq = fake_request(ADMIN_SDO_READ);
+	struct admin_request ping = fake_request(ADMIN_PING);
+	int flood;
+	int other;
+	int is_open = 1;
+
+	bench_open(&b);
+	b.fake.is_sdo_slow = 1;
+	flood = bench_connect(&b);
+	other = bench_connect(&b);
+	for (rq.id = 0; rq.id < 1000 && is_open; rq.id++) {
+		is_open = send(flood, &rq, sizeof(rq), MSG_DONTWAIT | MSG_NOSIGNAL) == sizeof(rq);
+		ask(other, &ping);
+		CHECK(service(&b) <= 8);
+		CHECK_EQ(answer(other).result, 0);
+	}
+	CHECK(!is_open); /* it does not read its answers: it is closed */
+	CHECK_EQ(b.fake.cancels, 8);
+	b.fake.is_sdo_slow = 0;
+	rq.id = 1;
+	ask(other, &rq);
+	CHECK_EQ(service(&b), 0);
+	CHECK_EQ(answer(other).result, 0);
+	close(flood);
+	close(other);
+	bench_close(&b);
+}
+
 TEST(admin_server, a_path_that_cannot_be_bound_is_reported_in_one_line)
 {
 	struct admin_server *server = NULL;

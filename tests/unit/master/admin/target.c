@@ -85,6 +85,27 @@ static void sdo(void *ctx, struct admin_pending *pending)
 	admin_pending_complete(pending, fake->sdo_result);
 }
 
+static void poll_bus(struct admin_pending *pending, const struct admin_target *target)
+{
+	struct fake *fake = target->ctx;
+
+	(void)pending;
+	fake->frames++;
+}
+
+/* A register takes one frame, the state of a slave one in each pass. */
+static void bus_request(void *ctx, struct admin_pending *pending)
+{
+	struct fake *fake = ctx;
+
+	fake->frames++;
+	if (pending->request.verb == ADMIN_STATE) {
+		pending->poll = poll_bus;
+	} else {
+		admin_pending_complete(pending, 0);
+	}
+}
+
 static void stop(void *ctx)
 {
 	struct fake *fake = ctx;
@@ -118,6 +139,7 @@ struct admin_target fake_target(struct fake *fake)
 		.is_op = 1,
 		.dc_now = dc_now,
 		.sdo = sdo,
+		.bus_request = bus_request,
 		.stop = stop,
 		.clear = clear,
 		.emit = emit,

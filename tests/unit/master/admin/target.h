@@ -22,6 +22,7 @@ struct fake {
 	int is_cancel_slow; /* also after it was cancelled */
 	int cancels;
 	struct admin_pending *pending; /* of the last SDO */
+	unsigned frames;               /* that requests to the bus have taken */
 	struct event event[FAKE_EVENTS];
 	unsigned events;
 };
