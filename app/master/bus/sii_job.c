@@ -34,7 +34,9 @@ enum {
 
 static int fail(struct sii_job *job, int code, const char *what)
 {
-	snprintf(job->error, sizeof(job->error), "slave %zu: %s", job->pos, what);
+	job->bus->error = job->error;
+	bus_fail_slave(job->bus, job->pos, code, "%s", what);
+	job->bus->error = NULL; /* the job may be freed before the next call */
 	return code;
 }
 
@@ -321,7 +323,12 @@ int sii_job_step(struct sii_job *job)
 static int begin(struct sii_job *job, struct bus *bus, size_t pos, enum sii_job_kind kind)
 {
 	*job = (struct sii_job){ .kind = kind, .pos = pos, .bus = bus };
-	return pos < bus->slave_count ? 0 : fail(job, -ENODEV, "there is no such slave");
+	if (pos < bus->slave_count) {
+		return 0;
+	}
+	snprintf(job->error, sizeof(job->error), "no slave at position %zu: there are %zu", pos,
+		 bus->slave_count);
+	return -ENODEV;
 }
 
 int sii_job_read(struct sii_job *job, struct bus *bus, size_t pos, uint8_t *image, size_t capacity)

@@ -186,13 +186,17 @@ static void start_job(struct session *s, struct admin_pending *pending)
 {
 	size_t room = pending->request.verb == ADMIN_SII_READ ? SII_LIMIT_BYTES : 0;
 	struct sii_request *sr;
+	size_t count;
 	int r;
 
 	if (s->sii != NULL) {
+		const struct slave_info *slaves = bus_slaves(s->bus, &count);
+
 		admin_pending_refuse(pending, -EBUSY,
-				     "the EEPROM of slave %u is being read or written: one at a "
-				     "time",
-				     s->sii->request.slave_pos);
+				     "the EEPROM of slave %u (%s) is being read or written: one "
+				     "at a time",
+				     s->sii->request.slave_pos,
+				     slaves[s->sii->request.slave_pos].name);
 		return;
 	}
 	sr = calloc(1, sizeof(*sr) + room);

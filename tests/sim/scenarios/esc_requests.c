@@ -215,7 +215,8 @@ TEST(esc_requests, a_read_of_an_eeprom_ends_when_the_bus_is_taken_down)
 	CHECK_EQ(virtual_master_run(&vm, 100), SESSION_GOES_ON);
 	reply = ask(ADMIN_SII_READ, 1, 0, 0);
 	CHECK_EQ(reply.result, -EBUSY);
-	CHECK_STR(reply.text, "the EEPROM of slave 0 is being read or written: one at a time");
+	CHECK_STR(reply.text,
+		  "the EEPROM of slave 0 (piccolo0) is being read or written: one at a time");
 	CHECK_EQ(virtual_master_ask(&vm, &rescan).result, 0);
 	do {
 		CHECK_EQ(recv(fd, &reply, sizeof(reply), MSG_DONTWAIT), sizeof(reply));
