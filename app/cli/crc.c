@@ -19,13 +19,13 @@ struct crc {
 
 static void show_text(const struct crc *crc, uint16_t pos, const struct admin_diagnosis *found)
 {
-	printf("%3u %s\n", pos, source_slave(crc->page, pos).name);
+	printf("%3u %s\n"
+	       "    port  state  invalid frames  receive errors  forwarded  lost links\n",
+	       pos, source_slave(crc->page, pos).name);
 	for (unsigned i = 0; i < ADMIN_PORTS; i++) {
 		const struct admin_port *port = &found->port[i];
 
-		printf("    port %u %-5s %3u invalid frames, %3u receive errors, %3u forwarded, "
-		       "%3u lost links\n",
-		       i,
+		printf("    %-4u  %-5s  %14u  %14u  %9u  %10u\n", i,
 		       port->is_communicating ? "open"
 		       : port->is_link        ? "link"
 					      : "-",

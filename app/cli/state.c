@@ -60,11 +60,11 @@ static void show_text(const struct status_page *page)
 		uint32_t code = GET(page->slave[i].al_status_code);
 
 		slave_state(page, i, state, sizeof(state));
-		printf("%3u %-16s %s", i, source_slave(page, i).name, state);
+		printf("%3u %-16s %s\n", i, source_slave(page, i).name, state);
 		if (code != 0) {
-			printf("  0x%04x %s", code, al_status_code_to_str((uint16_t)code));
+			printf("    AL status code 0x%04x: %s\n", code,
+			       al_status_code_to_str((uint16_t)code));
 		}
-		putchar('\n');
 	}
 }
 

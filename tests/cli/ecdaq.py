@@ -33,8 +33,14 @@ def environment(run_dir: Path | None, **more: str) -> dict[str, str]:
     return kept | more
 
 
-def ecdaq(run_dir: Path | None, *words: str, user: int | None = None, **more: str) -> Result:
-    """Run ecdaq to its end."""
+def ecdaq(
+    run_dir: Path | None,
+    *words: str,
+    user: int | None = None,
+    groups: Sequence[int] = (),
+    **more: str,
+) -> Result:
+    """Run ecdaq to its end; as @user of @groups, if given."""
     return subprocess.run(
         [ECDAQ, *words],
         env=environment(run_dir, **more),
@@ -46,7 +52,7 @@ def ecdaq(run_dir: Path | None, *words: str, user: int | None = None, **more: st
         check=False,
         user=user,
         group=user,
-        extra_groups=None if user is None else [],
+        extra_groups=None if user is None else groups,
     )
 
 
@@ -98,8 +104,10 @@ class Fake:
         assert self.process.stdout is not None
         assert self.process.stdout.readline() == "ready\n"
 
-    def __call__(self, *words: str, user: int | None = None, **more: str) -> Result:
-        return ecdaq(self.run_dir, *words, user=user, **more)
+    def __call__(
+        self, *words: str, user: int | None = None, groups: Sequence[int] = (), **more: str
+    ) -> Result:
+        return ecdaq(self.run_dir, *words, user=user, groups=groups, **more)
 
     def start(self, *words: str, **options: Any) -> subprocess.Popen[str]:
         """Start ecdaq and leave it running."""

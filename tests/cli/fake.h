@@ -32,6 +32,7 @@ struct fake {
 	const char *admin;
 	unsigned mode;
 	unsigned slaves; /* claimed on the status page */
+	int has_long_names;
 	uint64_t page_faults;
 	unsigned control;  /* calls of a control program; 0: there is none */
 	uint32_t degraded; /* bit per enum event_rt */

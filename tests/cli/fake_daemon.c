@@ -116,6 +116,8 @@ static void parse(struct fake *f, int argc, char **argv)
 			f->mode = (unsigned)strtoul(value, NULL, 8);
 		} else if (strcmp(argv[i], "SLAVES") == 0) {
 			f->slaves = (unsigned)strtoul(value, NULL, 10);
+		} else if (strcmp(argv[i], "LONG") == 0) {
+			f->has_long_names = value[0] == '1';
 		} else if (strcmp(argv[i], "FAULTS") == 0) {
 			f->page_faults = strtoull(value, NULL, 10);
 		} else if (strcmp(argv[i], "CONTROL") == 0) {

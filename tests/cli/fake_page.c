@@ -8,6 +8,7 @@
 
 #include "base/clock.h"
 #include "fake.h"
+#include "wire/al.h"
 
 int64_t fake_clock_ns(clockid_t clock)
 {
@@ -152,6 +153,13 @@ void fake_make_status(struct fake *f)
 	for (unsigned s = 0; s < SLAVES; s++) {
 		page->slave[s].info = f->meta.slave[s];
 		page->slave[s].al_state = 8;
+	}
+	for (unsigned s = 0; f->has_long_names && s < f->slaves && s < LIMIT_SLAVES; s++) {
+		char *name = page->slave[s].info.name;
+
+		memset(name, 'n', sizeof(page->slave[s].info.name) - 1);
+		page->slave[s].al_state = AL_SAFEOP | AL_ERROR;
+		page->slave[s].al_status_code = 0x002d;
 	}
 	describe_control(&page->control, f->control);
 	page->slave[1].dc_diff_ns = -7;

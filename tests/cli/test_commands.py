@@ -304,11 +304,27 @@ def test_crc_shows_the_counters_and_resets_them(daemon: Fake) -> None:
     assert [port["receive_errors"] for port in shown[0]["port"]] == [7, 0, 0, 0]
     assert (shown[0]["port"][0]["open"], shown[0]["pdi_errors"]) == (True, 3)
     assert shown[0]["watchdog_pdi"] is None
-    assert "  7 receive errors" in works(daemon("crc", "0", "--reset"))
-    assert "  0 receive errors" in works(daemon("crc", "0"))
+    port = "    0     open   {:14}  {:14}  {:9}  {:10}"
+    assert port.format(0, 7, 0, 0) in works(daemon("crc", "0", "--reset")).splitlines()
+    assert port.format(0, 0, 0, 0) in works(daemon("crc", "0")).splitlines()
 
 
 def test_crc_goes_on_behind_a_slave_that_does_not_answer(daemon: Fake) -> None:
     result = daemon("crc", "1", "0")
     fails(result, REFUSED, "slave 1: no frame came back")
     assert "0 piccolo0" in result.stdout
+
+
+def test_sixty_four_slaves_with_long_names_fit_80_columns(fake: Callable[..., Fake]) -> None:
+    daemon = fake("SLAVES=64", "LONG=1")
+    lines = works(daemon("state")).splitlines()
+    assert lines[-2] == f" 63 {'n' * 31} SAFE-OP+ERROR"
+    assert lines[-1].startswith("    AL status code 0x002d: ")
+    assert len(lines) == 2 + 2 * 64  # with the message
+    lines += works(daemon("crc", "0")).splitlines()
+    lines += works(daemon("sii", "read", "0")).splitlines()
+    lines += works(daemon("reg", "read", "0", "0x0000", "256")).splitlines()
+    assert max(len(line) for line in lines) <= 80
+    shown = json_of(daemon("state", "--json"))["slave"]
+    assert [slave["position"] for slave in shown] == list(range(64))
+    assert {slave["name"] for slave in shown} == {"n" * 31}

@@ -45,10 +45,26 @@ def test_what_may_not_be_read_is_named(daemon: Fake, words: list[str]) -> None:
     fails(daemon(*words, user=NOBODY), PERMISSION, "no permission to read", remedy)
 
 
+COMMANDS = [
+    ["set", "piccolo0.led=1"],
+    ["clear"],
+    ["stop"],
+    ["oneshot", "all", "--in", "1s"],
+    ["state", "PREOP"],
+    ["state", "PREOP", "0"],
+    ["rescan", "--force"],
+    ["sdo", "read", "0", "0x1018:1"],
+    ["sdo", "write", "0", "0x8000:2", "5", "--type", "UINT"],
+    ["reg", "read", "0", "0x0130"],
+    ["reg", "write", "0", "0x0f80", "1"],
+    ["sii", "read", "0"],
+    ["sii", "alias", "0", "5"],
+    ["crc", "0"],
+]
+
+
 @needs_nobody
-@pytest.mark.parametrize(
-    "words", [["set", "piccolo0.led=1"], ["clear"], ["stop"], ["oneshot", "all", "--in", "1s"]]
-)
+@pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
 def test_commands_need_the_group_of_the_socket(daemon: Fake, words: list[str]) -> None:
     # Everyone may read here, so that it is the socket that rejects.
     for name in ("status", "samples", "events"):
@@ -56,6 +72,16 @@ def test_commands_need_the_group_of_the_socket(daemon: Fake, words: list[str]) -
     fails(
         daemon(*words, user=NOBODY), PERMISSION, "permission denied: run as root or join its group"
     )
+
+
+@needs_nobody
+@pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
+def test_a_member_of_the_group_may_command(daemon: Fake, words: list[str]) -> None:
+    group = 4711
+    for path in daemon.run_dir.iterdir():
+        os.chown(path, -1, group)
+        path.chmod(0o660 if path.name == "admin" else 0o640)
+    works(daemon(*words, user=NOBODY, groups=[group]))
 
 
 @pytest.mark.parametrize("name", ["status", "samples", "events"])
