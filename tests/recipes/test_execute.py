@@ -35,3 +35,13 @@ def test_a_disk_image_takes_the_space_of_its_data(tmp_path: Path) -> None:
     assert copy.read_bytes() == (source / "disk.img").read_bytes()
     assert copy.stat().st_blocks * 512 < 1 << 20
     assert (tmp_path / "target" / "link").is_symlink()
+
+
+def test_an_image_that_is_made_is_still_copied_to_the_build_folder(
+    metadata: Metadata, tmp_path: Path
+) -> None:
+    executor = Executor(Graph(metadata), tmp_path, 1)
+    goal = Task("ecdaq-image", "do_build")
+    for task in executor.plan(goal):
+        executor._write_stamp(task)
+    assert executor.plan(goal) == [Task("ecdaq-image", "do_deploy"), goal]

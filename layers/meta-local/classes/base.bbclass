@@ -35,6 +35,7 @@ python do_unpack() {
 
 addtask build after do_unpack
 do_build[noexec] = "1"
+do_build[nostamp] = "1"
 do_build() {
     :
 }
