@@ -12,7 +12,6 @@
 #include "sim/harness/run_dir.h"
 
 enum {
-	SERVICE_CYCLES = 10,     /* the service loop runs once in so many cycles */
 	REPLY_CYCLES = 2000,     /* an answer has to come within so many */
 	TRANSFER_CYCLES = 60000, /* the same of one with much data */
 	SETTLE_CYCLES = 100,     /* behind the bring-up, before a test begins to count */
@@ -356,7 +355,7 @@ static int run_cycles(struct virtual_master *vm, uint64_t cycles)
 		int ended = has_cycle_ended(vm);
 
 		step_cycle(vm);
-		if (ended || ++vm->steps >= SERVICE_CYCLES) {
+		if (ended || ++vm->steps >= VIRTUAL_SERVICE_CYCLES) {
 			vm->steps = 0;
 			r = session_service(vm->session, &vm->failure);
 			take_samples(vm);
@@ -372,7 +371,7 @@ static int serve(struct virtual_master *vm, uint64_t periods)
 
 	for (uint64_t i = 0; i < periods && r == SESSION_GOES_ON; i++) {
 		advance_clock(vm, (mono_t){ door_now(vm).ns + vm->cfg.cycle_period_ns });
-		if (++vm->steps >= SERVICE_CYCLES) {
+		if (++vm->steps >= VIRTUAL_SERVICE_CYCLES) {
 			vm->steps = 0;
 			r = session_service(vm->session, &vm->failure);
 		}
@@ -492,8 +491,8 @@ struct admin_reply virtual_master_transfer(struct virtual_master *vm,
 	int fd = virtual_master_connect(vm);
 
 	send_request(fd, request, tr->data, tr->data_len);
-	for (int i = 0; i < TRANSFER_CYCLES / SERVICE_CYCLES; i++) {
-		if (virtual_master_run(vm, SERVICE_CYCLES) == SESSION_RESTART) {
+	for (int i = 0; i < TRANSFER_CYCLES / VIRTUAL_SERVICE_CYCLES; i++) {
+		if (virtual_master_run(vm, VIRTUAL_SERVICE_CYCLES) == SESSION_RESTART) {
 			virtual_master_bring_up(vm);
 		}
 		while (recv(fd, &reply, sizeof(reply), MSG_DONTWAIT) == (ssize_t)sizeof(reply)) {
@@ -517,8 +516,8 @@ struct admin_reply virtual_master_ask(struct virtual_master *vm,
 	int fd = virtual_master_connect(vm);
 
 	CHECK_EQ(send(fd, request, sizeof(*request), 0), sizeof(*request));
-	for (int i = 0; i < REPLY_CYCLES / SERVICE_CYCLES; i++) {
-		if (virtual_master_run(vm, SERVICE_CYCLES) == SESSION_RESTART) {
+	for (int i = 0; i < REPLY_CYCLES / VIRTUAL_SERVICE_CYCLES; i++) {
+		if (virtual_master_run(vm, VIRTUAL_SERVICE_CYCLES) == SESSION_RESTART) {
 			virtual_master_bring_up(vm);
 		}
 		if (recv(fd, &reply, sizeof(reply), MSG_DONTWAIT) == (ssize_t)sizeof(reply)) {

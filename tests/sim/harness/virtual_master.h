@@ -16,6 +16,8 @@
 #include "daemon/session.h"
 #include "sim/harness/virtual_bench.h"
 
+enum { VIRTUAL_SERVICE_CYCLES = 10 }; /* the service loop runs once in so many cycles */
+
 /* Summary of the samples. All counts are of samples read from the ring. */
 struct virtual_result {
 	uint64_t samples;
