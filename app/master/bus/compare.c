@@ -6,6 +6,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/limits.h"
+
 struct text {
 	char *buf;
 	size_t bytes;
@@ -216,9 +218,9 @@ void compare_apply(const struct config *cfg, const int *config, size_t found_cou
 
 /* --- why it is not possible --- */
 
-/* The found one is another of the configured slaves: they were exchanged. */
-static void append_other(struct text *text, const struct config *cfg, size_t not_this,
-			 const struct slave_info *found, unsigned id)
+/* The configured slave other than @not_this that the found one is: they were exchanged; or -1. */
+static int find_other(const struct config *cfg, size_t not_this, const struct slave_info *found,
+		      unsigned id)
 {
 	for (size_t i = 0; i < cfg->slave_count; i++) {
 		const struct config_slave *other = &cfg->slave[i];
@@ -226,10 +228,87 @@ static void append_other(struct text *text, const struct config *cfg, size_t not
 				  other->identification != 0 || other->product != 0;
 
 		if (i != not_this && is_specific && is_wanted(other, found, id)) {
-			append(text, ", which is slave %zu%s%s", i,
-			       other->name[0] != '\0' ? " " : "", other->name);
-			return;
+			return (int)i;
 		}
+	}
+	return -1;
+}
+
+/* Configured slaves and found devices, one each, in any order. */
+struct matching {
+	const struct config *cfg;
+	const struct slave_info *found;
+	const uint16_t *id;
+	size_t found_count;
+	int config[LIMIT_SLAVES];       /* that has this device; -1: none */
+	uint8_t is_tried[LIMIT_SLAVES]; /* device, for the slave that is looking for one */
+};
+
+/* Slave @i gets a device, if need be of another slave that can have another one. */
+static int match_one(struct matching *m, size_t i)
+{
+	for (size_t j = 0; j < m->found_count; j++) {
+		if (m->is_tried[j] ||
+		    !is_wanted(&m->cfg->slave[i], &m->found[j], id_of(m->id, j))) {
+			continue;
+		}
+		m->is_tried[j] = 1;
+		if (m->config[j] < 0 || match_one(m, (size_t)m->config[j])) {
+			m->config[j] = (int)i;
+			return 1;
+		}
+	}
+	return 0;
+}
+
+static void append_name(struct text *text, const struct config *cfg, size_t i)
+{
+	append(text, "slave %zu%s%s", i, cfg->slave[i].name[0] != '\0' ? " " : "",
+	       cfg->slave[i].name);
+}
+
+/* Slaves that are at no other place either: "slave 2 pump is missing; ". */
+static void append_missing(struct text *text, struct matching *m)
+{
+	unsigned missing = 0;
+
+	for (size_t j = 0; j < m->found_count; j++) {
+		m->config[j] = -1;
+	}
+	for (size_t i = 0; i < m->cfg->slave_count; i++) {
+		memset(m->is_tried, 0, sizeof(m->is_tried));
+		if (m->cfg->slave[i].is_optional || match_one(m, i)) {
+			continue;
+		}
+		if (missing++ == 0) {
+			append_name(text, m->cfg, i);
+		}
+	}
+	if (missing > 1) {
+		append(text, " and %u more are missing; ", missing - 1);
+	} else if (missing > 0) {
+		append(text, " is missing; ");
+	}
+}
+
+/* The device at @position is not the configured slave @i. */
+static void append_wrong(struct text *text, struct matching *m, size_t i, size_t position)
+{
+	const struct config_slave *want = &m->cfg->slave[i];
+	const struct slave_info *found = &m->found[position];
+	unsigned id = id_of(m->id, position);
+	int other = find_other(m->cfg, i, found, id);
+
+	if (other >= 0) {
+		append_missing(text, m);
+	}
+	append(text, "slave %zu: wrong identity: expected ", i);
+	append_wanted(text, want);
+	append(text, ", found ");
+	append_found(text, want, found, id);
+	if (other >= 0) {
+		append(text, ", which is ");
+		append_name(text, m->cfg, (size_t)other);
 	}
 }
 
@@ -237,10 +316,10 @@ int compare_slaves(const struct config *cfg, const struct slave_info *found, con
 		   size_t found_count, char *error, size_t error_bytes)
 {
 	struct text text = { .buf = error, .bytes = error_bytes };
-	int config[LIMIT_SLAVES];
+	struct matching m = { .cfg = cfg, .found = found, .id = id, .found_count = found_count };
 	size_t j = 0; /* position */
 
-	if (compare_bind(cfg, found, id, found_count, config) == 0) {
+	if (compare_bind(cfg, found, id, found_count, m.config) == 0) {
 		return 0;
 	}
 	for (size_t i = 0; i < cfg->slave_count; i++) {
@@ -254,18 +333,13 @@ int compare_slaves(const struct config *cfg, const struct slave_info *found, con
 			continue;
 		}
 		if (j >= found_count) {
-			append(&text,
-			       "slave %zu%s%s is missing: %zu found, %zu expected; expected ", i,
-			       want->name[0] != '\0' ? " " : "", want->name, found_count,
-			       cfg->slave_count);
+			append_name(&text, cfg, i);
+			append(&text, " is missing: %zu found, %zu expected; expected ",
+			       found_count, cfg->slave_count);
 			append_wanted(&text, want);
 			return -ENXIO;
 		}
-		append(&text, "slave %zu: wrong identity: expected ", i);
-		append_wanted(&text, want);
-		append(&text, ", found ");
-		append_found(&text, want, &found[j], id_of(id, j));
-		append_other(&text, cfg, i, &found[j], id_of(id, j));
+		append_wrong(&text, &m, i, j);
 		return -ENXIO;
 	}
 	if (j < found_count) {

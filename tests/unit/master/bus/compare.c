@@ -195,6 +195,38 @@ TEST(compare, exchanged_slaves_are_both_named)
 		  "revision 0x00000005 identification 2, which is slave 1 s1");
 }
 
+TEST(compare, a_slave_missing_among_others_in_another_order_is_named)
+{
+	struct config *cfg = want_three();
+	const uint16_t id[3] = { 3, 1 };
+	char error[256] = "";
+
+	for (uint16_t i = 0; i < 3; i++) {
+		cfg->slave[i].identification = (uint16_t)(i + 1);
+		cfg->slave[i].product = 1;
+	}
+	CHECK_EQ(compare_slaves(cfg, three, id, 2, error, sizeof(error)), -ENXIO);
+	CHECK_STR(error, "slave 1 s1 is missing; slave 0: wrong identity: expected vendor "
+			 "0x00000002 product 0x00000001 revision any identification 1, found "
+			 "vendor 0x00000002 product 0x00000001 revision 0x00000005 identification "
+			 "3, which is slave 2 s2");
+	CHECK_EQ(compare_slaves(cfg, three, id, 1, error, sizeof(error)), -ENXIO);
+	CHECK(strstr(error, "slave 0 s0 and 1 more are missing; slave 0: wrong") == error);
+}
+
+/* The first device found would do for the first slave, too, but is the only one for the second. */
+TEST(compare, devices_that_fit_several_slaves_are_counted_once)
+{
+	struct config *cfg = want_three();
+	const uint16_t id[3] = { 3, 1 };
+	char error[256] = "";
+
+	cfg->slave[1].identification = 3;
+	cfg->slave[2].identification = 2;
+	CHECK_EQ(compare_slaves(cfg, three, id, 2, error, sizeof(error)), -ENXIO);
+	CHECK(strstr(error, "slave 2 s2 is missing") == error);
+}
+
 TEST(compare, revision_policy_allows_newer_or_any_revisions)
 {
 	struct config *cfg = want_three();
