@@ -9,6 +9,7 @@ import hashlib
 import json
 import re
 import subprocess
+import sys
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,13 +18,14 @@ from typing import Any
 import pytest
 from machine import TOOLS, TOP
 
+sys.path.insert(0, str(TOP / "tests" / "recipes"))
+import firmware
+
 IMAGES = TOP / "build" / "image"
 MACHINES = ("qemuarm64", "raspberrypi4-64")
 MIB = 1 << 20
 SIZES_MIB = {"boot": 128, "rootA": 512, "rootB": 512}
 KERNEL = {"qemuarm64": "Image", "raspberrypi4-64": "kernel8.img"}
-TREES = ("bcm2711-rpi-4-b.dtb", "bcm2711-rpi-cm4-io.dtb")
-FIRMWARE = ("start4.elf", "fixup4.dat", "config.txt", *TREES)
 
 
 @dataclass(frozen=True)
@@ -173,17 +175,18 @@ def test_the_block_map_covers_what_is_written(built: Built) -> None:
 def test_the_firmware_of_the_board_finds_what_it_needs(built: Built) -> None:
     if built.machine != "raspberrypi4-64":
         pytest.skip("QEMU's machine has no firmware")
-    files = {name: built.boot_file(name) for name in FIRMWARE}
+    settings = built.boot_file("config.txt").decode()
+    files = {name: built.boot_file(name) for name in sorted(firmware.files_wanted(settings))}
     assert [name for name, content in files.items() if not content] == []
     assert files["start4.elf"][:4] == b"\x7fELF"
-    for tree in TREES:
+    assert firmware.unknown_keys(settings, files["start4.elf"]) == []
+    for tree in firmware.TREES:
         assert files[tree][:4] == b"\xd0\x0d\xfe\xed", "no device tree"
         assert b"brcm,bcm2711" in files[tree]
         for needed in (b"brcm,bcm2711-genet-v5", b"brcm,bcm2711-emmc2", b"brcm,bcm2835-pm"):
             assert needed in files[tree], (tree, needed)
-    settings = files["config.txt"].decode().splitlines()
     for line in ("arm_64bit=1", "kernel=kernel8.img", "enable_uart=1", "upstream_kernel=1"):
-        assert line in settings
+        assert line in settings.splitlines()
 
 
 def test_the_kernel_has_the_drivers_of_the_board(built: Built) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import firmware
 import pytest
 import rules
 from conftest import MACHINES, TOP
@@ -51,6 +52,18 @@ def test_boot_files_are_where_wic_looks(metadata: Metadata) -> None:
     image = metadata.recipes["ecdaq-image"]
     assert image.value("IMAGE_BOOT_FILES")
     assert rules.boot_files(image) == []
+
+
+def test_the_boot_partition_of_a_board_has_what_its_config_txt_needs(metadata: Metadata) -> None:
+    files = dict(
+        entry.split(";") if ";" in entry else (entry, entry)
+        for entry in metadata.recipes["ecdaq-image"].value("IMAGE_BOOT_FILES").split()
+    )
+    config = next((source for source, name in files.items() if name == "config.txt"), None)
+    if config is None:
+        pytest.skip("QEMU's machine has no firmware")
+    text = (TOP / "recipes/recipes-core/ecdaq-rpi/files/config.txt").read_text()
+    assert firmware.missing(text, set(files.values())) == []
 
 
 def test_build_sh_and_the_image_build_the_same_soem(metadata: Metadata) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import firmware
 import pytest
 import rules
 import wks
@@ -172,3 +173,33 @@ def test_an_error_in_a_layout_is_reported_with_line_or_file(tmp_path: Path, line
     (tmp_path / "a.wks").write_text(GOOD + line + "\n")
     with pytest.raises(wks.WksError, match=r"a\.wks"):
         wks.parse(tmp_path / "a.wks")
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("gpu_mem=16\n", "start4cd.elf"),
+        ("gpu_mem_1024 = 31\n", "fixup4cd.dat"),
+        ("start_x=1\n", "start4x.elf"),
+        ("[cm4]\ndtoverlay=i2c-rtc,pcf85063a\n", "overlays/i2c-rtc.dtbo"),
+        ("device_tree=own.dtb\n", "own.dtb"),
+        ("kernel=kernel9.img # ours\n", "kernel9.img"),
+        ("initramfs initrd.img followkernel\nramfsfile=initrd.img\n", "initrd.img"),
+    ],
+)
+def test_a_file_that_the_firmware_does_not_find_is_named(text: str, name: str) -> None:
+    present = {"start4.elf", "fixup4.dat", "config.txt", "cmdline.txt", *firmware.TREES}
+    assert firmware.missing("gpu_mem=32\n", present) == []
+    assert name in firmware.missing(text, present)
+    assert name not in firmware.missing(text, present | {name})
+
+
+def test_a_board_without_its_device_tree_is_named() -> None:
+    present = {"start4.elf", "fixup4.dat", "config.txt", "cmdline.txt", *firmware.TREES[1:]}
+    assert firmware.missing("", present) == [firmware.TREES[0]]
+
+
+def test_a_key_that_the_firmware_does_not_know_is_named() -> None:
+    image = b"\x7fELF\0gpu_mem_256\0upstream_kernel\0"
+    text = "upstream_kernel=1\nkernel_watchdog_timeout=60\ngpu_mem=64\n"
+    assert firmware.unknown_keys(text, image) == ["kernel_watchdog_timeout"]
