@@ -105,6 +105,8 @@ def test_the_journal_is_kept_and_bounded(machine: Machine) -> None:
 def test_the_watchdog_is_fed_by_systemd(machine: Machine) -> None:
     usec = machine.run("systemctl show --property=RuntimeWatchdogUSec --value").strip()
     assert usec == "15s"
+    usec = machine.run("systemctl show --property=RebootWatchdogUSec --value").strip()
+    assert usec == "15s"
 
 
 @pytest.mark.parametrize("unit", sorted(EXPOSURE_LIMITS))

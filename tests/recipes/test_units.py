@@ -5,9 +5,12 @@ from __future__ import annotations
 
 import re
 
+import pytest
 from conftest import TOP
+from metadata import Metadata
 
-UNITS = TOP / "recipes/recipes-core/ecdaq-config/files/root/usr/lib/systemd/system"
+ROOT = TOP / "recipes/recipes-core/ecdaq-config/files/root"
+UNITS = ROOT / "usr/lib/systemd/system"
 
 
 def values(unit: str, key: str) -> list[str]:
@@ -25,3 +28,19 @@ def test_the_master_is_not_restarted_after_a_requested_stop_or_a_crash_of_contro
     assert values("ecdaqd.service", "Restart") == ["always"]
     codes = [exit_code("OVERRUN"), exit_code("CONTROL")]
     assert values("ecdaqd.service", "RestartPreventExitStatus") == codes
+
+
+@pytest.mark.parametrize("key", ["RuntimeWatchdogSec", "RebootWatchdogSec"])
+def test_a_watchdog_is_set_to_no_more_than_the_chip_counts(metadata: Metadata, key: str) -> None:
+    text = (ROOT / "usr/lib/systemd/system.conf.d/60-ecdaq.conf").read_text()
+    (seconds,) = re.findall(rf"^{key}=(\d+)s$", text, re.MULTILINE)
+    limit = int(metadata.recipes["ecdaq-image"].value("ECDAQ_WATCHDOG_LIMIT_S"))
+    assert 0 < int(seconds) <= limit
+
+
+def test_the_kernel_feeds_an_armed_watchdog_while_the_disk_is_checked(metadata: Metadata) -> None:
+    """e2fsck and resize2fs of a large card take longer than the chip counts, before systemd."""
+    words = metadata.recipes["ecdaq-image"].value("KERNEL_CMDLINE").split()
+    assert "watchdog.handle_boot_enabled=1" in words
+    (timeout,) = (int(w.partition("=")[2]) for w in words if w.startswith("watchdog.open_timeout="))
+    assert 300 <= timeout <= 3600
