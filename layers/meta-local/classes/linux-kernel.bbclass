@@ -12,6 +12,7 @@ do_prepare_build[file-checksums] += "${LAYERDIR_core}/lib/kconfig.py:True"
 do_prepare_build() {
 	rm -rf "${S}/debian"
 	deb_debianize
+	source_version=$(sed -n 's/^Version: //p' "${WORKDIR}"/apt-source/*.dsc)
 	cat > "${S}/debian/control" <<CONTROL
 Source: ${BPN}
 Section: kernel
@@ -23,6 +24,7 @@ Build-Depends: debhelper-compat (= ${DEBIAN_COMPAT}), bc, bison, flex, kmod, rsy
 Package: linux-image-${KERNEL_NAME_PROVIDED}
 Architecture: ${PACKAGE_ARCH}
 Depends: kmod
+Built-Using: ${APT_SOURCE} (= $source_version)
 Description: ${DESCRIPTION}
 CONTROL
 	install -d "${S}/debian/fragments"

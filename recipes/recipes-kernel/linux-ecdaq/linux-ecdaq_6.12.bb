@@ -6,7 +6,7 @@ SECTION = "kernel"
 LICENSE = "GPL-2.0-only WITH Linux-syscall-note"
 LIC_FILES_CHKSUM = "file://COPYING;md5=6bc538ed5bd9a7fc9398086aedcd7e46"
 
-# Debian's source package, the newest of the suite: security updates come with it.
+# Debian's source package, the newest of the suite when nothing is cached.
 SRC_URI = "apt://linux \
            file://0001-sysfs-say-that-the-kernel-is-real-time.patch \
            file://base.cfg \
