@@ -18,6 +18,8 @@ static int timeout_s(const struct admin_request *request)
 	case ADMIN_RESCAN:
 	case ADMIN_SII_READ:
 	case ADMIN_SII_WRITE:
+	case ADMIN_FOE_READ: /* progress comes before, but while a slave erases its flash */
+	case ADMIN_FOE_WRITE:
 		return LONG_TIMEOUT_S;
 	case ADMIN_STATE:
 		return request->slave_pos == ADMIN_ALL_SLAVES ? LONG_TIMEOUT_S : REPLY_TIMEOUT_S;
@@ -35,6 +37,16 @@ static int timeout_s(const struct admin_request *request)
 	case ADMIN_SII_ALIAS:
 	case ADMIN_DIAGNOSIS:
 	case ADMIN_ERRORS_RESET:
+	case ADMIN_SDO_LIST:
+	case ADMIN_SDO_OBJECT:
+	case ADMIN_SDO_ENTRY:
+	case ADMIN_SOE_READ:
+	case ADMIN_SOE_WRITE:
+	case ADMIN_EOE_IP_READ:
+	case ADMIN_EOE_IP_WRITE:
+	case ADMIN_AOE_READ:
+	case ADMIN_AOE_WRITE:
+	case ADMIN_VOE:
 		break;
 	}
 	return REPLY_TIMEOUT_S;

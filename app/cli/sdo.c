@@ -54,11 +54,11 @@ static enum exit_code ask(struct sdo *sdo)
 	const struct admin_reply *reply = &sdo->transfer.reply;
 	enum exit_code result = admin_transfer(sdo->cli, &sdo->transfer);
 
-	if (result == EXIT_CODE_OK && reply->result < 0 && reply->sdo_abort != 0) {
+	if (result == EXIT_CODE_OK && reply->result < 0 && reply->slave_code != 0) {
 		return cli_fail(sdo->cli, EXIT_CODE_REFUSED,
 				"slave %u: 0x%04x:%02x: SDO abort 0x%08x: %s",
 				sdo->request.slave_pos, sdo->request.index, sdo->request.subindex,
-				reply->sdo_abort, sdo_abort_to_str(reply->sdo_abort));
+				reply->slave_code, sdo_abort_to_str(reply->slave_code));
 	}
 	return result == EXIT_CODE_OK ? admin_judge(sdo->cli, reply) : result;
 }

@@ -111,7 +111,7 @@ static void answer_read(struct fake *f, const struct admin_request *rq, struct a
 		give(reply, bytes, 2);
 	} else {
 		refuse(reply, -EIO, "abort");
-		reply->sdo_abort = 0x06020000;
+		reply->slave_code = 0x06020000;
 	}
 }
 
@@ -122,7 +122,7 @@ static void answer_write(struct fake *f, const struct admin_request *rq, struct 
 		return;
 	}
 	refuse(reply, -EIO, "abort");
-	reply->sdo_abort = rq->index == 0x8000 ? 0x08000022 : 0x06020000;
+	reply->slave_code = rq->index == 0x8000 ? 0x08000022 : 0x06020000;
 }
 
 static void clear(struct fake *f)
@@ -256,6 +256,18 @@ static void answer(struct fake *f, const struct admin_request *rq, struct admin_
 	case ADMIN_ERRORS_RESET:
 		f->reg[0x0301] = 0;
 		break;
+	case ADMIN_SDO_LIST:
+	case ADMIN_SDO_OBJECT:
+	case ADMIN_SDO_ENTRY:
+	case ADMIN_FOE_READ:
+	case ADMIN_FOE_WRITE:
+	case ADMIN_SOE_READ:
+	case ADMIN_SOE_WRITE:
+	case ADMIN_EOE_IP_READ:
+	case ADMIN_EOE_IP_WRITE:
+	case ADMIN_AOE_READ:
+	case ADMIN_AOE_WRITE:
+	case ADMIN_VOE:
 	case ADMIN_CANCEL:
 	case ADMIN_DATA:
 		refuse(reply, -EINVAL, "not served here");

@@ -50,7 +50,11 @@ MODULES: dict[str, dict[str, set[str]]] = {
         "publish": READERS | {"keystore"},
         "sync0": READERS,
     },
-    "cli": {"cli": READERS | {"wire/al.h", "wire/sdo_abort.h", "wire/sii.h"}},
+    "cli": {
+        "cli": READERS
+        | {"wire/al.h", "wire/sdo_abort.h", "wire/sii.h"}
+        | {"wire/aoe.h", "wire/eoe.h", "wire/soe.h"}
+    },
     "sim": {
         "firmware": {"base", "wire"},
         "segment": {"base", "wire"},

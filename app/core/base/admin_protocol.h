@@ -28,8 +28,9 @@ enum admin_verb {
 	ADMIN_SET = 2,       /* output channels to raw values: count, item[] */
 	ADMIN_ONESHOT = 3,   /* slave_pos or ADMIN_ALL_SLAVES, dc_time_ns (absolute) or relative if
 				is_relative */
-	ADMIN_SDO_READ = 4,  /* slave_pos, index, subindex */
-	ADMIN_SDO_WRITE = 5, /* slave_pos, index, subindex, data */
+	ADMIN_SDO_READ = 4,  /* slave_pos, index, subindex; argument[0] 1: the whole object, from
+				subindex 0 or 1 on (complete access) */
+	ADMIN_SDO_WRITE = 5, /* the same, data */
 	ADMIN_STOP = 6,      /* orderly stop of the bus and the daemon */
 	ADMIN_CLEAR = 7,     /* histograms and counters to zero */
 	ADMIN_CANCEL = 8,    /* end the open request of this id; no reply of its own unless there is
@@ -48,6 +49,25 @@ enum admin_verb {
 	ADMIN_SII_ALIAS = 16,      /* slave_pos, argument[0]; argument[1] and answer as SII_WRITE */
 	ADMIN_DIAGNOSIS = 17,      /* slave_pos; data: struct admin_diagnosis */
 	ADMIN_ERRORS_RESET = 18,   /* slave_pos: its error counters to zero */
+	/* --- mailboxes; with the two of SDOs above. A slave that refuses: reply.slave_code --- */
+	ADMIN_SDO_LIST = 19,    /* slave_pos, argument[0]: 0 lengths of the lists, 1 all objects,
+				   2 RxPDO, 3 TxPDO, 4 backup, 5 settings; data: words of 16 bits */
+	ADMIN_SDO_OBJECT = 20,  /* slave_pos, index; data: struct admin_sdo_object */
+	ADMIN_SDO_ENTRY = 21,   /* slave_pos, index, subindex; data: struct admin_sdo_entry */
+	ADMIN_FOE_READ = 22,    /* slave_pos, name, argument[0]: password, 0 none; data: the file */
+	ADMIN_FOE_WRITE = 23,   /* the same, data: the file; may be empty */
+	ADMIN_SOE_READ = 24,    /* slave_pos, index: IDN, subindex: drive, argument[0]: elements
+				   (enum soe_element of wire/soe.h); data: as soe.h has them */
+	ADMIN_SOE_WRITE = 25,   /* the same, data: the one element */
+	ADMIN_EOE_IP_READ = 26, /* slave_pos, argument[0]: port; data: as eoe_ip_get() of
+				   wire/eoe.h takes them */
+	ADMIN_EOE_IP_WRITE = 27, /* the same, data: as eoe_ip_put() writes them */
+	ADMIN_AOE_READ = 28,     /* slave_pos, argument[0]: index group, [1]: index offset, [2]: AMS
+				    port, name: AMS Net ID ("": zeros), length: bytes at most; data.
+				    An SDO: AOE_GROUP_SDO and aoe_sdo_offset() of wire/aoe.h */
+	ADMIN_AOE_WRITE = 29,    /* the same, data */
+	ADMIN_VOE = 30, /* slave_pos, argument[0]: vendor, [1]: vendor's type, [2] 1: no answer is
+			   waited for, data; data: the answer's type (2 bytes), then its data */
 };
 
 /* Every slave with a one-shot output, all in one cycle or none. */
@@ -104,7 +124,8 @@ struct admin_reply {
 	uint32_t id;                 /* of its request */
 	uint32_t kind;               /* enum admin_reply_kind */
 	int32_t result;              /* 0 or -errno */
-	uint32_t sdo_abort;          /* 0: none */
+	uint32_t slave_code;         /* the slave refused: SDO abort code, FoE, SoE or ADS error,
+					EoE result, as the verb has it; 0: it did not */
 	uint32_t data_len;           /* bytes in data[] */
 	uint32_t data_offset;        /* their place among data_total */
 	uint32_t data_total;         /* bytes of the whole answer */
@@ -120,6 +141,27 @@ struct admin_reply {
 struct admin_sii_written {
 	uint32_t compared;
 	uint32_t written; /* that differed; 0: the EEPROM is unchanged */
+};
+
+/* Answer of ADMIN_SDO_OBJECT. */
+struct admin_sdo_object {
+	uint16_t index;
+	uint16_t data_type; /* ETG.1020 */
+	uint8_t subindex_max;
+	uint8_t object_code;         /* 7 variable, 8 array, 9 record */
+	char name[ADMIN_NAME_BYTES]; /* as the slave sent it, ends with 0 */
+};
+
+/* Answer of ADMIN_SDO_ENTRY. */
+struct admin_sdo_entry {
+	uint16_t index;
+	uint16_t data_type; /* ETG.1020 */
+	uint16_t bit_len;
+	uint16_t access; /* bits 0 to 2 read in PRE-OP, SAFE-OP, OP; 3 to 5 write; 6 RxPDO, 7 TxPDO
+			  */
+	uint8_t subindex;
+	uint8_t reserved;
+	char name[ADMIN_NAME_BYTES];
 };
 
 /* Link and error counters of a port; a counter stops at 255. */
@@ -144,6 +186,8 @@ struct admin_diagnosis {
 };
 
 static_assert(sizeof(struct admin_diagnosis) <= ADMIN_DATA_BYTES, "it is one message");
+static_assert(sizeof(struct admin_sdo_object) == 70, "both ends agree");
+static_assert(sizeof(struct admin_sdo_entry) == 74, "both ends agree");
 static_assert(sizeof(struct admin_request) == 136 + 64 * 72 + 1024, "both ends agree");
 static_assert(sizeof(struct admin_reply) == 56 + 256 + 1024, "both ends agree");
 

@@ -147,7 +147,19 @@ static const char *command_name(int32_t verb)
 					     "SII write",
 					     "SII alias",
 					     "diagnosis",
-					     "error counter reset" };
+					     "error counter reset",
+					     "SDO list",
+					     "SDO object",
+					     "SDO entry",
+					     "FoE read",
+					     "FoE write",
+					     "SoE read",
+					     "SoE write",
+					     "EoE IP read",
+					     "EoE IP write",
+					     "AoE read",
+					     "AoE write",
+					     "VoE" };
 
 	return verb >= 0 && verb < (int32_t)(sizeof(names) / sizeof(names[0])) ? names[verb]
 									       : "unknown";

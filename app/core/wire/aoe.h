@@ -51,6 +51,11 @@ int aoe_header_get(const uint8_t *data, size_t data_len, struct aoe_header *ret)
 /** AOE_HEADER_BYTES. */
 void aoe_header_put(uint8_t *data, const struct aoe_header *h);
 
+/** Text of an ADS error, or of the SDO abort code that comes in its place. */
+const char *aoe_error_to_str(uint32_t code);
+/** AMS Net ID "1.2.3.4.5.6" of @text; "": zeros. 0 or -EINVAL. */
+int aoe_net_id_parse(const char *text, uint8_t ret_net_id[AOE_NET_ID_BYTES]);
+
 /** Index offset of an SDO. */
 static inline uint32_t aoe_sdo_offset(uint16_t index, uint8_t subindex)
 {

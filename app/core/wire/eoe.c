@@ -165,3 +165,21 @@ size_t eoe_split_next(struct eoe_split *s, uint8_t *data, size_t capacity)
 	s->fragment++;
 	return EOE_HEADER_BYTES + now;
 }
+
+const char *eoe_result_to_str(uint32_t result)
+{
+	switch (result) {
+	case EOE_SUCCESS:
+		return "success";
+	case EOE_UNSPECIFIED:
+		return "unspecified error";
+	case EOE_UNSUPPORTED:
+		return "frame type not supported";
+	case EOE_NO_IP:
+		return "no IP support";
+	case EOE_NO_DHCP:
+		return "DHCP not supported";
+	default: /* of the slave */
+		return "unknown result";
+	}
+}

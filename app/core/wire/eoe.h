@@ -16,6 +16,7 @@ enum {
 	EOE_IP_BYTES = 58,          /* flags, MAC, 4 addresses, name */
 	EOE_NAME_BYTES = 32,
 	EOE_FRAME_NUMBERS = 16,
+	EOE_PORTS = 16,
 };
 
 enum eoe_type {
@@ -70,6 +71,9 @@ struct eoe_ip {
 int eoe_header_get(const uint8_t *data, size_t data_len, struct eoe_header *ret);
 /** EOE_HEADER_BYTES. */
 void eoe_header_put(uint8_t *data, const struct eoe_header *h);
+
+/** Text of an enum eoe_result; "unknown result" for one that is not listed. */
+const char *eoe_result_to_str(uint32_t result);
 
 /** IP parameters behind the header. 0; -EBADMSG: too short for what its flags say. */
 int eoe_ip_get(const uint8_t *data, size_t data_len, struct eoe_ip *ret);

@@ -319,35 +319,53 @@ static int has_slave(const struct admin_target *t, struct admin_pending *pending
 	return 1;
 }
 
-static void run_sdo(const struct admin_target *t, struct admin_pending *pending)
+/* Requests to a mailbox that only read are no event. */
+static int is_mailbox_command(uint32_t verb)
+{
+	return verb == ADMIN_SDO_WRITE || verb == ADMIN_FOE_WRITE || verb == ADMIN_SOE_WRITE ||
+	       verb == ADMIN_EOE_IP_WRITE || verb == ADMIN_AOE_WRITE || verb == ADMIN_VOE;
+}
+
+/* Never a password. */
+static int64_t mailbox_object(const struct admin_request *rq)
+{
+	switch (rq->verb) {
+	case ADMIN_SDO_WRITE:
+		return (int64_t)rq->index << 8 | rq->subindex;
+	case ADMIN_SOE_WRITE:
+		return rq->index;
+	case ADMIN_AOE_WRITE:
+		return rq->argument[1];
+	default: /* they have none */
+		return 0;
+	}
+}
+
+static void run_mailbox(const struct admin_target *t, struct admin_pending *pending)
 {
 	const struct admin_request *rq = &pending->request;
 
-	if (t->sdo == NULL) {
+	if (t->mailbox == NULL) {
 		admin_pending_refuse(pending, -EAGAIN, "the bus is down");
 		return;
 	}
 	if (!has_slave(t, pending)) {
 		return;
 	}
-	if (rq->verb == ADMIN_SDO_WRITE) {
-		emit(t, EVENT_COMMAND, rq->slave_pos, (int64_t)rq->index << 8 | rq->subindex,
-		     ADMIN_SDO_WRITE, (int32_t)pending->uid);
+	if (is_mailbox_command(rq->verb)) {
+		emit(t, EVENT_COMMAND, rq->slave_pos, mailbox_object(rq), (int32_t)rq->verb,
+		     (int32_t)pending->uid);
 	}
-	t->sdo(t->ctx, pending);
+	t->mailbox(t->ctx, pending);
 }
 
 static void report_sdo(const struct admin_target *t, struct admin_pending *pending)
 {
 	const struct admin_request *rq = &pending->request;
-	const char *what = rq->verb == ADMIN_SDO_READ ? "read" : "write";
 	int32_t object = (int32_t)((uint32_t)rq->index << 8 | rq->subindex);
-	struct admin_reply *reply = &pending->reply;
 
-	if (reply->sdo_abort != 0) {
-		emit(t, EVENT_SDO_ABORT, rq->slave_pos, reply->sdo_abort, object, 0);
-		refuse(reply, reply->result, "slave %u: SDO %s of 0x%04x:%02x: abort code 0x%08x",
-		       rq->slave_pos, what, rq->index, rq->subindex, reply->sdo_abort);
+	if (pending->reply.slave_code != 0) {
+		emit(t, EVENT_SDO_ABORT, rq->slave_pos, pending->reply.slave_code, object, 0);
 	}
 }
 
@@ -422,7 +440,19 @@ void admin_command_run(const struct admin_target *target, struct admin_pending *
 		return;
 	case ADMIN_SDO_READ:
 	case ADMIN_SDO_WRITE:
-		run_sdo(target, pending);
+	case ADMIN_SDO_LIST:
+	case ADMIN_SDO_OBJECT:
+	case ADMIN_SDO_ENTRY:
+	case ADMIN_FOE_READ:
+	case ADMIN_FOE_WRITE:
+	case ADMIN_SOE_READ:
+	case ADMIN_SOE_WRITE:
+	case ADMIN_EOE_IP_READ:
+	case ADMIN_EOE_IP_WRITE:
+	case ADMIN_AOE_READ:
+	case ADMIN_AOE_WRITE:
+	case ADMIN_VOE:
+		run_mailbox(target, pending);
 		return;
 	case ADMIN_STOP:
 		run_simple(target, pending, target->stop);
@@ -465,6 +495,9 @@ int64_t admin_command_timeout_ns(const struct admin_request *request)
 	case ADMIN_SII_READ:
 	case ADMIN_SII_WRITE:
 		return ADMIN_SII_TIMEOUT_NS;
+	case ADMIN_FOE_READ:
+	case ADMIN_FOE_WRITE:
+		return ADMIN_FOE_TIMEOUT_NS;
 	case ADMIN_REGISTER_READ:
 	case ADMIN_REGISTER_WRITE:
 	case ADMIN_SII_ALIAS:
@@ -473,6 +506,16 @@ int64_t admin_command_timeout_ns(const struct admin_request *request)
 	case ADMIN_PING:
 	case ADMIN_SDO_READ:
 	case ADMIN_SDO_WRITE:
+	case ADMIN_SDO_LIST:
+	case ADMIN_SDO_OBJECT:
+	case ADMIN_SDO_ENTRY:
+	case ADMIN_SOE_READ:
+	case ADMIN_SOE_WRITE:
+	case ADMIN_EOE_IP_READ:
+	case ADMIN_EOE_IP_WRITE:
+	case ADMIN_AOE_READ:
+	case ADMIN_AOE_WRITE:
+	case ADMIN_VOE:
 	case ADMIN_STOP:
 	case ADMIN_CLEAR:
 	case ADMIN_CANCEL:

@@ -26,6 +26,8 @@ enum { ADMIN_ONESHOT_MARGIN_CYCLES = 5 };
 #define ADMIN_DATA_TIMEOUT_NS (2 * NS_PER_S)
 /* A whole EEPROM, word by word. */
 #define ADMIN_SII_TIMEOUT_NS (600 * NS_PER_S)
+/* A whole file: a slave that does not go on ends it earlier. */
+#define ADMIN_FOE_TIMEOUT_NS (3600 * NS_PER_S)
 /* All timeouts of a bring-up together may be longer; the client then gets a timeout error. */
 #define ADMIN_BRING_UP_TIMEOUT_NS (600 * NS_PER_S)
 /* Latest time of a one-shot from now: a later one is probably a typing error. */
@@ -44,11 +46,10 @@ struct admin_target {
 	/** DC time now. 0 or -EAGAIN. */
 	int (*dc_now)(void *ctx, int64_t *ret_dc_ns);
 	/**
-	 * Start an SDO transfer: ADMIN_SDO_READ or ADMIN_SDO_WRITE of a slave that exists. It is
-	 * completed at once or later, with reply.sdo_abort if the slave aborted it. NULL while
-	 * there is no bus.
+	 * Start a request to the mailbox of a slave that exists. It is completed at once or later,
+	 * with reply.slave_code if the slave refused it. NULL while there is no bus.
 	 */
-	void (*sdo)(void *ctx, struct admin_pending *pending);
+	void (*mailbox)(void *ctx, struct admin_pending *pending);
 	/** Start ADMIN_RESCAN, ADMIN_STATE of a slave that exists or of all, or a request to the
 	 * registers or the EEPROM of a slave that exists. NULL while a bring-up is under way. */
 	void (*bus_request)(void *ctx, struct admin_pending *pending);
@@ -73,8 +74,7 @@ int admin_request_parse(const void *message, size_t len, struct admin_request *r
 void admin_command_run(const struct admin_target *target, struct admin_pending *pending);
 
 /**
- * Once for each request that was completed, before its answer goes out: events, and the text of an
- * SDO that failed.
+ * Once for each request that was completed, before its answer goes out: events.
  */
 void admin_command_report(const struct admin_target *target, struct admin_pending *pending);
 

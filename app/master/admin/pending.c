@@ -13,7 +13,7 @@ void admin_pending_complete(struct admin_pending *pending, int result)
 	if (result < 0) {
 		pending->reply.data_len = 0;
 		pending->answer_len = 0;
-		if (pending->reply.text[0] == '\0' && pending->reply.sdo_abort == 0) {
+		if (pending->reply.text[0] == '\0') {
 			snprintf(pending->reply.text, sizeof(pending->reply.text), "%s",
 				 strerror(-result));
 		}

@@ -5,6 +5,11 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "wire/aoe.h"
+#include "wire/eoe.h"
+#include "wire/mailbox.h"
+#include "wire/soe.h"
+
 static int refuse(char *why, int result, const char *text)
 {
 	snprintf(why, ADMIN_TEXT_BYTES, "%s", text);
@@ -12,11 +17,11 @@ static int refuse(char *why, int result, const char *text)
 }
 
 /* A name that can be printed in a line: it comes back in messages. */
-static int is_name(const char *name)
+static int is_name(const char *name, size_t room)
 {
-	size_t len = strnlen(name, LIMIT_NAME_BYTES);
+	size_t len = strnlen(name, room);
 
-	if (len == 0 || len == LIMIT_NAME_BYTES) {
+	if (len == 0 || len == room) {
 		return 0;
 	}
 	for (size_t i = 0; i < len; i++) {
@@ -35,7 +40,7 @@ static int check_items(const struct admin_request *rq, char *why)
 		return -EINVAL;
 	}
 	for (uint32_t i = 0; i < rq->count; i++) {
-		if (!is_name(rq->item[i].channel)) {
+		if (!is_name(rq->item[i].channel, LIMIT_NAME_BYTES)) {
 			snprintf(why, ADMIN_TEXT_BYTES, "item %u has no valid channel name", i);
 			return -EINVAL;
 		}
@@ -63,6 +68,69 @@ static int check_registers(const struct admin_request *rq, uint32_t len, char *w
 		return -EINVAL;
 	}
 	return check_slave(rq, why);
+}
+
+/* An SDO, its description, or a list of objects. */
+static int check_coe(const struct admin_request *rq, char *why)
+{
+	if (rq->verb == ADMIN_SDO_LIST && rq->argument[0] > 5) {
+		return refuse(why, -EINVAL, "argument[0] must be a list of objects, 0 to 5");
+	}
+	if ((rq->verb == ADMIN_SDO_READ || rq->verb == ADMIN_SDO_WRITE) &&
+	    (rq->argument[0] > 1 || (rq->argument[0] == 1 && rq->subindex > 1))) {
+		return refuse(why, -EINVAL, "complete access begins at subindex 0 or 1");
+	}
+	if (rq->verb == ADMIN_SDO_WRITE && rq->data_len == 0) {
+		return refuse(why, -EINVAL, "an SDO takes 1 byte of data at least");
+	}
+	return check_slave(rq, why);
+}
+
+static int check_soe(const struct admin_request *rq, char *why)
+{
+	if (rq->subindex >= SOE_DRIVES || rq->argument[0] == 0 || rq->argument[0] > UINT8_MAX) {
+		return refuse(why, -EINVAL, "expected a drive, 0 to 7, and 1 element at least");
+	}
+	if (rq->verb == ADMIN_SOE_WRITE && rq->data_len == 0) {
+		return refuse(why, -EINVAL, "an IDN takes 1 byte of data at least");
+	}
+	return check_slave(rq, why);
+}
+
+static int check_aoe(const struct admin_request *rq, char *why)
+{
+	uint8_t net_id[AOE_NET_ID_BYTES];
+
+	if (rq->argument[2] > UINT16_MAX || aoe_net_id_parse(rq->name, net_id) < 0) {
+		return refuse(why, -EINVAL, "expected an AMS port, 0 to 65535, and a Net ID");
+	}
+	if (rq->verb == ADMIN_AOE_READ && (rq->length == 0 || rq->length > MAILBOX_BYTES)) {
+		snprintf(why, ADMIN_TEXT_BYTES, "%u bytes: expected 1 to %d", rq->length,
+			 MAILBOX_BYTES);
+		return -EINVAL;
+	}
+	return check_slave(rq, why);
+}
+
+static int check_foe(const struct admin_request *rq, char *why)
+{
+	return is_name(rq->name, ADMIN_NAME_BYTES)
+		       ? check_slave(rq, why)
+		       : refuse(why, -EINVAL, "a file name has 1 to 63 bytes and no spaces");
+}
+
+static int check_eoe(const struct admin_request *rq, char *why)
+{
+	return rq->argument[0] < EOE_PORTS
+		       ? check_slave(rq, why)
+		       : refuse(why, -EINVAL, "argument[0] must be a port, 0 to 15");
+}
+
+static int check_voe(const struct admin_request *rq, char *why)
+{
+	return rq->argument[1] <= UINT16_MAX && rq->argument[2] <= 1
+		       ? check_slave(rq, why)
+		       : refuse(why, -EINVAL, "expected a type up to 65535 and a flag");
 }
 
 static int check_verb(const struct admin_request *rq, char *why)
@@ -97,17 +165,31 @@ static int check_verb(const struct admin_request *rq, char *why)
 			return refuse(why, -EINVAL, "argument[0] must be an alias up to 65535");
 		}
 		return check_slave(rq, why);
-	case ADMIN_SDO_READ:
 	case ADMIN_SII_READ:
 	case ADMIN_SII_WRITE:
 	case ADMIN_DIAGNOSIS:
 	case ADMIN_ERRORS_RESET:
 		return check_slave(rq, why);
+	case ADMIN_SDO_READ:
 	case ADMIN_SDO_WRITE:
-		if (rq->data_len == 0) {
-			return refuse(why, -EINVAL, "an SDO takes 1 byte of data at least");
-		}
-		return check_slave(rq, why);
+	case ADMIN_SDO_LIST:
+	case ADMIN_SDO_OBJECT:
+	case ADMIN_SDO_ENTRY:
+		return check_coe(rq, why);
+	case ADMIN_FOE_READ:
+	case ADMIN_FOE_WRITE:
+		return check_foe(rq, why);
+	case ADMIN_SOE_READ:
+	case ADMIN_SOE_WRITE:
+		return check_soe(rq, why);
+	case ADMIN_EOE_IP_READ:
+	case ADMIN_EOE_IP_WRITE:
+		return check_eoe(rq, why);
+	case ADMIN_AOE_READ:
+	case ADMIN_AOE_WRITE:
+		return check_aoe(rq, why);
+	case ADMIN_VOE:
+		return check_voe(rq, why);
 	}
 	snprintf(why, ADMIN_TEXT_BYTES, "unknown verb %u", rq->verb);
 	return -EINVAL;

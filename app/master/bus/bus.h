@@ -150,12 +150,12 @@ void bus_mailbox_step(struct bus *bus);
 int bus_mailbox_is_busy(const struct bus *bus);
 
 /**
- * Begin an SDO transfer: @rq has slave, parameters, buffer and done(); its result comes from
- * bus_mailbox_step(). 0; -ENODEV, -ENOTSUP, -EIO the slave is lost, -EINVAL, and done() is not
- * called.
+ * Begin a request to a mailbox: @rq has protocol, slave, parameters, buffer and done(); its result
+ * comes from bus_mailbox_step(). 0; -ENODEV, -ENOTSUP, -EIO the slave is lost, -EINVAL, and done()
+ * is not called.
  */
-int bus_sdo_submit(struct bus *bus, struct mailbox_request *rq);
-void bus_sdo_cancel(struct bus *bus, struct mailbox_request *rq);
+int bus_mailbox_submit(struct bus *bus, struct mailbox_request *rq);
+void bus_mailbox_cancel(struct bus *bus, struct mailbox_request *rq);
 /**
  * One SDO transfer; blocking, at most bus.mailbox_timeout for each mail. A download is never
  * executed twice. @ret_abort is the SDO abort code or 0. Size in @len is updated by read.

@@ -49,17 +49,6 @@ int bus_has_coe(const struct bus *bus, size_t pos)
 
 /* --- one transfer; blocking --- */
 
-static int check_request(const struct bus *bus, size_t pos)
-{
-	if (pos >= bus->slave_count) {
-		return -ENODEV;
-	}
-	if (!bus_has_coe(bus, pos)) {
-		return -ENOTSUP;
-	}
-	return bus->slave[pos].is_lost ? -EIO : 0;
-}
-
 static void tell_abort(struct bus *bus, size_t pos, int32_t object, uint32_t abort)
 {
 	bus_emit_event(bus, &bus->listener,
@@ -74,24 +63,29 @@ static int32_t object_of(uint16_t index, uint8_t subindex)
 	return (int32_t)((uint32_t)index << 8 | subindex);
 }
 
-int bus_sdo_submit(struct bus *bus, struct mailbox_request *rq)
+int bus_mailbox_submit(struct bus *bus, struct mailbox_request *rq)
 {
-	int r = check_request(bus, rq->slave_pos);
-
-	rq->protocol = &coe_protocol;
 	rq->timeout = (span_t){ bus->cfg->bus_mailbox_timeout_ns };
-	return r < 0 ? r : mailbox_submit(bus->mailbox, rq);
+	if (rq->slave_pos >= bus->slave_count) {
+		return -ENODEV;
+	}
+	if (!mailbox_slave_has(bus->mailbox, rq->slave_pos, rq->protocol->sii_bit)) {
+		return -ENOTSUP;
+	}
+	return bus->slave[rq->slave_pos].is_lost ? -EIO : mailbox_submit(bus->mailbox, rq);
 }
 
-void bus_sdo_cancel(struct bus *bus, struct mailbox_request *rq)
+void bus_mailbox_cancel(struct bus *bus, struct mailbox_request *rq)
 {
 	mailbox_cancel(bus->mailbox, rq);
 }
 
 static int run(struct bus *bus, struct mailbox_request *rq)
 {
-	int r = bus_sdo_submit(bus, rq);
+	int r;
 
+	rq->protocol = &coe_protocol;
+	r = bus_mailbox_submit(bus, rq);
 	return r < 0 ? r : mailbox_wait(bus->mailbox, rq);
 }
 
@@ -222,7 +216,7 @@ static int next_sdo(const struct bus *bus, size_t pos, size_t *next, struct conf
 static void go_on(struct bus *bus, size_t pos)
 {
 	struct bus_startup *su = &bus->slave[pos].startup;
-	int r = check_request(bus, pos);
+	int r;
 
 	if (!next_sdo(bus, pos, &su->next, &su->sdo)) {
 		su->state = STARTUP_DONE;
@@ -234,9 +228,7 @@ static void go_on(struct bus *bus, size_t pos)
 	su->request.with.coe = (struct coe_parameters){ .operation = COE_DOWNLOAD,
 							.index = su->sdo.index,
 							.subindex = su->sdo.subindex };
-	if (r >= 0) {
-		r = mailbox_submit(bus->mailbox, &su->request);
-	}
+	r = bus_mailbox_submit(bus, &su->request);
 	if (r < 0) {
 		su->request.result = r;
 		su->state = STARTUP_FAILED;
@@ -264,7 +256,6 @@ void bus_startup_begin(struct bus *bus, size_t pos)
 		.state = STARTUP_RUNNING,
 		.request = { .protocol = &coe_protocol,
 			     .slave_pos = (uint16_t)pos,
-			     .timeout = { bus->cfg->bus_mailbox_timeout_ns },
 			     .done = startup_sdo_done,
 			     .ctx = bus },
 	};

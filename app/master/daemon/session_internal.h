@@ -67,8 +67,8 @@ struct session {
 void session_emit(struct session *s, const struct event *ev);
 /** For bus.h: session_emit(). */
 void session_bus_event(void *ctx, const struct event *ev);
-/** Begin the SDO transfer of an admin request; @ctx is the session. */
-void session_sdo(void *ctx, struct admin_pending *pending);
+/** Begin the mailbox request of an admin request; @ctx is the session. */
+void session_mailbox(void *ctx, struct admin_pending *pending);
 /** State, page and event. */
 void session_state_set(struct session *s, enum bus_state state);
 /** What the bus is led to, from the next bring-up on. */

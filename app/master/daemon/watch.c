@@ -59,7 +59,7 @@ static void make_target(struct session *s, struct admin_target *ret_target)
 	ret_target->bus_request = session_bus_request;
 	if (s->bus != NULL) {
 		ret_target->slaves = bus_slaves(s->bus, &ret_target->slave_count);
-		ret_target->sdo = session_sdo;
+		ret_target->mailbox = session_mailbox;
 	}
 	if (s->is_riding) {
 		ret_target->cfg = bus_config(s->bus);

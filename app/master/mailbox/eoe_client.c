@@ -6,13 +6,11 @@
 #include "mailbox/mailbox.h"
 #include "wire/sii.h"
 
-enum { PORT_MAX = 15 };
-
 static int start(struct mailbox_request *rq)
 {
 	const struct eoe_parameters *with = &rq->with.eoe;
 
-	if (with->port > PORT_MAX ||
+	if (with->port >= EOE_PORTS ||
 	    (with->operation != EOE_SET_IP && with->operation != EOE_GET_IP &&
 	     with->operation != EOE_FRAGMENT)) {
 		return -EINVAL;

@@ -31,11 +31,13 @@ static void sdo(void *ctx, struct admin_pending *pending)
 
 	(void)ctx;
 	assert(pending->request.slave_pos < 2);
-	assert(pending->request.verb == ADMIN_SDO_READ || pending->data_len >= 1);
-	reply->sdo_abort = pending->request.index % 2 != 0 ? 0x06020000 : 0;
+	assert((pending->request.verb != ADMIN_SDO_WRITE &&
+		pending->request.verb != ADMIN_SOE_WRITE) ||
+	       pending->data_len >= 1);
+	reply->slave_code = pending->request.index % 2 != 0 ? 0x06020000 : 0;
 	memset(reply->data, 0x55, sizeof(reply->data));
 	reply->data_len = sizeof(reply->data);
-	admin_pending_complete(pending, reply->sdo_abort != 0 ? -EIO : 0);
+	admin_pending_complete(pending, reply->slave_code != 0 ? -EIO : 0);
 }
 
 static void nothing(void *ctx)
@@ -82,7 +84,7 @@ static struct admin_target make_target(void)
 		.board = &board,
 		.is_op = 1,
 		.dc_now = dc_now,
-		.sdo = sdo,
+		.mailbox = sdo,
 		.stop = nothing,
 		.clear = nothing,
 		.emit = emit,

@@ -184,11 +184,12 @@ static uint8_t name_buffer[64];
 
 static void begin_read(struct bus_bench *b, struct mailbox_request *rq)
 {
-	*rq = (struct mailbox_request){ .slave_pos = 1,
+	*rq = (struct mailbox_request){ .protocol = &coe_protocol,
+					.slave_pos = 1,
 					.with.coe = { .operation = COE_UPLOAD, .index = 0x1008 },
 					.buffer = name_buffer,
 					.capacity = sizeof(name_buffer) };
-	CHECK_EQ(bus_sdo_submit(b->bus, rq), 0);
+	CHECK_EQ(bus_mailbox_submit(b->bus, rq), 0);
 }
 
 static void check_name_is_read(struct bus_bench *b)
@@ -276,9 +277,10 @@ static void submit_one(struct storm *st, unsigned slave)
 {
 	struct mailbox_request *rq = &st->request[slave];
 
+	rq->protocol = &coe_protocol;
 	rq->buffer = st->data[slave];
 	rq->capacity = sizeof(st->data[slave]);
-	CHECK_EQ(bus_sdo_submit(st->bus, rq), 0);
+	CHECK_EQ(bus_mailbox_submit(st->bus, rq), 0);
 }
 
 static void storm_done(void *ctx, struct mailbox_request *rq)
@@ -371,7 +373,8 @@ TEST(mailbox, dead_mailbox_delays_neither_supervision_nor_other_slaves)
 {
 	struct bus_bench *b = start(3, 118);
 	uint8_t data[64];
-	struct mailbox_request dead = { .slave_pos = 1,
+	struct mailbox_request dead = { .protocol = &coe_protocol,
+					.slave_pos = 1,
 					.with.coe = { .operation = COE_UPLOAD, .index = 0x1008 },
 					.buffer = data,
 					.capacity = sizeof(data) };
@@ -381,7 +384,7 @@ TEST(mailbox, dead_mailbox_delays_neither_supervision_nor_other_slaves)
 	uint64_t from;
 
 	bench_fault(b, "at=0s mailbox-stuck slave=1");
-	CHECK_EQ(bus_sdo_submit(b->bus, &dead), 0);
+	CHECK_EQ(bus_mailbox_submit(b->bus, &dead), 0);
 	bench_run(b, 100);
 	CHECK(mailbox_is_running(&dead));
 	bench_fault(b, "at=0s al-error slave=0 code=0x001b");

@@ -200,7 +200,7 @@ TEST(sim_oneshot, sdo_requests_ride_along_and_leave_the_samples_alone)
 	rq.index = 0x9999;
 	reply = virtual_master_ask(&vm, &rq);
 	CHECK(reply.result < 0);
-	CHECK_EQ(reply.sdo_abort, 0x06020000);
+	CHECK_EQ(reply.slave_code, 0x06020000);
 	CHECK_EQ(vm.result.bad, 0);
 	CHECK_EQ(vm.result.lost, 0);
 	close_all();

@@ -39,3 +39,28 @@ TEST(aoe, an_sdo_is_an_index_offset)
 {
 	CHECK_EQ(aoe_sdo_offset(0x1018, 2), 0x10180002);
 }
+
+TEST(aoe, a_net_id_is_six_bytes_in_decimal)
+{
+	static const char *const bad[] = { "1.2.3.4.5",  "1.2.3.4.5.6.7", "1.2.3.4.5.256",
+					   "1.2.3.4.5.", "1..3.4.5.6",    "1.2.3.4.5.6 ",
+					   "a",          "1.2.3.4.5.0006" };
+	uint8_t id[AOE_NET_ID_BYTES] = { 9 };
+
+	CHECK_EQ(aoe_net_id_parse("192.168.0.1.2.255", id), 0);
+	CHECK_EQ(id[0], 192);
+	CHECK_EQ(id[5], 255);
+	for (size_t i = 0; i < sizeof(bad) / sizeof(bad[0]); i++) {
+		CHECK_EQ(aoe_net_id_parse(bad[i], id), -EINVAL);
+	}
+	CHECK_EQ(id[0], 192);
+	CHECK_EQ(aoe_net_id_parse("", id), 0);
+	CHECK_EQ(id[0], 0);
+}
+
+TEST(aoe, errors_of_ads_and_aborts_of_sdos_have_a_text)
+{
+	CHECK_STR(aoe_error_to_str(AOE_ERROR_GROUP), "invalid index group");
+	CHECK_STR(aoe_error_to_str(0x06020000), "object does not exist");
+	CHECK_STR(aoe_error_to_str(0x7777), "unknown error");
+}

@@ -157,3 +157,55 @@ TEST(admin, an_alias_has_16_bits)
 	CHECK_EQ(parse(&rq, &got, why), -EINVAL);
 	CHECK_STR(why, "argument[0] must be an alias up to 65535");
 }
+
+TEST(admin, requests_to_a_mailbox_are_checked_before_they_reach_a_slave)
+{
+	static const struct {
+		enum admin_verb verb;
+		const char *name;
+		uint32_t argument[3];
+		uint8_t subindex;
+		uint32_t data_len;
+		uint32_t length;
+		int is_good;
+	} cases[] = {
+		{ ADMIN_SDO_READ, "", { 1 }, 1, 0, 0, 1 },
+		{ ADMIN_SDO_READ, "", { 1 }, 2, 0, 0, 0 },
+		{ ADMIN_SDO_READ, "", { 2 }, 0, 0, 0, 0 },
+		{ ADMIN_SDO_LIST, "", { 5 }, 0, 0, 0, 1 },
+		{ ADMIN_SDO_LIST, "", { 6 }, 0, 0, 0, 0 },
+		{ ADMIN_FOE_READ, "a.bin", { UINT32_MAX }, 0, 0, 0, 1 },
+		{ ADMIN_FOE_READ, "", { 0 }, 0, 0, 0, 0 },
+		{ ADMIN_FOE_WRITE, "a\nb", { 0 }, 0, 1, 0, 0 },
+		{ ADMIN_FOE_WRITE, "a.bin", { 0 }, 0, 0, 0, 1 },
+		{ ADMIN_SOE_READ, "", { 0x40 }, 7, 0, 0, 1 },
+		{ ADMIN_SOE_READ, "", { 0x40 }, 8, 0, 0, 0 },
+		{ ADMIN_SOE_READ, "", { 0 }, 0, 0, 0, 0 },
+		{ ADMIN_SOE_READ, "", { 0x100 }, 0, 0, 0, 0 },
+		{ ADMIN_SOE_WRITE, "", { 0x40 }, 0, 0, 0, 0 },
+		{ ADMIN_EOE_IP_READ, "", { 15 }, 0, 0, 0, 1 },
+		{ ADMIN_EOE_IP_READ, "", { 16 }, 0, 0, 0, 0 },
+		{ ADMIN_AOE_READ, "1.2.3.4.5.6", { 0, 0, 65535 }, 0, 0, 4, 1 },
+		{ ADMIN_AOE_READ, "1.2.3.4.5", { 0 }, 0, 0, 4, 0 },
+		{ ADMIN_AOE_READ, "", { 0, 0, 65536 }, 0, 0, 4, 0 },
+		{ ADMIN_AOE_READ, "", { 0 }, 0, 0, 0, 0 },
+		{ ADMIN_VOE, "", { UINT32_MAX, 65535, 1 }, 0, 0, 0, 1 },
+		{ ADMIN_VOE, "", { 0, 65536, 0 }, 0, 0, 0, 0 },
+		{ ADMIN_VOE, "", { 0, 0, 2 }, 0, 0, 0, 0 },
+	};
+	struct admin_request got;
+	char why[ADMIN_TEXT_BYTES];
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
+		struct admin_request rq = fake_request(cases[i].verb);
+
+		snprintf(rq.name, sizeof(rq.name), "%s", cases[i].name);
+		memcpy(rq.argument, cases[i].argument, sizeof(cases[i].argument));
+		rq.subindex = cases[i].subindex;
+		rq.data_len = cases[i].data_len;
+		rq.length = cases[i].length;
+		CHECK_EQ(parse(&rq, &got, why), cases[i].is_good ? 0 : -EINVAL);
+		rq.slave_pos = LIMIT_SLAVES;
+		CHECK_EQ(parse(&rq, &got, why), -EINVAL);
+	}
+}

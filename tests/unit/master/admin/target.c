@@ -77,7 +77,7 @@ static void sdo(void *ctx, struct admin_pending *pending)
 		pending->cancel = cancel_sdo;
 		return;
 	}
-	pending->reply.sdo_abort = fake->sdo_abort;
+	pending->reply.slave_code = fake->sdo_abort;
 	if (fake->sdo_result == 0 && pending->request.verb == ADMIN_SDO_READ) {
 		pending->reply.data[0] = pending->request.subindex;
 		pending->reply.data_len = 1;
@@ -138,7 +138,7 @@ struct admin_target fake_target(struct fake *fake)
 		.board = &fake->board,
 		.is_op = 1,
 		.dc_now = dc_now,
-		.sdo = sdo,
+		.mailbox = sdo,
 		.bus_request = bus_request,
 		.stop = stop,
 		.clear = clear,

@@ -304,7 +304,7 @@ const struct exchange_plan *bus_plan(const struct bus *bus)
 /* A read gives its subindex; a write is aborted. The answer comes with the next step. */
 static struct mailbox_request *sdo;
 
-int bus_sdo_submit(struct bus *bus, struct mailbox_request *rq)
+int bus_mailbox_submit(struct bus *bus, struct mailbox_request *rq)
 {
 	(void)bus;
 	rq->result = -EINPROGRESS;
@@ -312,7 +312,7 @@ int bus_sdo_submit(struct bus *bus, struct mailbox_request *rq)
 	return 0;
 }
 
-void bus_sdo_cancel(struct bus *bus, struct mailbox_request *rq)
+void bus_mailbox_cancel(struct bus *bus, struct mailbox_request *rq)
 {
 	(void)bus;
 	sdo = NULL;
