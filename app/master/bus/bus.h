@@ -125,7 +125,7 @@ void bus_lead_back(struct bus *bus, void (*emit)(void *ctx, const struct event *
 /**
  * Is the one device that answers to the reference clock's address the reference clock: by its
  * clock's offset and its identity? 1; 0; -EAGAIN: its EEPROM is still being read, it does not
- * answer, or two do: call again. Takes at most six frames; those of the cycle go on. For
+ * answer, or two do: call again. Takes at most two frames, the EEPROM is read by bus_step(). For
  * exchange_doubts_reference().
  */
 int bus_reference_is_itself(struct bus *bus);
@@ -145,14 +145,18 @@ const struct schedule *bus_schedule(const struct bus *bus);
 
 /** The mailboxes of all slaves: requests that do not block (mailbox/mailbox.h). */
 struct mailbox_engine *bus_mailbox(struct bus *bus);
-/** One pass of it; in OP once a cycle or so while it is busy, else a few times a second. */
-void bus_mailbox_step(struct bus *bus);
-int bus_mailbox_is_busy(const struct bus *bus);
+/**
+ * One pass of what goes on between the polls: the mailboxes, and one frame for all EEPROMs that are
+ * being read to identify returned slaves and new devices. In OP once a cycle or so while the
+ * mailboxes are busy, else a few times a second.
+ */
+void bus_step(struct bus *bus);
+int bus_is_busy(const struct bus *bus);
 
 /**
  * Begin a request to a mailbox: @rq has protocol, slave, parameters, buffer and done(); its result
- * comes from bus_mailbox_step(). 0; -ENODEV, -ENOTSUP, -EIO the slave is lost, -EINVAL, and done()
- * is not called.
+ * comes from bus_step(). 0; -ENODEV, -ENOTSUP, -EIO the slave is lost, -EINVAL, and done() is not
+ * called.
  */
 int bus_mailbox_submit(struct bus *bus, struct mailbox_request *rq);
 void bus_mailbox_cancel(struct bus *bus, struct mailbox_request *rq);

@@ -122,7 +122,7 @@ struct bus_identity {
 	uint16_t alias;
 };
 
-/* Reads it: a few frames at a time (bus/identity.h). */
+/* Reads it: a frame at a time (bus/identity.h). */
 struct identity_reader {
 	int result; /* 1: being read; 0: done, or not begun; -errno */
 	struct bus_identity identity;

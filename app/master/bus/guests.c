@@ -273,12 +273,9 @@ static int is_reading_due(const struct bus *bus, const struct bus_guest *guest)
 	       (guest->kind != GUEST_UNREADABLE || bus_now(bus).ns >= guest->readable_by.ns);
 }
 
-/* Of all that are on the wire, at the same time. */
-static void read_identities(struct bus *bus, const struct walk *walk)
+/* Of all that are on the wire, at the same time, by bus_guests_step(). */
+static void begin_reading(struct bus *bus, const struct walk *walk)
 {
-	struct identity_reader *reader[GUESTS_MAX];
-	size_t count = 0;
-
 	for (size_t g = 0; g < GUESTS_MAX; g++) {
 		struct bus_guest *guest = &bus->guest[g];
 		mono_t give_up = guest->readable_by;
@@ -293,9 +290,51 @@ static void read_identities(struct bus *bus, const struct walk *walk)
 		if (guest->reader.result != 1) {
 			identity_begin(&guest->reader, parking_of(bus, guest), give_up);
 		}
-		reader[count++] = &guest->reader;
 	}
+}
+
+static int is_being_read(const struct bus_guest *guest)
+{
+	return guest->kind != GUEST_NONE && guest->reader.result == 1;
+}
+
+int bus_guests_is_reading(const struct bus *bus)
+{
+	for (size_t g = 0; g < GUESTS_MAX; g++) {
+		if (is_being_read(&bus->guest[g])) {
+			return 1;
+		}
+	}
+	return bus->reference_reader.result == 1;
+}
+
+static size_t list_readers(struct bus *bus, struct identity_reader **ret)
+{
+	size_t count = 0;
+
+	for (size_t g = 0; g < GUESTS_MAX; g++) {
+		if (is_being_read(&bus->guest[g])) {
+			ret[count++] = &bus->guest[g].reader;
+		}
+	}
+	if (bus->reference_reader.result == 1) {
+		ret[count++] = &bus->reference_reader;
+	}
+	return count;
+}
+
+void bus_guests_step(struct bus *bus)
+{
+	struct identity_reader *reader[IDENTITY_READERS];
+	size_t count = list_readers(bus, reader);
+
+	if (count == 0) {
+		return;
+	}
+	bus->error = NULL;
+	bus->is_looking = 1;
 	identity_step(bus, reader, count);
+	bus->is_looking = 0;
 	for (size_t g = 0; g < GUESTS_MAX; g++) {
 		struct bus_guest *guest = &bus->guest[g];
 
@@ -316,6 +355,21 @@ static void note_unreadable(struct bus *bus, const struct walk *walk, struct bus
 	}
 }
 
+/* A device in front of @position in the same gap is still being identified: it may be the slave
+ * that this one would be taken for. */
+static int is_order_open(struct bus *bus, const struct walk *walk, size_t position)
+{
+	for (size_t i = position; i > 0 && walk->at[i - 1].slave < 0; i--) {
+		const struct bus_guest *other =
+			guest_of(bus, get_le16(walk->at[i - 1].address));
+
+		if (other != NULL && other->kind == GUEST_NEW && !is_identified(other)) {
+			return 1;
+		}
+	}
+	return 0;
+}
+
 static void judge(struct bus *bus, struct walk *walk, struct bus_guest *guest,
 		  const struct bus_emit *emit)
 {
@@ -326,6 +380,9 @@ static void judge(struct bus *bus, struct walk *walk, struct bus_guest *guest,
 		return;
 	}
 	r = find_returned(bus, walk, guest, &guest->expected);
+	if (r >= 0 && is_order_open(bus, walk, guest->position)) {
+		r = -EAGAIN;
+	}
 	if (r >= 0) {
 		walk->at[guest->position].slave = r;
 		return_slave(bus, guest, (size_t)r, emit);
@@ -415,7 +472,6 @@ void guests_follow(struct bus *bus, struct walk *walk, const struct bus_emit *em
 			take_guest(bus, walk, i);
 		}
 	}
-	read_identities(bus, walk);
 	for (size_t i = 0; i < walk->count; i++) {
 		struct bus_guest *guest = guest_of(bus, get_le16(walk->at[i].address));
 
@@ -423,6 +479,7 @@ void guests_follow(struct bus *bus, struct walk *walk, const struct bus_emit *em
 			judge(bus, walk, guest, emit);
 		}
 	}
+	begin_reading(bus, walk);
 	for (size_t i = 0; i < walk->count; i++) {
 		if (walk->at[i].slave >= 0) {
 			reopen(bus, walk, i, emit);

@@ -13,6 +13,10 @@ void guests_drop(struct bus *bus, const struct walk *walk, const struct bus_emit
 /** A step for each unbound position of @walk; lost slaves that are back are bound in it. */
 void guests_follow(struct bus *bus, struct walk *walk, const struct bus_emit *emit);
 
+/** One frame for the EEPROMs of all guests, and of the reference clock, that are being read. */
+void bus_guests_step(struct bus *bus);
+int bus_guests_is_reading(const struct bus *bus);
+
 /** Guests on the wire now. Those behind a closed port do not count. */
 unsigned bus_guests_answering(const struct bus *bus);
 /** Guests that are none of our slaves, wherever they are. */

@@ -56,13 +56,11 @@ static int take_words(struct identity_reader *reader)
 	return 1;
 }
 
-/* One frame for all that are being read. 1 if there is one still. */
-static int run_frame(struct bus *bus, struct identity_reader *const *reader, size_t count)
+void identity_step(struct bus *bus, struct identity_reader *const *reader, size_t count)
 {
-	struct access access[GUESTS_MAX * EEPROM_ACCESSES];
-	size_t first[GUESTS_MAX];
+	struct access access[IDENTITY_READERS * EEPROM_ACCESSES];
+	size_t first[IDENTITY_READERS];
 	size_t n = 0;
-	int is_any = 0;
 	int r;
 
 	for (size_t i = 0; i < count; i++) {
@@ -70,9 +68,6 @@ static int run_frame(struct bus *bus, struct identity_reader *const *reader, siz
 		if (reader[i]->result == 1) {
 			n += eeprom_prepare(&reader[i]->command, &access[n]);
 		}
-	}
-	if (n == 0) {
-		return 0;
 	}
 	r = registers_run(bus, access, n);
 	for (size_t i = 0; i < count; i++) {
@@ -89,14 +84,6 @@ static int run_frame(struct bus *bus, struct identity_reader *const *reader, siz
 		if (rd->result == 0) {
 			rd->result = take_words(rd);
 		}
-		is_any |= rd->result == 1;
-	}
-	return is_any;
-}
-
-void identity_step(struct bus *bus, struct identity_reader *const *reader, size_t count)
-{
-	for (unsigned i = 0; i < IDENTITY_FRAMES && run_frame(bus, reader, count); i++) {
 	}
 }
 

@@ -8,16 +8,16 @@
 
 #include "bus/bus_internal.h"
 
-/* Frames of one call of identity_step(), at most. */
-enum { IDENTITY_FRAMES = 4 };
+/* At the same time, in one frame: those of all guests and of the reference clock. */
+enum { IDENTITY_READERS = GUESTS_MAX + 1 };
 
 /** Begin to read it from the EEPROM of the device with station address @station; @give_up bounds
  * it. */
 void identity_begin(struct identity_reader *reader, uint16_t station, mono_t give_up);
 /**
- * Go on with @count readers, at most GUESTS_MAX, which share their frames. Their result: 1 being
- * read; 0 identity is filled; -errno as eeprom_take(); -EBADMSG also: the EEPROM's checksum is
- * wrong; -ENODATA it is blank; -ETIME no frame came back until the time was over.
+ * Go on with @count readers, at most IDENTITY_READERS, by one frame. Their result: 1 being read; 0
+ * identity is filled; -errno as eeprom_take(); -EBADMSG also: the EEPROM's checksum is wrong;
+ * -ENODATA it is blank; -ETIME no frame came back until the time was over.
  */
 void identity_step(struct bus *bus, struct identity_reader *const *reader, size_t count);
 

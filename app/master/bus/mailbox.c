@@ -9,6 +9,7 @@
 
 #include "base/bytes.h"
 #include "bus/bus_internal.h"
+#include "bus/guests.h"
 #include "wire/sdo_abort.h"
 
 void bus_mailbox_set(struct bus *bus, size_t pos)
@@ -32,14 +33,15 @@ struct mailbox_engine *bus_mailbox(struct bus *bus)
 	return bus->mailbox;
 }
 
-void bus_mailbox_step(struct bus *bus)
+void bus_step(struct bus *bus)
 {
 	mailbox_step(bus->mailbox);
+	bus_guests_step(bus);
 }
 
-int bus_mailbox_is_busy(const struct bus *bus)
+int bus_is_busy(const struct bus *bus)
 {
-	return mailbox_is_busy(bus->mailbox);
+	return mailbox_is_busy(bus->mailbox) || bus_guests_is_reading(bus);
 }
 
 int bus_has_coe(const struct bus *bus, size_t pos)

@@ -185,17 +185,18 @@ int bus_reference_is_itself(struct bus *bus)
 	sl = &bus->slave[pos];
 	r = has_offset(bus, pos);
 	if (r != 1) {
-		reader->result = 0;
+		*reader = (struct identity_reader){ 0 };
 		return r;
 	}
-	if (reader->result != 1) {
+	if (reader->result == 0 && reader->identity.vendor == 0) {
 		identity_begin(reader, sl->info.station_addr,
 			       mono_add(bus_now(bus), (span_t){ REFERENCE_NS }));
 	}
-	identity_step(bus, &reader, 1);
 	if (reader->result == 1) {
 		return -EAGAIN;
 	}
+	r = reader->result < 0 ? -EAGAIN : bus_is_same_device(sl, &reader->identity);
+	*reader = (struct identity_reader){ 0 };
 	register_write(bus, pos, ESC_REG_EEPROM_CONFIG, &to_pdi, sizeof(to_pdi));
-	return reader->result < 0 ? -EAGAIN : bus_is_same_device(sl, &reader->identity);
+	return r;
 }

@@ -265,8 +265,7 @@ int session_fd(const struct session *session)
 
 int session_is_pressed(const struct session *session)
 {
-	return session->replies_waiting > 0 ||
-	       (session->is_riding && bus_mailbox_is_busy(session->bus));
+	return session->replies_waiting > 0 || (session->is_riding && bus_is_busy(session->bus));
 }
 
 /* --- life --- */

@@ -320,13 +320,13 @@ void bus_mailbox_cancel(struct bus *bus, struct mailbox_request *rq)
 	rq->done(rq->ctx, rq);
 }
 
-int bus_mailbox_is_busy(const struct bus *bus)
+int bus_is_busy(const struct bus *bus)
 {
 	(void)bus;
 	return sdo != NULL;
 }
 
-void bus_mailbox_step(struct bus *bus)
+void bus_step(struct bus *bus)
 {
 	struct mailbox_request *rq = sdo;
 
