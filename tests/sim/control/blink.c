@@ -20,8 +20,7 @@ static void open_all(const char *const *settings)
 
 static void close_all(void)
 {
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 static int seen_op;

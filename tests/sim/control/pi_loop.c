@@ -47,8 +47,7 @@ static void open_all(const char *options)
 
 static void close_all(void)
 {
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 static double value(const char *name)

@@ -97,6 +97,5 @@ TEST(sim_control, outputs_computed_from_cycle_k_are_sent_in_cycle_k_plus_1)
 	CHECK_EQ(vm.result.gaps, 0);
 	CHECK_EQ(vm.result.bad_unexplained, 0);
 	CHECK_EQ(session_page(vm.session)->control.calls - calls, RUN_CYCLES);
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }

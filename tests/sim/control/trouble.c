@@ -66,8 +66,7 @@ static void open_all(int (*cycle)(const struct ecdaq_cycle *cy, void *state))
 
 static void close_all(void)
 {
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 /* How many events of this kind there were, and the text of the last one. */

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 #include "sim/harness/virtual_bench.h"
 
+#include "base/bytes.h"
 #include "base/prng.h"
 #include "devices/fb1111_piccolo.h"
 #include "harness/test.h"
 #include "wire/datagram.h"
+#include "wire/esc_reg.h"
 
 enum {
 	DEFAULT_SLAVES = 2,
@@ -138,6 +140,11 @@ void virtual_bench_write(struct virtual_bench *bench, uint16_t station, uint16_t
 	CHECK_EQ(segment_frame(bench->segment, virtual_bench_now_ns(bench), frame,
 			       ecat_frame_end(&fb), &back_ns),
 		 0);
+}
+
+unsigned virtual_bench_al_status(const struct virtual_bench *bench, unsigned slave)
+{
+	return get_le16(segment_esc(bench->segment, slave)->reg + ESC_REG_AL_STATUS);
 }
 
 void virtual_bench_measure(struct virtual_bench *bench)

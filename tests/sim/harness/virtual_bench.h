@@ -69,6 +69,8 @@ int64_t virtual_bench_edge_ns(const struct virtual_bench *bench, unsigned slave,
 /** Write one byte of the registers of the slave with @station address, behind the master's back. */
 void virtual_bench_write(struct virtual_bench *bench, uint16_t station, uint16_t address,
 			 uint8_t value);
+/** The AL status register of @slave: its state and the error bit. */
+unsigned virtual_bench_al_status(const struct virtual_bench *bench, unsigned slave);
 /** Discard the measurements and start new ones. */
 void virtual_bench_measure(struct virtual_bench *bench);
 

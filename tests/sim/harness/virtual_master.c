@@ -323,6 +323,16 @@ void virtual_master_init_waiting(struct virtual_master *vm, struct virtual_bench
 	init(vm, bench, settings, 1);
 }
 
+void virtual_master_init_pair(struct virtual_master *vm, struct virtual_bench *bench,
+			      const char *setting, int waits)
+{
+	const char *const settings[] = { "slaves[0].name=a", "slaves[1].name=b", setting, NULL };
+
+	virtual_bench_init(bench,
+			   &(struct virtual_spec){ .slaves = 2, .seed = 5, .ppm = { 30, -40 } });
+	init(vm, bench, settings, waits);
+}
+
 void virtual_master_kill(struct virtual_master *vm)
 {
 	ring_reader_destroy(vm->samples);
@@ -330,6 +340,12 @@ void virtual_master_kill(struct virtual_master *vm)
 	session_destroy(vm->session);
 	vm->session = NULL;
 	run_dir_remove(vm->dir);
+}
+
+void virtual_master_close(struct virtual_master *vm)
+{
+	virtual_master_kill(vm);
+	virtual_bench_done(vm->bench);
 }
 
 int virtual_master_bring_up(struct virtual_master *vm)

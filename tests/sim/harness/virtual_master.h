@@ -70,8 +70,17 @@ void virtual_master_init(struct virtual_master *vm, struct virtual_bench *bench,
 /** The same, but a bring-up that fails leaves the bus as far as it came, as ecdaqd does. */
 void virtual_master_init_waiting(struct virtual_master *vm, struct virtual_bench *bench,
 				 const char *const *settings);
+/**
+ * A bench of two boards, "a" and "b", whose clocks drift apart, with a master that waits as above,
+ * or ends where a bring-up fails. @setting is one more; NULL: none.
+ */
+void virtual_master_init_pair(struct virtual_master *vm, struct virtual_bench *bench,
+			      const char *setting, int waits);
 /** End without sending a frame, as by SIGKILL. */
 void virtual_master_kill(struct virtual_master *vm);
+
+/** The same, with the bench under it. */
+void virtual_master_close(struct virtual_master *vm);
 
 /** session_bring_up(); 0 or -errno with vm->failure. */
 int virtual_master_bring_up(struct virtual_master *vm);

@@ -90,8 +90,7 @@ static void close_all(void)
 {
 	vm.each_cycle = NULL;
 	CHECK_EQ(virtual_master_stop(&vm), 0);
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 TEST(sim_loopback, analog_output_1_is_analog_input_1_of_the_cycle_before)
@@ -221,8 +220,7 @@ static void check_bring_up_fails(const struct virtual_spec *spec, const char *co
 		}
 	}
 	CHECK(strchr(vm.failure.text, '\n') == NULL);
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 TEST(sim_loopback, another_slave_than_the_coupler_is_named_with_both_identities)

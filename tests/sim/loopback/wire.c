@@ -86,8 +86,7 @@ TEST(sim_loopback, the_cyclic_frame_has_76_bytes_with_lrw_and_frmw)
 	CHECK_EQ(vm.result.op, vm.result.samples);
 	CHECK_EQ(vm.result.bad, 0);
 	CHECK_EQ(virtual_master_stop(&vm), 0);
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 static const struct channel *channel_of(const struct virtual_master *vm, const char *name)
@@ -132,6 +131,5 @@ TEST(sim_loopback, the_ordinary_mapping_makes_named_channels_of_the_coupler)
 	check_channel(&vm, "wago0.slot1_channel_1_data", CHANNEL_INPUT, CHANNEL_INT, 18);
 	check_channel(&vm, "wago0.slot3_channel_1_data", CHANNEL_INPUT, CHANNEL_BOOL, 26);
 	CHECK_EQ(virtual_master_stop(&vm), 0);
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }

@@ -9,11 +9,6 @@
 
 enum { STARTS = 60 };
 
-static uint16_t al_status(const struct virtual_bench *b, unsigned slave)
-{
-	return segment_esc(b->segment, slave)->reg[ESC_REG_AL_STATUS];
-}
-
 static uint16_t al_status_code(const struct virtual_bench *b, unsigned slave)
 {
 	const uint8_t *reg = segment_esc(b->segment, slave)->reg + ESC_REG_AL_STATUS_CODE;
@@ -48,15 +43,14 @@ TEST(sim_bring_up, two_slaves_reach_op_and_every_sample_is_good)
 	CHECK_EQ(vm.result.gaps, 0);
 	CHECK_EQ(vm.result.lost + vm.result.late + vm.result.skipped, 0);
 	for (unsigned i = 0; i < 2; i++) {
-		CHECK_EQ(al_status(&b, i), AL_OP);
+		CHECK_EQ(virtual_bench_al_status(&b, i), AL_OP);
 	}
 	CHECK_EQ(virtual_master_stop(&vm), 0);
 	for (unsigned i = 0; i < 2; i++) {
-		CHECK_EQ(al_status(&b, i), AL_INIT);
+		CHECK_EQ(virtual_bench_al_status(&b, i), AL_INIT);
 		CHECK_EQ(segment_esc(b.segment, i)->sync.is_running, 0);
 	}
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 /* T23: OP is requested of no slave before the servo is locked. */
@@ -80,8 +74,7 @@ TEST(sim_bring_up, op_is_requested_only_after_lock)
 	virtual_master_init(&vm, &b, NULL);
 	vm.each_cycle = check_lock_before_op;
 	bring_up(&vm);
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 /* T07: no watchdog trips on the way. */
@@ -89,7 +82,7 @@ static void check_no_watchdog(struct virtual_master *vm)
 {
 	for (unsigned i = 0; i < vm->bench->spec.slaves; i++) {
 		CHECK(al_status_code(vm->bench, i) != AL_CODE_SM_WATCHDOG);
-		CHECK((al_status(vm->bench, i) & AL_ERROR) == 0);
+		CHECK((virtual_bench_al_status(vm->bench, i) & AL_ERROR) == 0);
 	}
 }
 
@@ -104,8 +97,7 @@ TEST(sim_bring_up, no_watchdog_trips_in_sixty_starts)
 		vm.each_cycle = check_no_watchdog;
 		bring_up(&vm);
 		virtual_master_run(&vm, 50);
-		virtual_master_kill(&vm);
-		virtual_bench_done(&b);
+		virtual_master_close(&vm);
 	}
 }
 
@@ -143,8 +135,7 @@ TEST(sim_bring_up, a_bus_is_left_and_entered_again_and_again)
 		CHECK_EQ(virtual_master_run(&vm, 200), SESSION_GOES_ON);
 		CHECK_EQ(virtual_master_stop(&vm), 0);
 	}
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 TEST(sim_bring_up, sixteen_slaves_reach_op)
@@ -164,8 +155,7 @@ TEST(sim_bring_up, sixteen_slaves_reach_op)
 	virtual_master_run(&vm, 500);
 	CHECK_EQ(vm.result.bad, 0);
 	CHECK_EQ(atomic_load(&session_page(vm.session)->slave_count), 16);
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 static void check_refusal(const char *const *settings, enum exit_code code, const char *word)
@@ -180,8 +170,7 @@ static void check_refusal(const char *const *settings, enum exit_code code, cons
 	CHECK_EQ(vm.failure.code, code);
 	CHECK(strstr(vm.failure.text, word) != NULL);
 	CHECK(strchr(vm.failure.text, '\n') == NULL);
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 TEST(sim_bring_up, a_wrong_slave_one_too_few_and_one_too_many_are_refused)
@@ -210,6 +199,5 @@ TEST(sim_bring_up, a_segment_without_power_has_no_slave)
 	CHECK(strstr(vm.failure.text, "no slave") != NULL);
 	segment_power_on(b.segment, 0, virtual_bench_now_ns(&b));
 	bring_up(&vm); /* the same session, as --wait does it */
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }

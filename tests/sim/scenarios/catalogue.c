@@ -48,8 +48,7 @@ static void open_all(unsigned slaves, virtual_slave_maker maker, const char *con
 static void close_all(void)
 {
 	CHECK_EQ(virtual_master_stop(&vm), 0);
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 /* Bits of the PDOs that entry @i assigns by default. */

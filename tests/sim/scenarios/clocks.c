@@ -49,8 +49,7 @@ static struct figures one_start(uint64_t seed)
 	f.spread_ns = b.scope.spread_max_ns;
 	CHECK_EQ(vm.result.unlocked, 0);
 	CHECK(b.scope.compared >= MEASURE_CYCLES);
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 	return f;
 }
 
@@ -121,8 +120,7 @@ TEST(sim_clocks, a_step_of_the_wall_clock_does_not_reach_the_cycle)
 	CHECK_EQ(vm.result.unlocked, 0);
 	CHECK_EQ(vm.result.gaps, 0);
 	CHECK(vm.result.phase_max_ns <= PHASE_LIMIT_NS + 10000);
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 /* T39: a board without a battery wakes up in 1970, 30 years before DC time begins. */
@@ -141,8 +139,7 @@ TEST(sim_clocks, a_host_that_wakes_up_in_1970_reaches_op)
 	virtual_master_run(&vm, 500);
 	CHECK_EQ(vm.result.bad, 0);
 	CHECK_EQ(vm.result.gaps, 0);
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 /* A crystal that changes with the weather: the servo follows, the slaves follow. */
@@ -162,8 +159,7 @@ TEST(sim_clocks, a_reference_that_drifts_is_followed)
 	CHECK_EQ(vm.result.bad, 0);
 	CHECK(vm.result.phase_max_ns <= PHASE_LIMIT_NS);
 	CHECK(b.scope.spread_max_ns <= SPREAD_LIMIT_NS);
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 /* T17: without the reference no time is written into the others. */
@@ -188,6 +184,5 @@ TEST(sim_clocks, no_slave_s_clock_jumps_when_the_reference_loses_power)
 	end_ns = virtual_bench_now_ns(&b);
 	after_ns = (int64_t)esc_system_time(segment_esc(b.segment, 1), end_ns);
 	CHECK(llabs((after_ns - before_ns) - (end_ns - start_ns)) < (end_ns - start_ns) / 1000);
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }

@@ -25,12 +25,6 @@ static void open_bench(const char *setting)
 	virtual_master_init_waiting(&vm, &b, settings);
 }
 
-static void close_bench(void)
-{
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
-}
-
 static struct esc *esc_of(unsigned slave)
 {
 	return segment_esc(b.segment, slave);
@@ -114,7 +108,7 @@ TEST(esc_requests, registers_are_read_and_written_in_every_state)
 		CHECK_EQ(write_word(1, ESC_REG_USER_RAM, 0x4711, 0).result, 0);
 		CHECK_EQ(get_le16(esc_of(1)->reg + ESC_REG_USER_RAM), 0x4711);
 		CHECK(get_le16(esc_of(0)->reg + ESC_REG_USER_RAM) != 0x4711);
-		close_bench();
+		virtual_master_close(&vm);
 	}
 }
 
@@ -140,7 +134,7 @@ TEST(esc_requests, what_the_master_needs_is_written_in_operation_only_by_force)
 	CHECK_EQ(vm.result.lost, 0);
 	CHECK_EQ(vm.result.wkc_low, 0);
 	CHECK_EQ(session_page(vm.session)->bus_state, BUS_OP);
-	close_bench();
+	virtual_master_close(&vm);
 }
 
 TEST(esc_requests, an_eeprom_is_read_in_op_without_disturbing_the_cycle)
@@ -160,7 +154,7 @@ TEST(esc_requests, an_eeprom_is_read_in_op_without_disturbing_the_cycle)
 	CHECK_EQ(vm.result.lost, 0);
 	CHECK_EQ(vm.result.wkc_low, 0);
 	CHECK_EQ(vm.result.bad, 0);
-	close_bench();
+	virtual_master_close(&vm);
 }
 
 TEST(esc_requests, an_image_is_written_in_preop_and_refused_in_op)
@@ -191,14 +185,14 @@ TEST(esc_requests, an_image_is_written_in_preop_and_refused_in_op)
 	CHECK(sii_is_checksum_right(esc_of(1)->sii));
 	reply = ask(ADMIN_SII_ALIAS, 1, 0x1235, 0);
 	CHECK_EQ(written(&reply).written, 0);
-	close_bench();
+	virtual_master_close(&vm);
 	open_bench("bus.target=op");
 	virtual_master_settle(&vm);
 	reply = write_sii(1, image, len);
 	CHECK_EQ(reply.result, -EPERM);
 	CHECK(strstr(reply.text, "SAFE-OP or OP") != NULL);
 	CHECK(get_le16(esc_of(1)->sii + SII_ALIAS_BYTE) != 0x1234);
-	close_bench();
+	virtual_master_close(&vm);
 }
 
 TEST(esc_requests, a_read_of_an_eeprom_ends_when_the_bus_is_taken_down)
@@ -225,7 +219,7 @@ TEST(esc_requests, a_read_of_an_eeprom_ends_when_the_bus_is_taken_down)
 	CHECK_STR(reply.text, "the bus was taken down");
 	close(fd);
 	CHECK_EQ(ask(ADMIN_SII_READ, 1, 0, 0).result, 0);
-	close_bench();
+	virtual_master_close(&vm);
 }
 
 TEST(esc_requests, error_counters_are_read_and_reset_and_their_sums_go_on)
@@ -254,5 +248,5 @@ TEST(esc_requests, error_counters_are_read_and_reset_and_their_sums_go_on)
 	CHECK_EQ(found.port[0].rx_errors, 0);
 	CHECK_EQ(virtual_master_run(&vm, 500), SESSION_GOES_ON);
 	CHECK_EQ(session_page(vm.session)->slave[1].rx_errors[0], sum);
-	close_bench();
+	virtual_master_close(&vm);
 }

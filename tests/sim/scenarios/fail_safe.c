@@ -44,8 +44,7 @@ static void open_live(unsigned slaves, uint64_t seed, const char *setting)
 
 static void close_all(void)
 {
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 static const struct cycle_stats *stats(void)

@@ -84,8 +84,7 @@ static void close_bus(void)
 	close(admin);
 	mailbox_cancel(bus_mailbox(vm.session->bus), &foe);
 	mailbox_cancel(bus_mailbox(vm.session->bus), &sdo);
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 static void make_busy(void)

@@ -204,8 +204,7 @@ void fault_trial_run(struct fault_trial *t, const struct fault_row *row, uint64_
 	check_peace(t, row);
 	check_told(t, row);
 	ring_reader_destroy(t->events);
-	virtual_master_kill(&t->vm);
-	virtual_bench_done(&t->b);
+	virtual_master_close(&t->vm);
 }
 
 double fault_trial_back_ms(const struct fault_trial *t)

@@ -23,8 +23,7 @@ static void run_open(struct run *r)
 
 static void run_close(struct run *r)
 {
-	virtual_master_kill(&r->vm);
-	virtual_bench_done(&r->b);
+	virtual_master_close(&r->vm);
 }
 
 /* T01 */

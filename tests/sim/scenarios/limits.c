@@ -80,12 +80,6 @@ static void begin(unsigned slaves, const char *text, const char *const *settings
 	virtual_master_init(&vm, &b, settings);
 }
 
-static void close_bench(void)
-{
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
-}
-
 static const struct sample_meta *meta_of_ring(void)
 {
 	size_t bytes;
@@ -223,7 +217,7 @@ TEST(limits, the_greatest_bus_is_exchanged_and_all_its_outputs_arrive)
 	set_all_outputs();
 	CHECK_EQ(virtual_master_run(&vm, 2), SESSION_GOES_ON);
 	find_all_outputs_in_the_slaves();
-	close_bench();
+	virtual_master_close(&vm);
 }
 
 /* Not all LIMIT_SLAVES: each of two datagrams a slave passes each slave of the simulation. */
@@ -237,7 +231,7 @@ TEST(limits, a_lost_slave_beyond_the_first_words_is_bad_at_once_and_lost_after_t
 		CHECK_EQ(virtual_master_run(&vm, CYCLES + phase), SESSION_GOES_ON);
 		CHECK(slave_set_is_empty(&virtual_master_sample(&vm)->slaves_bad));
 		lose_one_slave(SLAVES);
-		close_bench();
+		virtual_master_close(&vm);
 	}
 }
 
@@ -253,12 +247,12 @@ TEST(limits, one_byte_more_of_process_data_is_refused)
 		 BYTES, BYTES / 8);
 	begin(SLAVES, text, one_datagram);
 	CHECK_EQ(virtual_master_bring_up(&vm), 0);
-	close_bench();
+	virtual_master_close(&vm);
 	begin(SLAVES + 1, text, one_datagram);
 	CHECK_EQ(virtual_master_bring_up(&vm), -E2BIG);
 	if (strstr(vm.failure.text, "the process image exceeds LIMIT_IMAGE_BYTES (32768)") ==
 	    NULL) {
 		test_fail(__FILE__, __LINE__, "%s", vm.failure.text);
 	}
-	close_bench();
+	virtual_master_close(&vm);
 }

@@ -75,7 +75,6 @@ int main(int argc, char **argv)
 	start_s = seconds();
 	virtual_master_run(&vm, cycles);
 	result = report(&vm, seconds() - start_s, cycles);
-	virtual_master_kill(&vm);
-	virtual_bench_done(&bench);
+	virtual_master_close(&vm);
 	return result;
 }

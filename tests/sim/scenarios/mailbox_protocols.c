@@ -126,8 +126,7 @@ TEST(sim_mailbox_protocols, all_of_them_in_op_disturb_no_cycle)
 	}
 	check_undisturbed((uint64_t)ROUNDS * CYCLES);
 	CHECK(vm.result.phase_max_ns <= phase_idle_ns + 2000);
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 TEST(sim_mailbox_protocols, all_of_them_are_served_in_safe_op)
@@ -154,8 +153,7 @@ TEST(sim_mailbox_protocols, all_of_them_are_served_in_safe_op)
 	CHECK_EQ(rq[4].len, sizeof(echo));
 	CHECK_EQ(rq[5].len, 4);
 	CHECK_EQ(segment_esc(b.segment, DRIVE)->reg[ESC_REG_AL_STATUS], AL_SAFEOP);
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 TEST(sim_mailbox_protocols, a_slave_that_is_busy_for_ever_disturbs_neither_cycle_nor_the_others)
@@ -180,6 +178,5 @@ TEST(sim_mailbox_protocols, a_slave_that_is_busy_for_ever_disturbs_neither_cycle
 		CHECK_EQ(rq[i].result, 0);
 	}
 	check_undisturbed(CYCLES);
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }

@@ -30,8 +30,7 @@ static void open_all(const char *const *settings)
 
 static void close_all(void)
 {
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 static struct admin_reply fire(uint16_t slave_pos, uint8_t is_relative, int64_t time_ns)

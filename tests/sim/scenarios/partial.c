@@ -44,8 +44,7 @@ static void open_all(const char *datagrams)
 
 static void close_all(void)
 {
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 static uint32_t state(void)

@@ -22,8 +22,7 @@ static struct virtual_result run(uint64_t seed, const char *fault)
 	}
 	CHECK_EQ(virtual_master_run(&vm, 5000), SESSION_GOES_ON);
 	CHECK_EQ(virtual_master_stop(&vm), 0);
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 	return vm.result;
 }
 

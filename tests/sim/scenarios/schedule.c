@@ -23,8 +23,7 @@ static int open_at(unsigned slaves, const char *period)
 
 static void close_all(void)
 {
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 TEST(sim_schedule, a_period_too_short_for_64_slaves_is_refused_and_the_one_named_works)

@@ -91,8 +91,7 @@ static void run_with_late_wakes(int is_busy)
 	vm.each_cycle = each_cycle;
 	virtual_master_run(&vm, CYCLES);
 	CHECK_EQ(atomic_load(&session_page(vm.session)->cycle.frames_lost), 0);
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 TEST(sim_service_frames, a_full_mailbox_slot_does_not_delay_the_frame_after_a_late_wake)

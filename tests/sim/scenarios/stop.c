@@ -8,36 +8,14 @@
 #include <unistd.h>
 
 #include "base/admin_protocol.h"
-#include "base/bytes.h"
 #include "harness/test.h"
 #include "sim/harness/virtual_master.h"
 #include "wire/al.h"
-#include "wire/esc_reg.h"
 
 enum { SLAVES = 2, RUN_CYCLES = 1000 };
 
 static struct virtual_bench b;
 static struct virtual_master vm;
-
-static void open_bench(const char *setting)
-{
-	const char *const settings[] = { "slaves[0].name=a", "slaves[1].name=b", setting, NULL };
-
-	virtual_bench_init(
-		&b, &(struct virtual_spec){ .slaves = SLAVES, .seed = 5, .ppm = { 30, -40 } });
-	virtual_master_init(&vm, &b, settings);
-}
-
-static void close_bench(void)
-{
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
-}
-
-static unsigned al_state(unsigned slave)
-{
-	return get_le16(segment_esc(b.segment, slave)->reg + ESC_REG_AL_STATUS);
-}
 
 /* Stop; it must take less than a second, and reaches INIT in the slaves of @reachable (bits). */
 static int stop_in_time(unsigned reachable)
@@ -50,7 +28,7 @@ static int stop_in_time(unsigned reachable)
 	CHECK(virtual_bench_now_ns(&b) - start_ns < NS_PER_S);
 	for (unsigned i = 0; i < SLAVES; i++) {
 		if ((reachable >> i & 1) != 0) {
-			CHECK_EQ(al_state(i), AL_INIT);
+			CHECK_EQ(virtual_bench_al_status(&b, i), AL_INIT);
 		}
 	}
 	return r;
@@ -61,14 +39,14 @@ static int run_and_stop(const char *setting, const char *fault, unsigned reachab
 {
 	int r;
 
-	open_bench(setting);
+	virtual_master_init_pair(&vm, &b, setting, 0);
 	virtual_master_settle(&vm);
 	if (fault != NULL) {
 		virtual_bench_fault(&b, fault);
 	}
 	virtual_master_run(&vm, RUN_CYCLES);
 	r = stop_in_time(reachable);
-	close_bench();
+	virtual_master_close(&vm);
 	return r;
 }
 
@@ -104,7 +82,7 @@ TEST(stop, a_dead_mailbox_with_a_request_in_it_is_not_waited_for)
 				    .subindex = 1 };
 	int fd;
 
-	open_bench("bus.mailbox_timeout=60s");
+	virtual_master_init_pair(&vm, &b, "bus.mailbox_timeout=60s", 0);
 	virtual_master_settle(&vm);
 	fd = virtual_master_connect(&vm);
 	virtual_bench_fault(&b, "at=0s mailbox-stuck slave=1 for=100s");
@@ -113,7 +91,7 @@ TEST(stop, a_dead_mailbox_with_a_request_in_it_is_not_waited_for)
 	CHECK(recv(fd, &rq, sizeof(rq), MSG_DONTWAIT | MSG_PEEK) < 0); /* it still waits */
 	CHECK_EQ(stop_in_time(3), 0);
 	close(fd);
-	close_bench();
+	virtual_master_close(&vm);
 }
 
 /* A stop request @after_ns into the bring-up. */
@@ -123,7 +101,7 @@ static int64_t ask_later(int64_t after_ns, const char *setting, const char *faul
 {
 	int64_t end_ns;
 
-	open_bench(setting);
+	virtual_master_init_pair(&vm, &b, setting, 0);
 	if (fault != NULL) {
 		virtual_bench_fault(&b, fault);
 	}
@@ -140,10 +118,10 @@ static int64_t ask_later(int64_t after_ns, const char *setting, const char *faul
 TEST(stop, a_scan_of_an_empty_wire_ends_at_once)
 {
 	CHECK(ask_later(0, "bus.scan_timeout=60s", "at=0s power-off slave=0") < NS_PER_S);
-	close_bench();
+	virtual_master_close(&vm);
 	CHECK(ask_later(20 * NS_PER_S, "bus.scan_timeout=60s", "at=0s power-off slave=0") <
 	      NS_PER_S);
-	close_bench();
+	virtual_master_close(&vm);
 }
 
 /* Every 20 ms of a bring-up: the slaves end in INIT. */
@@ -152,26 +130,26 @@ TEST(stop, every_step_of_the_bring_up_ends_at_once_and_in_init)
 	const char *const burst = "dc.burst_frames=100000";
 	int64_t whole_ns;
 
-	open_bench(NULL);
+	virtual_master_init_pair(&vm, &b, NULL, 0);
 	CHECK_EQ(virtual_master_bring_up(&vm), 0);
 	whole_ns = vm.op_ns;
-	close_bench();
+	virtual_master_close(&vm);
 	for (int64_t at_ns = 0; at_ns < whole_ns - NS_PER_MS; at_ns += 20 * NS_PER_MS) {
 		CHECK(ask_later(at_ns, NULL, NULL) < NS_PER_S);
 		for (unsigned i = 0; i < SLAVES; i++) {
-			CHECK_EQ(al_state(i), AL_INIT);
+			CHECK_EQ(virtual_bench_al_status(&b, i), AL_INIT);
 		}
-		close_bench();
+		virtual_master_close(&vm);
 	}
 	CHECK(ask_later(2 * NS_PER_S, burst, NULL) < NS_PER_S);
-	CHECK_EQ(al_state(1), AL_INIT);
-	close_bench();
+	CHECK_EQ(virtual_bench_al_status(&b, 1), AL_INIT);
+	virtual_master_close(&vm);
 }
 
 TEST(stop, waiting_for_a_state_that_does_not_come_ends_at_once)
 {
 	CHECK(ask_later(10 * NS_PER_S, "bus.op_timeout=120s",
 			"at=0s slow slave=1 state=safeop by=60s") < NS_PER_S);
-	CHECK_EQ(al_state(0), AL_INIT);
-	close_bench();
+	CHECK_EQ(virtual_bench_al_status(&b, 0), AL_INIT);
+	virtual_master_close(&vm);
 }

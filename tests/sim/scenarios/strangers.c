@@ -47,8 +47,7 @@ static void open_without(unsigned position)
 
 static void close_all(void)
 {
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 /* Another master has set its clock and its FMMU and led it to SAFE-OP. */

@@ -42,8 +42,7 @@ static void open_with(const char *setting)
 static void close_all(void)
 {
 	ring_reader_destroy(events);
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 /* Events since the last call; @ret_last the newest with @id. */

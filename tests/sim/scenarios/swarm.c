@@ -313,8 +313,7 @@ static uint64_t one_seed(uint64_t seed)
 	storm(&sw, seed);
 	wait_for_op(&sw);
 	check_peace(&sw);
-	virtual_master_kill(&sw.vm);
-	virtual_bench_done(&sw.b);
+	virtual_master_close(&sw.vm);
 	CHECK(sw.compared > (uint64_t)CHECK_CYCLES * sw.slaves);
 	return sw.compared;
 }

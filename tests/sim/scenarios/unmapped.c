@@ -32,8 +32,7 @@ static void open_all(const char *datagrams)
 
 static void close_all(void)
 {
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
+	virtual_master_close(&vm);
 }
 
 /* Somebody else, as a tool with a socket of its own, writes to a register of @slave. */

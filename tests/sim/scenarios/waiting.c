@@ -9,36 +9,15 @@
 #include "harness/test.h"
 #include "sim/harness/virtual_master.h"
 #include "wire/al.h"
-#include "wire/esc_reg.h"
 
 enum { SLAVES = 2 };
 
 static struct virtual_bench b;
 static struct virtual_master vm;
 
-static void open_bench(const char *setting)
-{
-	const char *const settings[] = { "slaves[0].name=a", "slaves[1].name=b", setting, NULL };
-
-	virtual_bench_init(
-		&b, &(struct virtual_spec){ .slaves = SLAVES, .seed = 5, .ppm = { 30, -40 } });
-	virtual_master_init_waiting(&vm, &b, settings);
-}
-
-static void close_bench(void)
-{
-	virtual_master_kill(&vm);
-	virtual_bench_done(&b);
-}
-
 static const struct status_page *page(void)
 {
 	return session_page(vm.session);
-}
-
-static unsigned al_state(unsigned slave)
-{
-	return get_le16(segment_esc(b.segment, slave)->reg + ESC_REG_AL_STATUS);
 }
 
 static struct admin_reply ask_state(uint16_t slave_pos, unsigned state)
@@ -70,7 +49,7 @@ static int can_read_an_object(void)
 
 TEST(waiting, a_slave_that_refuses_op_leaves_the_bus_in_safeop_with_the_reason)
 {
-	open_bench(NULL);
+	virtual_master_init_pair(&vm, &b, NULL, 1);
 	virtual_bench_fault(&b, "at=0s refuse slave=1 state=op code=0x001d");
 	CHECK(virtual_master_bring_up(&vm) < 0);
 	CHECK_EQ(vm.failure.code, EXIT_CODE_STATE);
@@ -81,7 +60,7 @@ TEST(waiting, a_slave_that_refuses_op_leaves_the_bus_in_safeop_with_the_reason)
 	CHECK(strstr(page()->message, "slave 1 (b): refuses OP and is in SAFE-OP") != NULL);
 	CHECK(strstr(page()->message, "0x001d") != NULL);
 	CHECK_EQ(virtual_master_run(&vm, 500), SESSION_GOES_ON);
-	CHECK_EQ(al_state(1) & AL_STATE_MASK, AL_SAFEOP);
+	CHECK_EQ(virtual_bench_al_status(&b, 1) & AL_STATE_MASK, AL_SAFEOP);
 	CHECK(can_read_an_object());
 	/* The cause is removed, and the operator says so. */
 	virtual_bench_fault(&b, "at=0s obey slave=1");
@@ -89,16 +68,16 @@ TEST(waiting, a_slave_that_refuses_op_leaves_the_bus_in_safeop_with_the_reason)
 	CHECK_EQ(page()->bus_state, BUS_OP);
 	CHECK_EQ(page()->is_waiting, 0);
 	CHECK_STR(page()->message, "");
-	CHECK_EQ(al_state(1), AL_OP);
+	CHECK_EQ(virtual_bench_al_status(&b, 1), AL_OP);
 	CHECK_EQ(virtual_master_stop(&vm), 0);
-	close_bench();
+	virtual_master_close(&vm);
 }
 
 TEST(waiting, a_rescan_that_fails_again_is_answered_with_the_reason)
 {
 	struct admin_reply reply;
 
-	open_bench(NULL);
+	virtual_master_init_pair(&vm, &b, NULL, 1);
 	virtual_bench_fault(&b, "at=0s refuse slave=1 state=safeop code=0x001e");
 	CHECK(virtual_master_bring_up(&vm) < 0);
 	CHECK_EQ(page()->bus_state, BUS_PREOP);
@@ -106,12 +85,12 @@ TEST(waiting, a_rescan_that_fails_again_is_answered_with_the_reason)
 	CHECK(reply.result < 0);
 	CHECK(strstr(reply.text, "slave 1 (b): refuses SAFE-OP") != NULL);
 	CHECK_EQ(session_is_waiting(vm.session), 1);
-	close_bench();
+	virtual_master_close(&vm);
 }
 
 TEST(waiting, a_bus_without_a_slave_waits_and_is_brought_up_when_one_is_there)
 {
-	open_bench("bus.scan_timeout=1s");
+	virtual_master_init_pair(&vm, &b, "bus.scan_timeout=1s", 1);
 	virtual_bench_fault(&b, "at=0s power-off slave=0");
 	CHECK(virtual_master_bring_up(&vm) < 0);
 	CHECK_EQ(session_is_waiting(vm.session), 1);
@@ -122,7 +101,7 @@ TEST(waiting, a_bus_without_a_slave_waits_and_is_brought_up_when_one_is_there)
 	virtual_bench_fault(&b, "at=0s power-on slave=0");
 	CHECK_EQ(rescan().result, 0);
 	CHECK_EQ(page()->bus_state, BUS_OP);
-	close_bench();
+	virtual_master_close(&vm);
 }
 
 TEST(waiting, without_leave_to_wait_everything_is_taken_down)
@@ -133,8 +112,8 @@ TEST(waiting, without_leave_to_wait_everything_is_taken_down)
 	CHECK(virtual_master_bring_up(&vm) < 0);
 	CHECK_EQ(session_is_waiting(vm.session), 0);
 	CHECK_EQ(page()->bus_state, BUS_DOWN);
-	CHECK_EQ(al_state(0), AL_INIT);
-	close_bench();
+	CHECK_EQ(virtual_bench_al_status(&b, 0), AL_INIT);
+	virtual_master_close(&vm);
 }
 
 TEST(waiting, the_target_is_the_state_where_the_bus_stays)
@@ -149,20 +128,20 @@ TEST(waiting, the_target_is_the_state_where_the_bus_stays)
 			{ "bus.target=op", AL_OP, BUS_OP } };
 
 	for (size_t i = 0; i < sizeof(targets) / sizeof(targets[0]); i++) {
-		open_bench(targets[i].setting);
+		virtual_master_init_pair(&vm, &b, targets[i].setting, 1);
 		CHECK_EQ(virtual_master_bring_up(&vm), 0);
 		CHECK_EQ(virtual_master_run(&vm, 1000), SESSION_GOES_ON);
 		CHECK_EQ(page()->bus_state, targets[i].state);
 		CHECK_EQ(page()->bus_target, targets[i].state);
 		CHECK_EQ(page()->is_waiting, 0);
 		for (unsigned k = 0; k < SLAVES; k++) {
-			CHECK_EQ(al_state(k), targets[i].al);
+			CHECK_EQ(virtual_bench_al_status(&b, k), targets[i].al);
 			CHECK_EQ(page()->slave[k].al_state, targets[i].al);
 		}
 		CHECK_EQ(targets[i].al == AL_INIT || can_read_an_object(), 1);
 		CHECK_EQ(virtual_master_stop(&vm), 0);
-		CHECK_EQ(al_state(1), AL_INIT);
-		close_bench();
+		CHECK_EQ(virtual_bench_al_status(&b, 1), AL_INIT);
+		virtual_master_close(&vm);
 	}
 }
 
@@ -170,31 +149,31 @@ TEST(waiting, all_slaves_are_led_to_the_state_that_a_client_asks_for)
 {
 	static const unsigned way[] = { AL_OP, AL_PREOP, AL_SAFEOP, AL_INIT, AL_OP };
 
-	open_bench("bus.target=preop");
+	virtual_master_init_pair(&vm, &b, "bus.target=preop", 1);
 	CHECK_EQ(virtual_master_bring_up(&vm), 0);
 	for (size_t i = 0; i < sizeof(way) / sizeof(way[0]); i++) {
 		CHECK_EQ(ask_state(ADMIN_ALL_SLAVES, way[i]).result, 0);
-		CHECK_EQ(al_state(0), way[i]);
-		CHECK_EQ(al_state(1), way[i]);
+		CHECK_EQ(virtual_bench_al_status(&b, 0), way[i]);
+		CHECK_EQ(virtual_bench_al_status(&b, 1), way[i]);
 		CHECK_EQ(virtual_master_run(&vm, 300), SESSION_GOES_ON);
-		CHECK_EQ(al_state(1), way[i]);
+		CHECK_EQ(virtual_bench_al_status(&b, 1), way[i]);
 	}
 	CHECK_EQ(ask_state(ADMIN_ALL_SLAVES, AL_BOOT).result, -EINVAL);
 	CHECK_EQ(page()->bus_state, BUS_OP);
-	close_bench();
+	virtual_master_close(&vm);
 }
 
 TEST(waiting, one_slave_changes_its_state_unless_the_bus_is_in_operation)
 {
 	struct admin_reply reply;
 
-	open_bench("bus.target=preop");
+	virtual_master_init_pair(&vm, &b, "bus.target=preop", 1);
 	CHECK_EQ(virtual_master_bring_up(&vm), 0);
 	reply = ask_state(1, AL_INIT);
 	CHECK_EQ(reply.result, 0);
 	CHECK_EQ(reply.data[0], AL_INIT);
-	CHECK_EQ(al_state(1), AL_INIT);
-	CHECK_EQ(al_state(0), AL_PREOP);
+	CHECK_EQ(virtual_bench_al_status(&b, 1), AL_INIT);
+	CHECK_EQ(virtual_bench_al_status(&b, 0), AL_PREOP);
 	CHECK_EQ(virtual_master_run(&vm, 200), SESSION_GOES_ON);
 	CHECK_EQ(page()->slave[1].al_state, AL_INIT);
 	CHECK_EQ(ask_state(1, AL_PREOP).result, 0);
@@ -206,14 +185,14 @@ TEST(waiting, one_slave_changes_its_state_unless_the_bus_is_in_operation)
 	reply = ask_state(1, AL_PREOP);
 	CHECK_EQ(reply.result, -EPERM);
 	CHECK_EQ(rescan().result, -EPERM);
-	CHECK_EQ(al_state(1), AL_OP);
-	close_bench();
+	CHECK_EQ(virtual_bench_al_status(&b, 1), AL_OP);
+	virtual_master_close(&vm);
 }
 
 /* user.md 3 of the first review: OP was shown of slaves that were gone. */
 TEST(waiting, no_state_is_shown_of_slaves_whose_frames_do_not_come_back)
 {
-	open_bench(NULL);
+	virtual_master_init_pair(&vm, &b, NULL, 1);
 	virtual_master_settle(&vm);
 	CHECK_EQ(virtual_master_run(&vm, 200), SESSION_GOES_ON);
 	CHECK_EQ(page()->slave[1].al_state, AL_OP);
@@ -222,16 +201,16 @@ TEST(waiting, no_state_is_shown_of_slaves_whose_frames_do_not_come_back)
 	CHECK_EQ(page()->slave[0].al_state, 0);
 	CHECK_EQ(page()->slave[1].al_state, 0);
 	CHECK_EQ(page()->bus_state, BUS_RECOVERING);
-	close_bench();
+	virtual_master_close(&vm);
 	/* The same on a bus that is held. */
-	open_bench("bus.target=preop");
+	virtual_master_init_pair(&vm, &b, "bus.target=preop", 1);
 	CHECK_EQ(virtual_master_bring_up(&vm), 0);
 	CHECK_EQ(virtual_master_run(&vm, 200), SESSION_GOES_ON);
 	CHECK_EQ(page()->slave[1].al_state, AL_PREOP);
 	virtual_bench_fault(&b, "at=0s cut slave=0");
 	CHECK_EQ(virtual_master_run(&vm, 400), SESSION_GOES_ON);
 	CHECK_EQ(page()->slave[1].al_state, 0);
-	close_bench();
+	virtual_master_close(&vm);
 }
 
 /* A request that was sent before the bring-up is answered in the middle of it. */
@@ -247,7 +226,7 @@ TEST(waiting, a_stop_through_the_socket_ends_a_scan_of_a_minute)
 	int64_t start_ns;
 	int fd = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
 
-	open_bench("bus.scan_timeout=60s");
+	virtual_master_init_pair(&vm, &b, "bus.scan_timeout=60s", 1);
 	virtual_bench_fault(&b, "at=0s power-off slave=0");
 	snprintf(address.sun_path, sizeof(address.sun_path), "%s/" CONFIG_RUN_ADMIN, vm.dir);
 	CHECK_EQ(connect(fd, (const struct sockaddr *)&address, sizeof(address)), 0);
@@ -264,5 +243,5 @@ TEST(waiting, a_stop_through_the_socket_ends_a_scan_of_a_minute)
 	CHECK_EQ(reply.id, 2);
 	CHECK_EQ(reply.result, 0);
 	close(fd);
-	close_bench();
+	virtual_master_close(&vm);
 }
