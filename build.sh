@@ -59,7 +59,7 @@ help_test()
 	cat <<'USAGE'
 usage: ./build.sh test [--fail-fast | --keep-going] [--only PATTERN] [--fuzz-seconds N] [GROUP...]
 
-Without GROUP all groups run, the fast ones first:
+Without GROUP all groups run, the fast ones first, cli and docs beside the computing ones:
   unit     app/, module by module; also under ASan+UBSan, and what threads share under TSan
   tidy     the rules of the source tree: include table, banned calls, sizes, formatting, links, lint
   cli      the operator's tool and the programs' command lines; also under ASan+UBSan

@@ -21,8 +21,10 @@ import time
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
+from beside import Beside
 from processes import adopt_orphans, end_group, wait_and_reap
 from test_report import Outcome, fail_unexpected_skips, read_junit, tail
 
@@ -314,6 +316,9 @@ GROUPS: dict[str, list[Suite]] = {
 }
 # Part of other groups, long, or too exact for a loaded machine: only when named.
 ON_REQUEST = ("control", "sync0", "long", "wire")
+# These mostly wait, and run beside the computing ones. The rest measure time: each alone.
+WAITING = ("cli", "docs")
+COMPUTING = ("unit", "tidy", "replay", "sim", "fuzz", "recipes")
 
 
 class Builder:
@@ -389,6 +394,33 @@ def run_timed(group: str, builder: Builder, options: argparse.Namespace) -> Outc
     return outcome
 
 
+def run_all(groups: Sequence[str], builder: Builder, options: argparse.Namespace) -> Outcome:
+    total = Outcome()
+    for group in groups:
+        total.add(run_timed(group, builder, options))
+        if total.failures and options.fail_fast:
+            break
+    return total
+
+
+def run_in_order(wanted: Sequence[str], builder: Builder, options: argparse.Namespace) -> Outcome:
+    """All groups; each of those that wait beside those that compute."""
+    computing = [group for group in wanted if group in COMPUTING]
+    waiting = [group for group in wanted if group in WAITING]
+    alone = [group for group in wanted if group not in (*computing, *waiting)]
+    if len(computing) + len(waiting) < 2 or options.fail_fast:
+        return run_all(wanted, builder, options)
+    # Two processes must not build in the same folder.
+    for suite in (suite for group in waiting for suite in GROUPS[group]):
+        builder.build(suite.flavour)
+    beside = {name: Beside(partial(run_timed, name, builder, options)) for name in waiting}
+    total = run_all(computing, builder, options)
+    for name, running in beside.items():
+        total.add(running.result() or Outcome(failures=[f"{name}: ended without a result"]))
+    total.add(run_all(alone, builder, options))
+    return total
+
+
 def report_times(total: Outcome) -> None:
     """Print time per group and the slowest tests; keep both for ./build.sh measure ci."""
     print(f"\n{'time per group':24} {'wall':>9} {'CPU':>9}")
@@ -435,14 +467,9 @@ def main(arguments: Sequence[str]) -> int:
             return 2
     if options.check:
         return 0
-    total = Outcome()
     usual = [g for g in GROUPS if g not in ON_REQUEST]
     wanted = [g for g in GROUPS if g in (options.groups or usual)]
-    builder = Builder()
-    for group in wanted:
-        total.add(run_timed(group, builder, options))
-        if total.failures and options.fail_fast:
-            break
+    total = run_in_order(wanted, Builder(), options)
     if os.environ.get("CI"):
         fail_unexpected_skips(total, ROOT / "tests" / "expected_skips.txt")
     if total.skips:

@@ -48,6 +48,13 @@ def own_build(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+def wait_for_lines(paths: list[Path]) -> None:
+    end = time.monotonic() + 60
+    while not all(path.exists() and path.read_text().strip() for path in paths):
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
 def heads(outcome: Outcome) -> list[str]:
     return [failure.splitlines()[0] for failure in outcome.failures]
 
@@ -160,6 +167,41 @@ def test_fail_fast_leaves_the_next_suite_alone(monkeypatch: pytest.MonkeyPatch) 
     assert run_tests.run_group("sim", ReadyBuilder(), OPTIONS).passed == 1
 
 
+def meeting(own: Path, other: Path) -> Suite:
+    """A suite that passes only while another one of its kind runs."""
+
+    def run(*_: object) -> Outcome:
+        own.write_text("here")
+        wait_for_lines([other])
+        return Outcome(passed=1)
+
+    return Suite(own.name, "release", run)
+
+
+def test_groups_that_wait_run_beside_those_that_compute(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    unit, cli, docs = tmp_path / "unit", tmp_path / "cli", tmp_path / "docs"
+    failing = Suite("live", "release", lambda *_: Outcome(failures=["live: x"]))
+    monkeypatch.setitem(run_tests.GROUPS, "unit", [meeting(unit, cli)])
+    monkeypatch.setitem(run_tests.GROUPS, "cli", [meeting(cli, docs)])
+    monkeypatch.setitem(run_tests.GROUPS, "docs", [meeting(docs, unit)])
+    monkeypatch.setitem(run_tests.GROUPS, "live", [failing])
+    outcome = run_tests.run_in_order(["unit", "cli", "live", "docs"], ReadyBuilder(), OPTIONS)
+    assert outcome.totals() == "3 passed, 1 failed, 0 skipped"
+    assert [name for name, *_ in outcome.groups] == ["unit", "cli", "docs", "live"]
+
+
+def test_groups_that_end_without_a_result_are_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    fine = Suite("unit", "release", lambda *_: Outcome(passed=1))
+    monkeypatch.setitem(run_tests.GROUPS, "unit", [fine])
+    monkeypatch.setitem(
+        run_tests.GROUPS, "docs", [Suite("docs", "release", lambda *_: os._exit(0))]
+    )
+    outcome = run_tests.run_in_order(["unit", "docs"], ReadyBuilder(), OPTIONS)
+    assert heads(outcome) == ["docs: ended without a result"]
+
+
 def fuzz_target(build: Path, name: str, script: str) -> None:
     target = build / "tests" / "fuzz" / f"fuzz_{name}"
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -214,13 +256,6 @@ def test_an_unexpected_skip_is_a_failure_in_ci(own_build: Path) -> None:
     assert heads(total) == [
         "live: b: no network (a skip that tests/expected_skips.txt does not list)"
     ]
-
-
-def wait_for_lines(paths: list[Path]) -> None:
-    end = time.monotonic() + 60
-    while not all(path.exists() and path.read_text().strip() for path in paths):
-        assert time.monotonic() < end
-        time.sleep(0.01)
 
 
 def test_a_signal_ends_everything_that_was_started(own_build: Path) -> None:
