@@ -42,6 +42,13 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def environment(clone: Path) -> dict[str, str]:
+    """A user's, who has no settings of ecdaq, but compiled the same text in another folder before
+    (ccache) and does not wait for pip to compile all of pandas."""
+    own = {name: value for name, value in os.environ.items() if not name.startswith("ECDAQ_")}
+    return own | {"CCACHE_BASEDIR": str(clone), "CCACHE_NOHASHDIR": "1", "PIP_COMPILE": "0"}
+
+
 def test_every_tutorial_is_run() -> None:
     pages = {str(path.relative_to(ROOT)) for path in (ROOT / "app/doc/tutorial").glob("*.md")}
     assert pages == set(PAGES[1:])
@@ -52,14 +59,11 @@ def test_the_commands_of_the_page_work_in_a_fresh_clone(clone: Path, page: str) 
     commands = blocks(page)
     assert commands
     script = "set -eu\n" + "".join(f"echo '--- block {i}' >&2\n{c}" for i, c in enumerate(commands))
-    environment = {
-        name: value for name, value in os.environ.items() if not name.startswith("ECDAQ_")
-    }
     with (clone / "shell.log").open("w") as log:
         shell = subprocess.Popen(
             ["sh", "-c", script],
             cwd=clone,
-            env=environment,
+            env=environment(clone),
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=log,
