@@ -46,7 +46,7 @@ usage: ./build.sh build [FLAVOUR...]
 
   release   -O2, gcc; into build/release/, installed into build/stage/{bin,lib,include,share} (default)
   asan      AddressSanitizer and UndefinedBehaviorSanitizer; build/asan/, build/asan/stage/
-  tsan      ThreadSanitizer; build/tsan/
+  tsan      ThreadSanitizer, the tests of what threads share; build/tsan/
   fuzz      the fuzz targets: clang, libFuzzer, both sanitizers; build/fuzz/
   clang     -O2 with the second compiler; build/clang/
 

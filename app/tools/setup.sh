@@ -308,8 +308,8 @@ configure_flavour()
 	printf '%s\n' "$*" > "$build_dir/configured"
 }
 
-# build_flavour NAME [TARGET]: configure, build (default: all of it), and, except for the fuzz
-# targets, install into $stage.
+# build_flavour NAME [TARGET]: configure, build (default: all that the flavour is for), and, except for
+# the fuzz targets and TSan's tests, install into $stage.
 build_flavour()
 {
 	configure_flavour "$1"
@@ -317,11 +317,13 @@ build_flavour()
 	target=${2:-all}
 	case $1 in
 	fuzz) target=fuzz_targets ;;
+	tsan) target=shared_state ;;
 	release) stage=$root/build/stage ;;
 	esac
 	if ! run_step "compiling $1" "$build_dir/build.log" ninja -C "$build_dir" "$target"; then
 		sed -n '/^FAILED:\|^ninja: error/,$p' "$build_dir/build.log" >&2
 		die "cannot build $1 (see above, and $build_dir/build.log)"
 	fi
-	[ "$1" = fuzz ] || cmake --install "$build_dir" --prefix "$stage" > "$build_dir/install.log"
+	case $1 in fuzz | tsan) return 0 ;; esac
+	cmake --install "$build_dir" --prefix "$stage" > "$build_dir/install.log"
 }
