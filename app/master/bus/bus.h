@@ -74,6 +74,15 @@ int bus_request_state(struct bus *bus, enum al_state state, span_t timeout, char
 int bus_slave_al_request(struct bus *bus, size_t pos, uint16_t state, char *error);
 /** AL status and code of one slave, 0x0130 to 0x0135; one frame. */
 int bus_slave_al_read(struct bus *bus, size_t pos, uint8_t ret_al[6], char *error);
+/**
+ * Before a slave in INIT is asked for @state, AL_PREOP or AL_BOOT: its mailbox SyncManagers get the
+ * boxes of that state from its SII; one frame. Until bus_slave_mailbox_follow() it has no mailbox.
+ * -ENOTSUP: it has none in BOOT.
+ */
+int bus_slave_mailbox_program(struct bus *bus, size_t pos, uint16_t state, char *error);
+/** The slave is in @state, an enum al_state: requests to its mailbox are possible, or, in INIT, no
+ * more. */
+void bus_slave_mailbox_follow(struct bus *bus, size_t pos, uint16_t state);
 /** The first step of an ordered stop, while the cycle runs: all that answer to SAFE-OP, in 150 ms.
  */
 int bus_stop_outputs(struct bus *bus, char *error);

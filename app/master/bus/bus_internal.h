@@ -101,6 +101,7 @@ struct bus_slave {
 	unsigned good_looks;     /* at 0x092C, in a row */
 	struct error_counters errors;
 	struct bus_startup startup;
+	struct mailbox_slave_spec boot; /* its mailboxes in BOOT; out_bytes 0: none */
 	enum recovery_step step;
 	enum al_state accepted; /* request that it has taken in this step */
 	mono_t step_deadline;
@@ -270,6 +271,9 @@ int bus_sii_entries(struct bus *bus, size_t pos, struct pdo_entry *ret, size_t c
 void bus_soem_describe(struct bus *bus, size_t pos);
 /** Program the mailbox SyncManagers of all slaves and give them their EEPROMs. */
 int bus_mailboxes_open(struct bus *bus);
+/** The same of one slave in INIT, with the mailboxes of @state, AL_PREOP or AL_BOOT; one frame. 0;
+ * -EIO; -ENXIO the slave did not take it. */
+int bus_mailbox_program(struct bus *bus, size_t pos, uint16_t state);
 
 /* --- scan.c --- */
 

@@ -12,6 +12,14 @@
 #include "bus/guests.h"
 #include "wire/sdo_abort.h"
 
+/* Boxes that no frame can carry: a slave without a mailbox. */
+static void open_mailbox(struct bus *bus, size_t pos, const struct mailbox_slave_spec *spec)
+{
+	if (spec->out_bytes == 0 || mailbox_slave_set(bus->mailbox, (uint16_t)pos, spec) < 0) {
+		mailbox_slave_set(bus->mailbox, (uint16_t)pos, NULL);
+	}
+}
+
 void bus_mailbox_set(struct bus *bus, size_t pos)
 {
 	const ec_slavet *soem = &bus->soem_slave[soem_index(pos)];
@@ -22,9 +30,38 @@ void bus_mailbox_set(struct bus *bus, size_t pos)
 						 .in_bytes = soem->mbx_rl,
 						 .protocols = soem->mbx_proto };
 
-	/* Boxes that no frame can carry: a slave without a mailbox. */
-	if (soem->mbx_l == 0 || mailbox_slave_set(bus->mailbox, (uint16_t)pos, &spec) < 0) {
+	open_mailbox(bus, pos, &spec);
+}
+
+int bus_slave_mailbox_program(struct bus *bus, size_t pos, uint16_t state, char *error)
+{
+	int r;
+
+	bus->error = error;
+	if (state == AL_BOOT && bus->slave[pos].boot.out_bytes == 0) {
+		return bus_fail_slave(bus, pos, -ENOTSUP,
+				      "its SII gives no mailbox for BOOT: it has no such state");
+	}
+	mailbox_slave_set(bus->mailbox, (uint16_t)pos, NULL);
+	if (state != AL_BOOT && bus->soem_slave[soem_index(pos)].mbx_l == 0) {
+		return 0;
+	}
+	r = bus_mailbox_program(bus, pos, state);
+	return r < 0 ? bus_fail_slave(bus, pos, r,
+				      "its mailbox SyncManagers (0x0800) cannot be written")
+		     : 0;
+}
+
+void bus_slave_mailbox_follow(struct bus *bus, size_t pos, uint16_t state)
+{
+	if (state == AL_INIT) {
 		mailbox_slave_set(bus->mailbox, (uint16_t)pos, NULL);
+	} else if (mailbox_slave_has(bus->mailbox, (uint16_t)pos, UINT16_MAX)) {
+		return; /* what runs there goes on */
+	} else if (state == AL_BOOT) {
+		open_mailbox(bus, pos, &bus->slave[pos].boot);
+	} else {
+		bus_mailbox_set(bus, pos);
 	}
 }
 

@@ -3,6 +3,8 @@
  * SOEM's table of slaves, filled from the SII that bus/sii_read.c read: what its mailbox and its
  * mapping look at, as ecx_config_init() would have set it.
  */
+#include <errno.h>
+
 #include "bus/bus_internal.h"
 #include "bus/registers.h"
 
@@ -73,10 +75,22 @@ static void set_fmmus(ec_slavet *soem, const struct bus_slave *sl)
 	}
 }
 
+/* In BOOT a slave serves FoE only. */
+static struct mailbox_slave_spec boot_of(const struct bus_slave *sl, const struct sii *sii)
+{
+	return (struct mailbox_slave_spec){ .station_addr = sl->info.station_addr,
+					    .out_start = sii->boot_out_start,
+					    .out_bytes =
+						    sii->boot_in_len > 0 ? sii->boot_out_len : 0,
+					    .in_start = sii->boot_in_start,
+					    .in_bytes = sii->boot_in_len,
+					    .protocols = SII_MAILBOX_FOE };
+}
+
 void bus_soem_describe(struct bus *bus, size_t pos)
 {
 	ec_slavet *soem = &bus->soem_slave[soem_index(pos)];
-	const struct bus_slave *sl = &bus->slave[pos];
+	struct bus_slave *sl = &bus->slave[pos];
 	const struct sii *sii = &bus->parsed;
 
 	soem->eep_man = sii->vendor;
@@ -91,6 +105,36 @@ void bus_soem_describe(struct bus *bus, size_t pos)
 	set_mailbox(soem, sii);
 	set_sms(soem, sii);
 	set_fmmus(soem, sl);
+	sl->boot = boot_of(sl, sii);
+}
+
+int bus_mailbox_program(struct bus *bus, size_t pos, uint16_t state)
+{
+	ec_slavet *soem = &bus->soem_slave[soem_index(pos)];
+	const struct mailbox_slave_spec *boot = &bus->slave[pos].boot;
+	ec_smt sm[2] = { soem->SM[0], soem->SM[1] };
+	uint8_t to_pdi = EEPROM_TO_PDI;
+	struct access access[] = {
+		/* What is enabled cannot be changed. */
+		{ .reg = ESC_REG_SM, .len = sizeof(sm) },
+		{ .reg = ESC_REG_SM, .len = sizeof(sm), .data = sm },
+		{ .reg = ESC_REG_EEPROM_CONFIG, .len = sizeof(to_pdi), .data = &to_pdi },
+	};
+	enum { ACCESSES = sizeof(access) / sizeof(access[0]) };
+
+	if (state == AL_BOOT) {
+		sm[0] = sm_of(boot->out_start, boot->out_bytes, MAILBOX_OUT);
+		sm[1] = sm_of(boot->in_start, boot->in_bytes, MAILBOX_IN);
+	}
+	for (size_t i = 0; i < ACCESSES; i++) {
+		access[i].cmd = ECAT_CMD_FPWR;
+		access[i].adp = bus->slave[pos].info.station_addr;
+	}
+	if (registers_run(bus, access, ACCESSES) < 0) {
+		return -EIO;
+	}
+	soem->eep_pdi = 1;
+	return access[1].wkc == 1 ? 0 : -ENXIO;
 }
 
 /* Both mailbox SMs in one datagram: old netX slaves need that. */

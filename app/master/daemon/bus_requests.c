@@ -4,6 +4,7 @@
  * rescan is done by whoever drives the session, the state of a slave is looked at in each pass.
  */
 #include <errno.h>
+#include <stdio.h>
 
 #include "base/bytes.h"
 #include "daemon/session.h"
@@ -72,38 +73,122 @@ void session_restart_done(struct session *s, const struct failure *failure)
 	}
 }
 
-/* --- one slave --- */
+/* --- one slave, a frame in each pass --- */
 
-/* Each pass: is it there? */
-static void poll_slave(struct admin_pending *pending, const struct admin_target *target)
+/*
+ * BOOT is entered from INIT and left to INIT only, and has mailboxes of its own: they are
+ * programmed in INIT, as those of PRE-OP are on the way back.
+ */
+enum change_step {
+	CHANGE_LOOK, /* where it is */
+	CHANGE_ASK_INIT,
+	CHANGE_WAIT_INIT,
+	CHANGE_PROGRAM, /* its mailboxes */
+	CHANGE_ASK,
+	CHANGE_WAIT,
+};
+
+static enum change_step next_from(uint16_t from, uint16_t wanted)
 {
-	struct session *s = target->ctx;
-	uint16_t pos = pending->request.slave_pos;
+	if (from == AL_INIT) {
+		return wanted == AL_BOOT || wanted == AL_PREOP ? CHANGE_PROGRAM : CHANGE_ASK;
+	}
+	return (from == AL_BOOT) != (wanted == AL_BOOT) && wanted != AL_INIT ? CHANGE_ASK_INIT
+									     : CHANGE_ASK;
+}
+
+static int ask_for(const struct session *s, const struct admin_pending *pending, uint16_t state,
+		   char *error)
+{
+	int r = bus_slave_al_request(s->bus, pending->request.slave_pos, state, error);
+
+	return r < 0 ? r : state == AL_INIT ? CHANGE_WAIT_INIT : CHANGE_WAIT;
+}
+
+/* It has reached @state: the next step, or the end. */
+static int reached(const struct session *s, struct admin_pending *pending, uint16_t state)
+{
 	uint16_t wanted = (uint16_t)pending->request.argument[0];
+
+	bus_slave_mailbox_follow(s->bus, pending->request.slave_pos, state);
+	if (state != wanted) {
+		return (int)next_from(state, wanted);
+	}
+	admin_pending_complete(pending, 0);
+	return CHANGE_WAIT;
+}
+
+/* Where is it? -EIO: it refuses what it was asked for. */
+static int look(const struct session *s, struct admin_pending *pending, enum change_step step,
+		char *error)
+{
+	uint16_t wanted = (uint16_t)pending->request.argument[0];
+	uint16_t asked = step == CHANGE_WAIT_INIT ? AL_INIT : wanted;
+	uint16_t pos = pending->request.slave_pos;
 	uint8_t al[6] = { 0 };
 	uint16_t status;
-	char error[BUS_ERROR_BYTES];
+	int r = bus_slave_al_read(s->bus, pos, al, error);
+
+	if (r < 0) {
+		return r;
+	}
+	status = get_le16(al) & (AL_STATE_MASK | AL_ERROR);
+	pending->reply.data[0] = (uint8_t)status;
+	pending->reply.data_len = 1;
+	if (step == CHANGE_LOOK) {
+		return (int)next_from(status & AL_STATE_MASK, wanted);
+	}
+	if (status == asked) {
+		return reached(s, pending, asked);
+	}
+	if ((status & AL_ERROR) == 0) {
+		return (int)step;
+	}
+	snprintf(error, BUS_ERROR_BYTES,
+		 "slave %u: refuses %s and is in %s: AL status code 0x%04x, %s", pos,
+		 al_state_to_str(asked), al_state_to_str(status), get_le16(al + 4),
+		 al_status_code_to_str(get_le16(al + 4)));
+	return -EIO;
+}
+
+/* One step: the next one, or -errno with a line in @error. */
+static int change(const struct session *s, struct admin_pending *pending, char *error)
+{
+	enum change_step step = (enum change_step)pending->sequence;
+	uint16_t wanted = (uint16_t)pending->request.argument[0];
+	int r;
+
+	switch (step) {
+	case CHANGE_ASK_INIT:
+		return ask_for(s, pending, AL_INIT, error);
+	case CHANGE_PROGRAM:
+		r = bus_slave_mailbox_program(s->bus, pending->request.slave_pos, wanted, error);
+		return r < 0 ? r : CHANGE_ASK;
+	case CHANGE_ASK:
+		return ask_for(s, pending, wanted, error);
+	case CHANGE_LOOK:
+	case CHANGE_WAIT_INIT:
+	case CHANGE_WAIT:
+		break;
+	}
+	return look(s, pending, step, error);
+}
+
+static void poll_slave(struct admin_pending *pending, const struct admin_target *target)
+{
+	const struct session *s = target->ctx;
+	char error[BUS_ERROR_BYTES] = "";
 	int r;
 
 	if (s->bus == NULL) {
 		admin_pending_refuse(pending, -ECANCELED, "the bus was taken down");
 		return;
 	}
-	r = bus_slave_al_read(s->bus, pos, al, error);
+	r = change(s, pending, error);
 	if (r < 0) {
 		admin_pending_refuse(pending, r, "%s", error);
-		return;
-	}
-	status = get_le16(al);
-	pending->reply.data[0] = (uint8_t)status;
-	pending->reply.data_len = 1;
-	if ((status & (AL_STATE_MASK | AL_ERROR)) == wanted) {
-		admin_pending_complete(pending, 0);
-	} else if ((status & AL_ERROR) != 0) {
-		admin_pending_refuse(pending, -EIO,
-				     "slave %u: refuses %s and is in %s: AL status code 0x%04x, %s",
-				     pos, al_state_to_str(wanted), al_state_to_str(status),
-				     get_le16(al + 4), al_status_code_to_str(get_le16(al + 4)));
+	} else {
+		pending->sequence = (uint64_t)r;
 	}
 }
 
@@ -112,11 +197,9 @@ static void abandon(struct admin_pending *pending)
 	admin_pending_complete(pending, -ECANCELED);
 }
 
-static void change_one(struct session *s, struct admin_pending *pending)
+static void change_one(const struct session *s, struct admin_pending *pending)
 {
 	uint16_t wanted = (uint16_t)pending->request.argument[0];
-	char error[BUS_ERROR_BYTES];
-	int r;
 
 	if (target_of(wanted) < 0 && wanted != AL_BOOT) {
 		admin_pending_refuse(pending, -EINVAL, "%u is not an AL state", wanted);
@@ -128,11 +211,7 @@ static void change_one(struct session *s, struct admin_pending *pending)
 				     "slave back: ecdaq state PREOP all first");
 		return;
 	}
-	r = bus_slave_al_request(s->bus, pending->request.slave_pos, wanted, error);
-	if (r < 0) {
-		admin_pending_refuse(pending, r, "%s", error);
-		return;
-	}
+	pending->sequence = CHANGE_LOOK;
 	pending->poll = poll_slave;
 	pending->cancel = abandon;
 }

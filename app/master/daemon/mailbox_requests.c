@@ -356,7 +356,7 @@ static void say_why(const struct transfer *tf, char *why, size_t why_bytes)
 		snprintf(why, why_bytes, "the slave, or a part of its answer, is lost");
 		return;
 	case -ENODEV:
-		snprintf(why, why_bytes, "the slave was restarted");
+		snprintf(why, why_bytes, "the slave was restarted, or its state changed");
 		return;
 	case -ENOTSUP:
 		snprintf(why, why_bytes, "the slave has no %s mailbox in this state", protocol);

@@ -228,6 +228,22 @@ int bus_slave_al_read(struct bus *bus, size_t pos, uint8_t ret_al[6], char *erro
 	return 0;
 }
 
+int bus_slave_mailbox_program(struct bus *bus, size_t pos, uint16_t state, char *error)
+{
+	(void)bus;
+	(void)pos;
+	(void)state;
+	(void)error;
+	return 0;
+}
+
+void bus_slave_mailbox_follow(struct bus *bus, size_t pos, uint16_t state)
+{
+	(void)bus;
+	(void)pos;
+	(void)state;
+}
+
 int bus_stop_outputs(struct bus *bus, char *error)
 {
 	(void)bus;
