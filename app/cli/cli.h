@@ -53,10 +53,12 @@ enum exit_code cli_exit_of(int errno_value);
 enum exit_code cli_path(struct cli *cli, const char *file, char *ret_path);
 
 /* The verbs, one file each. */
+enum exit_code verb_aoe(struct cli *cli, int argc, char **argv);
 enum exit_code verb_channels(struct cli *cli, int argc, char **argv);
 enum exit_code verb_clear(struct cli *cli, int argc, char **argv);
 enum exit_code verb_crc(struct cli *cli, int argc, char **argv);
 enum exit_code verb_doctor(struct cli *cli, int argc, char **argv);
+enum exit_code verb_eoe(struct cli *cli, int argc, char **argv);
 enum exit_code verb_events(struct cli *cli, int argc, char **argv);
 enum exit_code verb_histogram(struct cli *cli, int argc, char **argv);
 enum exit_code verb_oneshot(struct cli *cli, int argc, char **argv);
@@ -66,11 +68,13 @@ enum exit_code verb_sdo(struct cli *cli, int argc, char **argv);
 enum exit_code verb_set(struct cli *cli, int argc, char **argv);
 enum exit_code verb_sii(struct cli *cli, int argc, char **argv);
 enum exit_code verb_slaves(struct cli *cli, int argc, char **argv);
+enum exit_code verb_soe(struct cli *cli, int argc, char **argv);
 enum exit_code verb_state(struct cli *cli, int argc, char **argv);
 enum exit_code verb_status(struct cli *cli, int argc, char **argv);
 enum exit_code verb_stop(struct cli *cli, int argc, char **argv);
 enum exit_code verb_sync0(struct cli *cli, int argc, char **argv);
 enum exit_code verb_top(struct cli *cli, int argc, char **argv);
+enum exit_code verb_voe(struct cli *cli, int argc, char **argv);
 enum exit_code verb_watch(struct cli *cli, int argc, char **argv);
 
 #endif

@@ -6,6 +6,7 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum { BYTES_PER_LINE = 16 };
 
@@ -30,6 +31,30 @@ void hex_dump(const uint8_t *bytes, size_t len, uint32_t start)
 		hex_format(bytes + i, n, text, sizeof(text));
 		printf("0x%04" PRIx32 "  %s\n", start + (uint32_t)i, text);
 	}
+}
+
+static unsigned digit_of(char c)
+{
+	return isdigit((unsigned char)c) ? (unsigned)(c - '0')
+					 : (unsigned)(tolower((unsigned char)c) - 'a' + 10);
+}
+
+ssize_t hex_parse(const char *text, uint8_t *ret_bytes, size_t capacity)
+{
+	size_t len = 0;
+
+	for (const char *p = text; *p != '\0'; p += 2) {
+		p += strspn(p, " ");
+		if (*p == '\0') {
+			break;
+		}
+		if (!isxdigit((unsigned char)p[0]) || !isxdigit((unsigned char)p[1]) ||
+		    len == capacity) {
+			return -EINVAL;
+		}
+		ret_bytes[len++] = (uint8_t)(digit_of(p[0]) << 4 | digit_of(p[1]));
+	}
+	return (ssize_t)len;
 }
 
 int hex_number(const char *text, uint32_t high, uint32_t *ret_value)

@@ -94,13 +94,38 @@ static const struct verb verbs[] = {
 	  verb_state },
 	{ "rescan", "", "Take the bus down and bring it up again, with what is there now.",
 	  "Ends when the target is reached, or with the reason why not.\n", verb_rescan },
-	{ "sdo", "read|write SLAVE INDEX:SUB [VALUE]", "Read or write an object of a slave (CoE).",
+	{ "sdo", "read|write|list SLAVE [INDEX:SUB] [VALUE]",
+	  "Read, write or list the objects of a slave (CoE).",
 	  "ecdaq sdo read piccolo0 0x1018:1 --type UDINT\n"
-	  "ecdaq sdo write 0 0x8000:2 20 --type UINT\n\n"
+	  "ecdaq sdo write 0 0x8000:2 20 --type UINT\n"
+	  "ecdaq sdo read 0 0x1c12 --complete          all subindices, as bytes\n"
+	  "ecdaq sdo write 0 0x1c12 '01 00 00 16' --complete\n"
+	  "ecdaq sdo list 0                            the object dictionary\n\n"
 	  "INDEX is hexadecimal with 0x; :SUB may be left out for 0. Types: BOOL SINT INT DINT "
 	  "LINT\n"
 	  "USINT UINT UDINT ULINT REAL LREAL, and for reading STRING.\n",
 	  verb_sdo },
+	{ "soe", "read|write|list SLAVE [IDN] [VALUE]",
+	  "Read, write or list the parameters of a drive (SoE).",
+	  "ecdaq soe list drive0                  all IDNs (of S-0-0017)\n"
+	  "ecdaq soe read drive0 S-0-0001         name, attribute, unit, limits, value\n"
+	  "ecdaq soe write drive0 S-0-0001 2000 --drive 1\n\n"
+	  "IDN is S-0-0001, P-0-0001, or a number. VALUE is as the attribute says; numbers of a "
+	  "list\n"
+	  "have commas between.\n",
+	  verb_soe },
+	{ "eoe", "ip SLAVE", "Show or set the IP parameters of a slave (EoE).",
+	  "ecdaq eoe ip gateway0\n"
+	  "ecdaq eoe ip gateway0 --ip 192.168.5.2 --mask 255.255.255.0\n\n"
+	  "Not every slave reports its parameters.\n",
+	  verb_eoe },
+	{ "aoe", "read|write SLAVE INDEX:SUB [VALUE]",
+	  "Read or write an object of a slave by ADS (AoE).",
+	  "ecdaq aoe read 0 0x1018:1 --port 1000\n\n"
+	  "INDEX:SUB and types as of ecdaq sdo.\n",
+	  verb_aoe },
+	{ "voe", "SLAVE BYTES", "One exchange of a vendor's own protocol (VoE), in hex.",
+	  "ecdaq voe 0 '01 02 ff' --type 3\n", verb_voe },
 	{ "reg", "read|write SLAVE REGISTER [LENGTH|VALUE...]",
 	  "Read or write registers of a slave's ESC.",
 	  "ecdaq reg read piccolo0 0x0130         2 bytes: AL status\n"

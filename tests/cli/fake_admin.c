@@ -95,6 +95,12 @@ static void give(struct admin_reply *reply, const void *data, uint32_t len)
 	reply->data_len = len;
 }
 
+static void abort_sdo(struct admin_reply *reply, uint32_t code, const char *text)
+{
+	refuse(reply, -EREMOTEIO, text);
+	reply->slave_code = code;
+}
+
 static void answer_read(struct fake *f, const struct admin_request *rq, struct admin_reply *reply)
 {
 	uint8_t bytes[4];
@@ -110,8 +116,7 @@ static void answer_read(struct fake *f, const struct admin_request *rq, struct a
 		put_le16(bytes, f->refresh_ms);
 		give(reply, bytes, 2);
 	} else {
-		refuse(reply, -EIO, "abort");
-		reply->slave_code = 0x06020000;
+		abort_sdo(reply, 0x06020000, "slave 0 (piccolo0): SDO read: object does not exist");
 	}
 }
 
@@ -121,8 +126,45 @@ static void answer_write(struct fake *f, const struct admin_request *rq, struct 
 		f->refresh_ms = get_le16(rq->data);
 		return;
 	}
-	refuse(reply, -EIO, "abort");
-	reply->slave_code = rq->index == 0x8000 ? 0x08000022 : 0x06020000;
+	abort_sdo(reply, 0x08000022, "slave 0 (piccolo0): SDO write: data cannot be stored");
+}
+
+/* Object 0x6000 has a gap and a long name, 0x7000 an entry that is not described. */
+static void answer_list(struct admin_reply *reply)
+{
+	uint8_t indices[4];
+
+	put_le16(indices, 0x6000);
+	put_le16(indices + 2, 0x7000);
+	give(reply, indices, sizeof(indices));
+}
+
+static void answer_object(const struct admin_request *rq, struct admin_reply *reply)
+{
+	struct admin_sdo_object object = { .index = rq->index,
+					   .subindex_max = 3,
+					   .object_code = 9 };
+
+	memset(object.name, 'o', sizeof(object.name) - 1);
+	give(reply, &object, sizeof(object));
+}
+
+static void answer_entry(const struct admin_request *rq, struct admin_reply *reply)
+{
+	struct admin_sdo_entry entry = { .index = rq->index,
+					 .data_type = rq->subindex == 3 ? 0x0801 : 6,
+					 .bit_len = 16,
+					 .access = 0x008f,
+					 .subindex = rq->subindex };
+
+	memset(entry.name, 'e', sizeof(entry.name) - 1);
+	if (rq->index == 0x7000) {
+		abort_sdo(reply, 0x08000000, "slave 0 (piccolo0): description: general error");
+	} else if (rq->subindex == 2) {
+		abort_sdo(reply, 0x06090011, "slave 0 (piccolo0): description: no subindex");
+	} else {
+		give(reply, &entry, sizeof(entry));
+	}
 }
 
 static void clear(struct fake *f)
@@ -257,8 +299,14 @@ static void answer(struct fake *f, const struct admin_request *rq, struct admin_
 		f->reg[0x0301] = 0;
 		break;
 	case ADMIN_SDO_LIST:
+		answer_list(reply);
+		break;
 	case ADMIN_SDO_OBJECT:
+		answer_object(rq, reply);
+		break;
 	case ADMIN_SDO_ENTRY:
+		answer_entry(rq, reply);
+		break;
 	case ADMIN_FOE_READ:
 	case ADMIN_FOE_WRITE:
 	case ADMIN_SOE_READ:

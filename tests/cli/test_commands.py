@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -140,8 +141,12 @@ def test_sdo_write_is_read_back(daemon: Fake) -> None:
 @pytest.mark.parametrize(
     ("words", "code", "message"),
     [
-        (["read", "0", "0x1234"], REFUSED, "0x1234:00: SDO abort 0x06020000: object"),
-        (["write", "0", "0x8000:1", "1", "-t", "USINT"], REFUSED, "0x08000022: data cannot be"),
+        (["read", "0", "0x1234"], REFUSED, "slave 0 (piccolo0): SDO read: object does"),
+        (
+            ["write", "0", "0x8000:1", "1", "-t", "USINT"],
+            REFUSED,
+            "SDO write: data cannot be stored",
+        ),
         (["write", "0", "0x8000:2", "1"], USAGE, "write: --type must be one of BOOL|SINT"),
         (["write", "0", "0x8000:2", "65536", "-t", "UINT"], USAGE, "65536: does not fit into UINT"),
         (["write", "0", "0x8000:2", "x", "-t", "UINT"], USAGE, "x: is not a valid UINT"),
@@ -154,6 +159,26 @@ def test_a_failed_sdo_is_reported_with_its_reason(
     daemon: Fake, words: list[str], code: int, message: str
 ) -> None:
     fails(daemon("sdo", *words), code, message)
+
+
+def test_a_dictionary_with_gaps_is_listed_up_to_an_entry_that_is_refused(daemon: Fake) -> None:
+    result = daemon("sdo", "list", "0")
+    fails(result, REFUSED, "refused: slave 0 (piccolo0): description: general error")
+    assert result.stdout.splitlines() == [
+        f"0x6000 record  {'o' * 63}",
+        f"  :00    UINT             16  rrrw--  {'e' * 42}",
+        f"  :01    UINT             16  rrrw--  {'e' * 42}",
+        f"  :03    0x0801           16  rrrw--  {'e' * 42}",
+        f"0x7000 record  {'o' * 63}",
+    ]
+    result = daemon("sdo", "list", "0", "--json")
+    fails(result, REFUSED, "general error")
+    first, second = (json.loads(line) for line in result.stdout.splitlines())
+    assert [entry["subindex"] for entry in first["entry"]] == [0, 1, 3]
+    last = first["entry"][2]
+    assert (last["name"], last["type"], last["access"]) == ("e" * 63, "0x0801", "rrrw--")
+    assert (last["bits"], last["rxpdo"], last["txpdo"]) == (16, False, True)
+    assert second["entry"] == []
 
 
 def test_clear_sets_counters_to_zero(fake: Callable[..., Fake]) -> None:

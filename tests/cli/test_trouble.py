@@ -55,6 +55,7 @@ COMMANDS = [
     ["rescan", "--force"],
     ["sdo", "read", "0", "0x1018:1"],
     ["sdo", "write", "0", "0x8000:2", "5", "--type", "UINT"],
+    ["sdo", "read", "0", "0x1018:1", "--complete"],
     ["reg", "read", "0", "0x0130"],
     ["reg", "write", "0", "0x0f80", "1"],
     ["sii", "read", "0"],

@@ -51,9 +51,7 @@ MODULES: dict[str, dict[str, set[str]]] = {
         "sync0": READERS,
     },
     "cli": {
-        "cli": READERS
-        | {"wire/al.h", "wire/sdo_abort.h", "wire/sii.h"}
-        | {"wire/aoe.h", "wire/eoe.h", "wire/soe.h"}
+        "cli": READERS | {"wire/al.h", "wire/sii.h"} | {"wire/aoe.h", "wire/eoe.h", "wire/soe.h"}
     },
     "sim": {
         "firmware": {"base", "wire"},

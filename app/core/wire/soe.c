@@ -1,7 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 #include "wire/soe.h"
 
+#include <ctype.h>
 #include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "base/bytes.h"
@@ -117,4 +120,49 @@ size_t soe_value_bytes(uint32_t attribute)
 int soe_is_list(uint32_t attribute)
 {
 	return (attribute >> SOE_LENGTH_SHIFT & SOE_LENGTH_MASK) >= SOE_LENGTH_LIST_1;
+}
+
+void soe_idn_format(uint16_t idn, char ret_text[SOE_IDN_TEXT_BYTES])
+{
+	snprintf(ret_text, SOE_IDN_TEXT_BYTES, "%c-%u-%04u", (idn & 0x8000) != 0 ? 'P' : 'S',
+		 idn >> 12 & 7, idn & 0x0fff);
+}
+
+/* The number that begins @text, up to @high; then @text is behind it. -EINVAL: none. */
+static long take_number(const char **text, int base, long high)
+{
+	char *end;
+	long number;
+
+	if (!isdigit((unsigned char)**text)) {
+		return -EINVAL;
+	}
+	number = strtol(*text, &end, base);
+	*text = end;
+	return number <= high ? number : -EINVAL;
+}
+
+int soe_idn_parse(const char *text, uint16_t *ret_idn)
+{
+	int kind = toupper((unsigned char)text[0]);
+	int is_hex = text[0] == '0' && (text[1] == 'x' || text[1] == 'X');
+	long set = 0;
+	long number;
+
+	if ((kind == 'S' || kind == 'P') && text[1] == '-') {
+		text += 2;
+		set = take_number(&text, 10, 7);
+		if (set < 0 || *text++ != '-') {
+			return -EINVAL;
+		}
+		number = take_number(&text, 10, 0x0fff);
+	} else {
+		kind = 'S';
+		number = take_number(&text, is_hex ? 16 : 10, UINT16_MAX);
+	}
+	if (number < 0 || *text != '\0') {
+		return -EINVAL;
+	}
+	*ret_idn = (uint16_t)((kind == 'P' ? 0x8000 : 0) | set << 12 | number);
+	return 0;
 }

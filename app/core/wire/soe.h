@@ -33,8 +33,29 @@ enum soe_element {
 	SOE_ELEMENT_DEFAULT = 0x80,
 };
 
-/* Bits 16 to 18 of the attribute: bytes of a value, and whether it is a list of such. */
-enum soe_attribute { SOE_LENGTH_SHIFT = 16, SOE_LENGTH_MASK = 7, SOE_IS_COMMAND = 1 << 19 };
+/* Bits 16 to 18 of the attribute: bytes of a value, and whether it is a list of such; 20 to 22: how
+ * it is shown; 24 to 27: decimal places. */
+enum soe_attribute {
+	SOE_LENGTH_SHIFT = 16,
+	SOE_LENGTH_MASK = 7,
+	SOE_IS_COMMAND = 1 << 19,
+	SOE_FORMAT_SHIFT = 20,
+	SOE_FORMAT_MASK = 7,
+	SOE_DECIMALS_SHIFT = 24,
+	SOE_DECIMALS_MASK = 15,
+};
+
+enum soe_format {
+	SOE_FORMAT_BINARY = 0,
+	SOE_FORMAT_UNSIGNED = 1,
+	SOE_FORMAT_SIGNED = 2,
+	SOE_FORMAT_HEX = 3,
+	SOE_FORMAT_TEXT = 4,
+	SOE_FORMAT_IDN = 5,
+	SOE_FORMAT_FLOAT = 6,
+};
+
+enum { SOE_IDN_TEXT_BYTES = 10 };
 
 enum soe_length {
 	SOE_LENGTH_2 = 1,
@@ -77,6 +98,10 @@ size_t soe_format(const struct soe_message *m, uint8_t *data, size_t capacity);
 
 /** Text of an error code; "unknown error" for one that is not listed. */
 const char *soe_error_to_str(uint32_t code);
+/** "S-0-0017", "P-0-0001". */
+void soe_idn_format(uint16_t idn, char ret_text[SOE_IDN_TEXT_BYTES]);
+/** An IDN of that form, or a number up to 65535, in hex with 0x. 0 or -EINVAL. */
+int soe_idn_parse(const char *text, uint16_t *ret_idn);
 /** Bytes of a value by its attribute; of one item of a list. 0: the attribute gives none. */
 size_t soe_value_bytes(uint32_t attribute);
 /** 1: the value is a list. */

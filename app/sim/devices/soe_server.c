@@ -13,6 +13,7 @@ struct idn {
 	const char *name;
 	const char *unit;
 	enum soe_length length;
+	enum soe_format format;
 	uint32_t min;
 	uint32_t max; /* both 0: none */
 	uint8_t is_writable;
@@ -20,17 +21,23 @@ struct idn {
 };
 
 static const struct idn idns[SOE_SERVER_IDNS] = {
-	{ SOE_IDN_CYCLE, "Control unit cycle time", "us", SOE_LENGTH_2, 250, 10000, 1, 0 },
-	{ SOE_IDN_ALL, "IDN list of all operation data", "", SOE_LENGTH_LIST_2, 0, 0, 0, 0 },
-	{ SOE_IDN_VERSION, "Manufacturer version", "", SOE_LENGTH_LIST_1, 0, 0, 0, 0 },
-	{ SOE_IDN_VELOCITY, "Velocity feedback value 1", "1/min", SOE_LENGTH_4, 0, 0, 0, 0 },
-	{ SOE_IDN_RESET, "Reset class 1 diagnostic", "", SOE_LENGTH_2, 0, 0, 1, 1 },
-	{ SOE_IDN_TABLE, "Table", "", SOE_LENGTH_LIST_4, 0, 0, 1, 0 },
+	{ SOE_IDN_CYCLE, "Control unit cycle time", "us", SOE_LENGTH_2, SOE_FORMAT_UNSIGNED, 250,
+	  10000, 1, 0 },
+	{ SOE_IDN_ALL, "IDN list of all operation data", "", SOE_LENGTH_LIST_2, SOE_FORMAT_IDN, 0,
+	  0, 0, 0 },
+	{ SOE_IDN_VERSION, "Manufacturer version", "", SOE_LENGTH_LIST_1, SOE_FORMAT_TEXT, 0, 0, 0,
+	  0 },
+	{ SOE_IDN_VELOCITY, "Velocity feedback value 1", "1/min", SOE_LENGTH_4, SOE_FORMAT_SIGNED,
+	  0, 0, 0, 0 },
+	{ SOE_IDN_RESET, "Reset class 1 diagnostic", "", SOE_LENGTH_2, SOE_FORMAT_BINARY, 0, 0, 1,
+	  1 },
+	{ SOE_IDN_TABLE, "Table", "", SOE_LENGTH_LIST_4, SOE_FORMAT_UNSIGNED, 0, 0, 1, 0 },
 };
 
 static uint32_t attribute_of(const struct idn *idn)
 {
-	return (uint32_t)idn->length << SOE_LENGTH_SHIFT | (idn->is_command ? SOE_IS_COMMAND : 0) |
+	return (uint32_t)idn->length << SOE_LENGTH_SHIFT |
+	       (uint32_t)idn->format << SOE_FORMAT_SHIFT | (idn->is_command ? SOE_IS_COMMAND : 0) |
 	       1;
 }
 

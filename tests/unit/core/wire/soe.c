@@ -67,3 +67,38 @@ TEST(soe, attributes_say_how_long_a_value_is)
 	CHECK_STR(soe_error_to_str(SOE_ERROR_NO_IDN), "no such IDN");
 	CHECK_STR(soe_error_to_str(0x6666), "unknown error");
 }
+
+TEST(soe, an_idn_is_a_kind_a_set_and_a_number)
+{
+	static const struct {
+		const char *text;
+		uint16_t idn;
+	} good[] = { { "S-0-0000", 0 },      { "S-0-0017", 17 },     { "p-0-0001", 0x8001 },
+		     { "S-7-4095", 0x7fff }, { "P-7-4095", 0xffff }, { "S-1-5", 0x1005 } };
+	static const char *const bad[] = {
+		"",         "S",       "S-",      "S-0",    "S-0-",  "S-8-0",
+		"S-0-4096", "S-0-1x",  "S-0-0x1", "X-0-1",  "65536", "-1",
+		"1x",       "0x10000", "S--1",    "S-0--1", "0x",    "99999999999999999999"
+	};
+	char text[SOE_IDN_TEXT_BYTES];
+	uint16_t idn = 7;
+
+	for (size_t i = 0; i < sizeof(good) / sizeof(good[0]); i++) {
+		CHECK_EQ(soe_idn_parse(good[i].text, &idn), 0);
+		CHECK_EQ(idn, good[i].idn);
+	}
+	CHECK_EQ(soe_idn_parse("65535", &idn), 0);
+	CHECK_EQ(idn, 65535);
+	CHECK_EQ(soe_idn_parse("0x8001", &idn), 0);
+	CHECK_EQ(idn, 0x8001);
+	for (size_t i = 0; i < sizeof(bad) / sizeof(bad[0]); i++) {
+		CHECK_EQ(soe_idn_parse(bad[i], &idn), -EINVAL);
+		CHECK_EQ(idn, 0x8001);
+	}
+	for (uint32_t n = 0; n <= UINT16_MAX; n++) {
+		soe_idn_format((uint16_t)n, text);
+		CHECK_EQ(soe_idn_parse(text, &idn), 0);
+		CHECK_EQ(idn, n);
+	}
+	CHECK_STR(text, "P-7-4095");
+}

@@ -1,0 +1,226 @@
+/* SPDX-License-Identifier: MIT */
+#include "cli/sdo_list.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/bytes.h"
+#include "cli/text.h"
+#include "program/json.h"
+
+enum { LIST_ALL = 1, COLUMNS = 80 };
+
+/* SDO abort: this subindex, or object, is not there. */
+enum { ABORT_NO_OBJECT = 0x06020000, ABORT_NO_SUBINDEX = 0x06090011 };
+
+static const char *code_to_str(uint8_t code)
+{
+	static const char *const texts[] = { [2] = "domain",   [5] = "type",  [6] = "struct",
+					     [7] = "variable", [8] = "array", [9] = "record" };
+
+	return code < sizeof(texts) / sizeof(texts[0]) && texts[code] != NULL ? texts[code] : "?";
+}
+
+/* Base data types of ETG.1020; a number for those of a device. */
+static const char *type_to_str(uint16_t type, char buf[TEXT_BYTES])
+{
+	static const struct {
+		uint16_t type;
+		const char *text;
+	} texts[] = {
+		{ 0x0001, "BOOL" },        { 0x0002, "SINT" },          { 0x0003, "INT" },
+		{ 0x0004, "DINT" },        { 0x0005, "USINT" },         { 0x0006, "UINT" },
+		{ 0x0007, "UDINT" },       { 0x0008, "REAL" },          { 0x0009, "STRING" },
+		{ 0x000a, "BYTES" },       { 0x000b, "WORDS" },         { 0x000c, "TIME" },
+		{ 0x000d, "TIMESPAN" },    { 0x0011, "LREAL" },         { 0x0015, "LINT" },
+		{ 0x001b, "ULINT" },       { 0x001e, "BYTE" },          { 0x001f, "WORD" },
+		{ 0x0020, "DWORD" },       { 0x0021, "PDO_MAPPING" },   { 0x0023, "IDENTITY" },
+		{ 0x0025, "COMMAND_PAR" }, { 0x0027, "PDO_PARAMETER" }, { 0x0029, "SM_SYNC" },
+		{ 0x0030, "BIT1" },        { 0x0031, "BIT2" },          { 0x0032, "BIT3" },
+		{ 0x0033, "BIT4" },        { 0x0034, "BIT5" },          { 0x0035, "BIT6" },
+		{ 0x0036, "BIT7" },        { 0x0037, "BIT8" },
+	};
+
+	for (size_t i = 0; i < sizeof(texts) / sizeof(texts[0]); i++) {
+		if (texts[i].type == type) {
+			return texts[i].text;
+		}
+	}
+	snprintf(buf, TEXT_BYTES, "0x%04x", type);
+	return buf;
+}
+
+/* "rrrw--": read, then write, each in PRE-OP, SAFE-OP and OP. */
+static const char *access_to_str(uint16_t access, char buf[TEXT_BYTES])
+{
+	for (unsigned i = 0; i < 6; i++) {
+		buf[i] = "rrrwww"[i];
+		if ((access >> i & 1) == 0) {
+			buf[i] = '-';
+		}
+	}
+	buf[6] = '\0';
+	return buf;
+}
+
+/* Behind the @used columns of a line, cut at its end. */
+static void put_name(const char *name, int used)
+{
+	char plain[ADMIN_NAME_BYTES];
+
+	if (name[0] != '\0') {
+		printf("  %.*s", COLUMNS - used - 2, text_plain(name, plain, sizeof(plain)));
+	}
+	putchar('\n');
+}
+
+static void show_entry(const struct admin_sdo_entry *entry)
+{
+	char type[TEXT_BYTES];
+	char access[TEXT_BYTES];
+
+	put_name(entry->name, printf("  :%02x    %-13s %5u  %s", entry->subindex,
+				     type_to_str(entry->data_type, type), entry->bit_len,
+				     access_to_str(entry->access, access)));
+}
+
+static void write_entry(struct json *js, const struct admin_sdo_entry *entry)
+{
+	char text[TEXT_BYTES];
+
+	json_object_begin(js, NULL);
+	json_u64(js, "subindex", entry->subindex);
+	json_text(js, "name", entry->name);
+	json_text(js, "type", type_to_str(entry->data_type, text));
+	json_u64(js, "bits", entry->bit_len);
+	json_text(js, "access", access_to_str(entry->access, text));
+	json_truth(js, "rxpdo", entry->access >> 6 & 1);
+	json_truth(js, "txpdo", entry->access >> 7 & 1);
+	json_object_end(js);
+}
+
+/* An answer of @bytes, its text terminated. */
+static enum exit_code take(struct mail *mail, enum admin_verb verb, void *ret, size_t bytes,
+			   int *ret_refused)
+{
+	enum exit_code result = mail_try(mail, verb, ret_refused);
+
+	if (result != EXIT_CODE_OK || *ret_refused) {
+		return result;
+	}
+	if (mail->transfer.answer_len != bytes) {
+		return cli_fail(mail->cli, EXIT_CODE_FAILED, "ecdaqd: an answer of %zu bytes",
+				mail->transfer.answer_len);
+	}
+	memcpy(ret, mail->transfer.answer, bytes);
+	return EXIT_CODE_OK;
+}
+
+/* Arrays and records may have gaps. */
+static enum exit_code list_entries(struct mail *mail, unsigned last, struct json *js)
+{
+	enum exit_code result = EXIT_CODE_OK;
+
+	for (unsigned sub = 0; sub <= last && result == EXIT_CODE_OK; sub++) {
+		struct admin_sdo_entry entry = { .index = 0 };
+		int is_refused;
+
+		mail->request.subindex = (uint8_t)sub;
+		result = take(mail, ADMIN_SDO_ENTRY, &entry, sizeof(entry), &is_refused);
+		if (is_refused) {
+			uint32_t code = mail->transfer.reply.slave_code;
+
+			if (code != ABORT_NO_SUBINDEX && code != ABORT_NO_OBJECT) {
+				return admin_judge(mail->cli, &mail->transfer.reply);
+			}
+		} else if (result == EXIT_CODE_OK) {
+			entry.name[sizeof(entry.name) - 1] = '\0';
+			if (mail->is_json) {
+				write_entry(js, &entry);
+			} else {
+				show_entry(&entry);
+			}
+		}
+	}
+	return result;
+}
+
+static enum exit_code list_object(struct mail *mail)
+{
+	struct admin_sdo_object object = { .index = 0 };
+	struct json js;
+	int is_refused;
+	enum exit_code result = take(mail, ADMIN_SDO_OBJECT, &object, sizeof(object), &is_refused);
+
+	if (is_refused) {
+		return admin_judge(mail->cli, &mail->transfer.reply);
+	}
+	if (result != EXIT_CODE_OK) {
+		return result;
+	}
+	object.name[sizeof(object.name) - 1] = '\0';
+	json_init(&js, stdout);
+	if (!mail->is_json) {
+		put_name(object.name,
+			 printf("0x%04x %s", object.index, code_to_str(object.object_code)));
+		return list_entries(mail, object.subindex_max, &js);
+	}
+	json_object_begin(&js, NULL);
+	json_u64(&js, "slave", mail->request.slave_pos);
+	json_u64(&js, "index", object.index);
+	json_text(&js, "name", object.name);
+	json_text(&js, "code", code_to_str(object.object_code));
+	json_array_begin(&js, "entry");
+	result = list_entries(mail, object.subindex_max, &js);
+	json_array_end(&js);
+	json_object_end(&js);
+	json_end_line(&js);
+	return result;
+}
+
+static enum exit_code read_indices(struct mail *mail, uint16_t **ret_indices, size_t *ret_count)
+{
+	int is_refused;
+	enum exit_code result;
+	size_t count;
+
+	mail->request.argument[0] = LIST_ALL;
+	result = mail_try(mail, ADMIN_SDO_LIST, &is_refused);
+	mail->request.argument[0] = 0;
+	if (is_refused) {
+		return cli_fail(mail->cli, EXIT_CODE_REFUSED,
+				"refused: %s: the slave has no SDO information",
+				mail->transfer.reply.text);
+	}
+	if (result != EXIT_CODE_OK) {
+		return result;
+	}
+	count = mail->transfer.answer_len / 2;
+	*ret_indices = calloc(count + 1, sizeof(**ret_indices));
+	if (*ret_indices == NULL) {
+		return cli_fail(mail->cli, EXIT_CODE_FAILED, "out of memory");
+	}
+	for (size_t i = 0; i < count; i++) {
+		(*ret_indices)[i] = get_le16(mail->transfer.answer + 2 * i);
+	}
+	*ret_count = count;
+	return EXIT_CODE_OK;
+}
+
+enum exit_code sdo_list(struct mail *mail)
+{
+	uint16_t *indices = NULL;
+	size_t count = 0;
+	enum exit_code result = read_indices(mail, &indices, &count);
+
+	for (size_t i = 0; i < count && result == EXIT_CODE_OK; i++) {
+		mail->request.index = indices[i];
+		mail->request.subindex = 0;
+		result = list_object(mail);
+	}
+	free(indices);
+	return result;
+}
