@@ -96,16 +96,32 @@ static void take_address(struct bus *bus, size_t position)
 	registers_run(bus, &access, 1);
 }
 
+static struct bus_guest make_guest(const struct bus *bus, size_t position, uint16_t address)
+{
+	return (struct bus_guest){ .kind = GUEST_NEW,
+				   .position = (uint16_t)position,
+				   .came_with = address,
+				   .owner = find_owner(bus, address),
+				   .expected = -1,
+				   .shut_by = -1,
+				   .readable_by = mono_add(bus_now(bus), (span_t){ LOADING_NS }) };
+}
+
 /* The guest at position @i, isolated if it is new. NULL: not now. */
 static struct bus_guest *take_guest(struct bus *bus, struct walk *walk, size_t i)
 {
 	uint16_t address = get_le16(walk->at[i].address);
 	struct bus_guest *guest = guest_of(bus, address);
 
-	if (guest != NULL) {
+	if (guest != NULL && walk_claims(walk, address) == 1) {
 		guest->position = (uint16_t)i;
 		guest->shut_by = -1;
 		return guest;
+	}
+	if (guest != NULL) {
+		/* One was gone for so long that another guest was given its address: this one gets
+		 * a new address, and both are identified again. */
+		*guest = make_guest(bus, guest->position, address);
 	}
 	guest = new_guest(bus);
 	if (guest == NULL) {
@@ -114,14 +130,7 @@ static struct bus_guest *take_guest(struct bus *bus, struct walk *walk, size_t i
 		}
 		return NULL;
 	}
-	*guest =
-		(struct bus_guest){ .kind = GUEST_NEW,
-				    .position = (uint16_t)i,
-				    .came_with = address,
-				    .owner = find_owner(bus, address),
-				    .expected = -1,
-				    .shut_by = -1,
-				    .readable_by = mono_add(bus_now(bus), (span_t){ LOADING_NS }) };
+	*guest = make_guest(bus, i, address);
 	if (isolate(bus, guest) < 0) {
 		guest->kind = GUEST_NONE; /* the next walk meets it again */
 		return NULL;
@@ -360,8 +369,7 @@ static void note_unreadable(struct bus *bus, const struct walk *walk, struct bus
 static int is_order_open(struct bus *bus, const struct walk *walk, size_t position)
 {
 	for (size_t i = position; i > 0 && walk->at[i - 1].slave < 0; i--) {
-		const struct bus_guest *other =
-			guest_of(bus, get_le16(walk->at[i - 1].address));
+		const struct bus_guest *other = guest_of(bus, get_le16(walk->at[i - 1].address));
 
 		if (other != NULL && other->kind == GUEST_NEW && !is_identified(other)) {
 			return 1;

@@ -209,6 +209,29 @@ TEST(sim_strangers, a_device_with_all_the_marks_of_a_slave_is_not_taken_for_it)
 	close_all();
 }
 
+/* It was isolated before, and its address was given to another guest meanwhile. */
+TEST(sim_strangers, two_devices_with_the_same_isolation_address_are_told_apart)
+{
+	int ms = 0;
+
+	open_without(2);
+	virtual_bench_fault(&b, "at=0s power-off slave=1");
+	virtual_master_run(&vm, 300);
+	put_le16(stranger_esc()->reg + ESC_REG_STATION_ADDRESS, PARKING_FIRST);
+	virtual_bench_fault(&b, "at=0s power-on slave=1");
+	CHECK_EQ(segment_plug(b.segment, 2, virtual_bench_now_ns(&b)), 0);
+	CHECK(state() != BUS_OP);
+	while (state() != BUS_OP && ms < 5000) {
+		virtual_master_run(&vm, 10);
+		ms += 10;
+	}
+	CHECK_EQ(state(), BUS_OP);
+	virtual_master_run(&vm, 200);
+	CHECK(get_le16(stranger_esc()->reg + ESC_REG_STATION_ADDRESS) >= PARKING_FIRST);
+	CHECK(strstr(page()->message, "position 2: a device that is not configured") != NULL);
+	close_all();
+}
+
 /* --- two equal slaves on two ports of one --- */
 
 static int tree_slave(int position, struct segment_slave_spec *ret_spec)
