@@ -223,6 +223,12 @@ static void cycle_with(const struct slave_set *live, const struct slave_set *arr
 	outputs_choose(&outputs, image, live, cycle);
 }
 
+static void check_answered(uint64_t sequence, uint64_t cycle)
+{
+	CHECK_EQ(board.taken_sequence, sequence);
+	CHECK_EQ(board.taken_cycle, cycle);
+}
+
 TEST(outputs, a_set_is_answered_with_the_first_cycle_whose_frame_came_back_with_it)
 {
 	uint64_t sequence;
@@ -235,8 +241,7 @@ TEST(outputs, a_set_is_answered_with_the_first_cycle_whose_frame_came_back_with_
 	cycle_with(&both, &second, 12); /* the data of the other slave only */
 	CHECK_EQ(board.taken_sequence, 0);
 	cycle_with(&both, &both, 13);
-	CHECK_EQ(board.taken_sequence, sequence);
-	CHECK_EQ(board.taken_cycle, 13);
+	check_answered(sequence, 13);
 }
 
 TEST(outputs, a_set_is_not_answered_while_its_output_is_at_fail_safe)
@@ -254,8 +259,7 @@ TEST(outputs, a_set_is_not_answered_while_its_output_is_at_fail_safe)
 	cycle_with(&both, &both, 22);
 	CHECK_EQ(board.taken_sequence, 0);
 	cycle_with(&both, &both, 23);
-	CHECK_EQ(board.taken_sequence, sequence);
-	CHECK_EQ(board.taken_cycle, 23);
+	check_answered(sequence, 23);
 }
 
 TEST(outputs, an_output_that_is_not_in_the_set_does_not_keep_its_answer_back)
@@ -270,8 +274,7 @@ TEST(outputs, an_output_that_is_not_in_the_set_does_not_keep_its_answer_back)
 	sequence = light(1); /* slave a has left OP meanwhile */
 	cycle_with(&second, &second, 12);
 	cycle_with(&second, &second, 13);
-	CHECK_EQ(board.taken_sequence, sequence);
-	CHECK_EQ(board.taken_cycle, 13);
+	check_answered(sequence, 13);
 }
 
 TEST(outputs, a_withdrawn_set_is_answered_by_the_next_frame)

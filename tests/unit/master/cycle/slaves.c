@@ -68,12 +68,18 @@ TEST(cycle, a_frame_outside_its_window_is_late_though_a_slave_of_a_split_image_i
 	CHECK_EQ(s.h.slaves_bad.word[0], 3);
 }
 
-TEST(cycle, outputs_of_a_slave_that_is_not_in_op_are_at_fail_safe)
+/* Of an image in two datagrams, with an output that is on. */
+static void start_split_in_op(void)
 {
 	start_in_op();
 	plan.is_split = 1;
 	set_led(1);
 	steps(3);
+}
+
+TEST(cycle, outputs_of_a_slave_that_is_not_in_op_are_at_fail_safe)
+{
+	start_split_in_op();
 	CHECK_EQ(world.seen_output & 1, 1);
 	cycle_slaves_set(cy, &(struct slave_set){ { 2 } }, cycle_alerts(cy));
 	steps(2);
@@ -281,10 +287,7 @@ TEST(cycle_slaves, the_state_of_a_stranger_is_accepted_once_ours_were_found_in_o
 
 TEST(cycle_slaves, a_missing_slave_that_a_split_image_names_takes_no_other_with_it)
 {
-	start_in_op();
-	plan.is_split = 1;
-	set_led(1);
-	steps(3);
+	start_split_in_op();
 	world.status = EXCHANGE_WKC_LOW;
 	world.slaves_low = 2;
 	world.al_wkc = 1;
@@ -303,20 +306,14 @@ TEST(cycle_slaves, a_missing_slave_that_a_split_image_names_takes_no_other_with_
 
 TEST(cycle_slaves, a_missing_slave_that_the_image_does_not_name_takes_all_with_it)
 {
-	start_in_op();
-	plan.is_split = 1;
-	set_led(1);
-	steps(3);
+	start_split_in_op();
 	/* Two missing, data of one: one without process data is gone, too, or somebody else. */
 	world.status = EXCHANGE_WKC_LOW;
 	world.slaves_low = 2;
 	world.al_wkc = 0;
 	steps(2);
 	CHECK_EQ(world.seen_output & 1, 0);
-	start_in_op();
-	plan.is_split = 1;
-	set_led(1);
-	steps(3);
+	start_split_in_op();
 	world.status = EXCHANGE_WKC_LOW;
 	world.slaves_low = 1; /* the reference clock */
 	world.al_wkc = 1;
