@@ -203,6 +203,7 @@ do_test()
 	case " ${1:--} $* " in
 	" -"* | *" dds "*) want_packages foreign "subscribers on Fast DDS and RustDDS" ;;
 	esac
+	[ -z "${CI:-}" ] || want_packages ci "a cache of compilations"
 	[ -z "${CI:-}" ] || [ $# -gt 0 ] || begin_images
 	exec "$PYTHON" "$root/app/tools/run_tests.py" "$@"
 }
