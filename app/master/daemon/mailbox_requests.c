@@ -187,10 +187,11 @@ static void fill_soe(const struct admin_pending *pending, struct mailbox_request
 
 static void say_soe(const struct admin_request *asked, char *ret_what)
 {
-	snprintf(ret_what, WHAT_BYTES, "SoE %s of %c-%u-%04u of drive %u",
-		 asked->verb == ADMIN_SOE_READ ? "read" : "write",
-		 asked->index & 0x8000 ? 'P' : 'S', asked->index >> 12 & 7, asked->index & 0x0fff,
-		 asked->subindex);
+	char idn[SOE_IDN_TEXT_BYTES];
+
+	soe_idn_format(asked->index, idn);
+	snprintf(ret_what, WHAT_BYTES, "SoE %s of %s of drive %u",
+		 asked->verb == ADMIN_SOE_READ ? "read" : "write", idn, asked->subindex);
 }
 
 /* --- EoE --- */
