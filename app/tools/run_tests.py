@@ -222,13 +222,23 @@ def run_fuzz_target(suite: Suite, target: Path, seconds: int) -> Outcome:
     return outcome
 
 
+def add_results(total: Outcome, running: dict[str, Beside[Outcome]]) -> None:
+    """Wait for all that runs beside this process."""
+    for name, one in running.items():
+        total.add(one.result() or Outcome(failures=[f"{name}: ended without a result"]))
+
+
 def run_fuzz(suite: Suite, options: argparse.Namespace) -> Outcome:
     outcome = Outcome()
     targets = [p for p in (suite.build_dir / "tests" / "fuzz").glob("**/fuzz_*") if p.is_file()]
-    for target in sorted(p for p in targets if os.access(p, os.X_OK)):
-        if options.only and not re.search(options.only, target.name):
-            continue
-        outcome.add(run_fuzz_target(suite, target, options.fuzz_seconds))
+    chosen = sorted(p for p in targets if os.access(p, os.X_OK) and re.search(options.only, p.name))
+    at_once = os.cpu_count() or 1
+    for first in range(0, len(chosen), at_once):
+        running = {
+            target.name: Beside(partial(run_fuzz_target, suite, target, options.fuzz_seconds))
+            for target in chosen[first : first + at_once]
+        }
+        add_results(outcome, running)
     return outcome
 
 
@@ -415,8 +425,7 @@ def run_in_order(wanted: Sequence[str], builder: Builder, options: argparse.Name
         builder.build(suite.flavour)
     beside = {name: Beside(partial(run_timed, name, builder, options)) for name in waiting}
     total = run_all(computing, builder, options)
-    for name, running in beside.items():
-        total.add(running.result() or Outcome(failures=[f"{name}: ended without a result"]))
+    add_results(total, beside)
     total.add(run_all(alone, builder, options))
     return total
 

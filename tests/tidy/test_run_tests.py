@@ -202,6 +202,12 @@ def test_groups_that_end_without_a_result_are_a_failure(monkeypatch: pytest.Monk
     assert heads(outcome) == ["docs: ended without a result"]
 
 
+def corpus_for(root: Path, name: str) -> None:
+    corpus = root / "tests" / "fuzz" / name / "corpus"
+    corpus.mkdir(parents=True)
+    (corpus / "one").write_bytes(b"1")
+
+
 def fuzz_target(build: Path, name: str, script: str) -> None:
     target = build / "tests" / "fuzz" / f"fuzz_{name}"
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -217,9 +223,7 @@ def test_fuzz_targets_need_a_corpus_and_the_canary_must_be_found(own_build: Path
     fuzz_target(build, "slow", "echo stat::number_of_executed_units: 1")
     fuzz_target(build, "canary", "exit 77")
     for name in ("good", "bad", "slow"):
-        corpus = own_build / "tests" / "fuzz" / name / "corpus"
-        corpus.mkdir(parents=True)
-        (corpus / "one").write_bytes(b"1")
+        corpus_for(own_build, name)
     outcome = run_tests.run_fuzz(run_tests.GROUPS["fuzz"][0], OPTIONS)
     assert outcome.passed == 4
     assert [head.split(":")[1].strip() for head in heads(outcome)] == [
@@ -232,6 +236,17 @@ def test_fuzz_targets_need_a_corpus_and_the_canary_must_be_found(own_build: Path
     assert "fuzz: canary is found: ended with 0" in heads(
         run_tests.run_fuzz(run_tests.GROUPS["fuzz"][0], OPTIONS)
     )
+
+
+def test_a_fuzz_target_runs_on_each_core(own_build: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    meet = "touch {0}; timeout 20 sh -c 'until [ -e {1} ]; do sleep 0.01; done' && echo {2}"
+    report = "stat::number_of_executed_units: 100"
+    for own, other in (("a", "b"), ("b", "a")):
+        script = meet.format(own_build / own, own_build / other, report)
+        fuzz_target(own_build / "build" / "fuzz", own, script)
+        corpus_for(own_build, own)
+    assert run_tests.run_fuzz(run_tests.GROUPS["fuzz"][0], OPTIONS).passed == 4
 
 
 def test_a_shared_structure_without_a_test_fails(
