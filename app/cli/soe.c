@@ -88,7 +88,8 @@ static enum exit_code read_attribute(struct mail *mail, uint32_t *ret_attribute)
 		return result;
 	}
 	if (mail->transfer.answer_len != 4) {
-		return cli_fail(mail->cli, EXIT_CODE_FAILED, "slave %u: an attribute of %zu bytes",
+		return cli_fail(mail->cli, EXIT_CODE_FAILED,
+				"slave %u: attribute of %zu bytes, expected 4",
 				mail->request.slave_pos, mail->transfer.answer_len);
 	}
 	*ret_attribute = get_le32(mail->transfer.answer);

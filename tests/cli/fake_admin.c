@@ -177,6 +177,10 @@ static void answer_rescan(struct fake *f, const struct admin_request *rq, struct
 {
 	if (rq->argument[1] == 0 && f->page->bus_state == BUS_OP) {
 		refuse(reply, -EPERM, "the bus is in operation, and a rescan stops it: --force");
+		return;
+	}
+	for (unsigned i = 0; i < SLAVES; i++) {
+		f->page->slave[i].al_state = AL_OP;
 	}
 }
 
@@ -240,11 +244,19 @@ static void answer_sii(struct fake *f, const struct admin_request *rq, struct ad
 static void answer_diagnosis(const struct fake *f, const struct admin_request *rq,
 			     struct admin_reply *reply)
 {
-	struct admin_diagnosis found = {
-		.port[0] = { .is_link = 1, .is_communicating = 1, .rx_errors = f->reg[0x0301] },
-		.has_processing_errors = 1,
-		.pdi_errors = 3
-	};
+	struct admin_diagnosis found = { .port[0] = { .is_link = 1,
+						      .is_communicating = 1,
+						      .invalid_frames = 11,
+						      .rx_errors = f->reg[0x0301],
+						      .forwarded_errors = 12,
+						      .lost_links = 255 },
+					 .port[2] = { .is_link = 1 },
+					 .has_processing_errors = 1,
+					 .processing_errors = 4,
+					 .pdi_errors = 3,
+					 .has_expirations = (uint8_t)f->has_long_names,
+					 .expirations_pd = 8,
+					 .expirations_pdi = 9 };
 
 	if (rq->slave_pos != 0) {
 		refuse(reply, -EIO, "slave 1: no frame came back");

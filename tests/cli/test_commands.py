@@ -230,7 +230,10 @@ def test_state_shows_and_requests(daemon: Fake) -> None:
 def test_rescan_stops_a_bus_in_operation_only_by_force(daemon: Fake) -> None:
     fails(daemon("rescan"), REFUSED, "--force")
     assert works(daemon("rescan", "--force")) == ""
-    assert json_of(daemon("rescan", "--force", "--json"))["state"] == "OP"
+    works(daemon("state", "INIT"))
+    after = json_of(daemon("rescan", "--force", "--json"))
+    assert after["state"] == "OP"
+    assert [slave["state"] for slave in after["slave"]] == ["OP", "OP"]
 
 
 def test_reg_reads_a_word_or_as_many_bytes_as_asked(daemon: Fake) -> None:
@@ -327,11 +330,22 @@ def test_crc_shows_the_counters_and_resets_them(daemon: Fake) -> None:
     shown = json_of(daemon("crc", "piccolo0", "--json"))
     assert [slave["name"] for slave in shown] == ["piccolo0"]
     assert [port["receive_errors"] for port in shown[0]["port"]] == [7, 0, 0, 0]
-    assert (shown[0]["port"][0]["open"], shown[0]["pdi_errors"]) == (True, 3)
-    assert shown[0]["watchdog_pdi"] is None
+    assert shown[0]["port"][0] == {
+        "link": True,
+        "open": True,
+        "invalid_frames": 11,
+        "receive_errors": 7,
+        "forwarded_errors": 12,
+        "lost_links": 255,
+    }
+    assert (shown[0]["processing_errors"], shown[0]["pdi_errors"]) == (4, 3)
+    assert (shown[0]["watchdog_process_data"], shown[0]["watchdog_pdi"]) == (None, None)
     port = "    0     open   {:14}  {:14}  {:9}  {:10}"
-    assert port.format(0, 7, 0, 0) in works(daemon("crc", "0", "--reset")).splitlines()
-    assert port.format(0, 0, 0, 0) in works(daemon("crc", "0")).splitlines()
+    assert port.format(11, 7, 12, 255) in works(daemon("crc", "0", "--reset")).splitlines()
+    lines = works(daemon("crc", "0")).splitlines()
+    assert lines[2] == port.format(11, 0, 12, 255)
+    assert [line.split()[1] for line in lines[3:6]] == ["-", "link", "-"]
+    assert lines[6:] == ["    processing errors 4, PDI errors 3"]
 
 
 def test_crc_goes_on_behind_a_slave_that_does_not_answer(daemon: Fake) -> None:
@@ -347,6 +361,9 @@ def test_sixty_four_slaves_with_long_names_fit_80_columns(fake: Callable[..., Fa
     assert lines[-1].startswith("    AL status code 0x002d: ")
     assert len(lines) == 2 + 2 * 64  # with the message
     lines += works(daemon("crc", "0")).splitlines()
+    assert lines[-1] == "    watchdog expired: process data 8, PDI 9"
+    shown = json_of(daemon("crc", "0", "--json"))[0]
+    assert (shown["watchdog_process_data"], shown["watchdog_pdi"]) == (8, 9)
     lines += works(daemon("sii", "read", "0")).splitlines()
     lines += works(daemon("reg", "read", "0", "0x0000", "256")).splitlines()
     assert max(len(line) for line in lines) <= 80

@@ -83,6 +83,7 @@ TEST(esc_access, registers_are_read_and_what_the_master_needs_is_guarded)
 	CHECK(strstr(b->error, "station address") != NULL);
 	put_le16(data, AL_SAFEOP);
 	CHECK_EQ(esc_access_write(b->bus, 0, ESC_REG_AL_CONTROL, data, 2, ESC_FORCED, b->error), 0);
+	CHECK_EQ(get_le16(segment_esc(b->segment, 0)->reg + ESC_REG_AL_CONTROL), AL_SAFEOP);
 	CHECK_EQ(esc_access_read(b->bus, 1, ESC_REG_TYPE, data, 1, b->error), -ENODEV);
 	CHECK_EQ(esc_access_read(b->bus, 0, 0xffff, data, 2, b->error), -EINVAL);
 	CHECK_EQ(esc_access_read(b->bus, 0, 0x0e00, data, 1, b->error), -ENXIO);
@@ -92,27 +93,48 @@ TEST(esc_access, registers_are_read_and_what_the_master_needs_is_guarded)
 TEST(esc_access, diagnosis_is_decoded_and_counters_are_reset)
 {
 	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = 2, .seed = 2 });
+	struct esc *esc = segment_esc(b->segment, 0);
 	struct esc_diagnosis d;
 
 	bench_bring_up(b);
-	segment_esc(b->segment, 0)->reg[ESC_REG_RX_ERROR_COUNTER + 3] = 7;
-	segment_esc(b->segment, 0)->reg[ESC_REG_LOST_LINK_COUNTER + 1] = 3;
+	esc->reg[ESC_REG_RX_ERROR_COUNTER + 2] = 6;
+	esc->reg[ESC_REG_RX_ERROR_COUNTER + 3] = 7;
+	esc->reg[ESC_REG_FORWARDED_RX_ERROR + 1] = 8;
+	esc->reg[ESC_REG_ECAT_PU_ERROR] = 9;
+	esc->reg[ESC_REG_PDI_ERROR] = 10;
+	esc->reg[ESC_REG_LOST_LINK_COUNTER + 1] = 3;
+	esc->reg[ESC_REG_WATCHDOG_COUNTER_PD] = 11;
+	esc->reg[ESC_REG_WATCHDOG_COUNTER_PDI] = 12;
 	CHECK_EQ(esc_diagnosis_read(b->bus, 0, &d, b->error), 0);
 	CHECK_EQ(d.type, 0x11);
 	CHECK_EQ(d.al_status, AL_OP);
 	CHECK_EQ(d.is_pdi_operational, 1);
 	CHECK_EQ(d.port[0].is_communicating, 1);
 	CHECK_EQ(d.port[1].is_communicating, 1);
+	CHECK_EQ(d.port[1].invalid_frames, 6);
 	CHECK_EQ(d.port[1].rx_errors, 7);
+	CHECK_EQ(d.port[1].forwarded_errors, 8);
 	CHECK_EQ(d.port[1].lost_links, 3);
+	CHECK_EQ(d.has_processing_errors, 1);
+	CHECK_EQ(d.processing_errors, 9);
+	CHECK_EQ(d.pdi_errors, 10);
+	CHECK_EQ(d.has_expirations, 1);
+	CHECK_EQ(d.expirations_pd, 11);
+	CHECK_EQ(d.expirations_pdi, 12);
 	CHECK_EQ(d.port[2].is_link, 0);
 	CHECK_EQ(d.port[2].is_loop_closed, 1);
 	CHECK_EQ(d.watchdog_pd_ns, 100 * NS_PER_MS);
 	CHECK_EQ(d.is_watchdog_alive, 1);
 	CHECK_EQ(esc_errors_reset(b->bus, 0, b->error), 0);
 	CHECK_EQ(esc_diagnosis_read(b->bus, 0, &d, b->error), 0);
+	CHECK_EQ(d.port[1].invalid_frames, 0);
 	CHECK_EQ(d.port[1].rx_errors, 0);
+	CHECK_EQ(d.port[1].forwarded_errors, 0);
 	CHECK_EQ(d.port[1].lost_links, 0);
+	CHECK_EQ(d.processing_errors, 0);
+	CHECK_EQ(d.pdi_errors, 0);
+	CHECK_EQ(d.expirations_pd, 0);
+	CHECK_EQ(d.expirations_pdi, 0);
 	bench_destroy(b);
 }
 

@@ -131,6 +131,7 @@ TEST(esc_requests, what_the_master_needs_is_written_in_operation_only_by_force)
 	CHECK_EQ(read_register(0, 0xffff, 2).result, -EINVAL);
 	CHECK_EQ(read_register(SLAVES, ESC_REG_TYPE, 1).result, -ENODEV);
 	/* The cycle was not disturbed. */
+	CHECK(vm.result.samples > 0);
 	CHECK_EQ(vm.result.lost, 0);
 	CHECK_EQ(vm.result.wkc_low, 0);
 	CHECK_EQ(session_page(vm.session)->bus_state, BUS_OP);
