@@ -9,6 +9,8 @@
 
 #include "reader/page.h"
 
+enum { PROBLEM_BYTES = 128 };
+
 enum exit_code source_fail_open(const struct cli *cli, const char *path, int err)
 {
 	switch (err) {
@@ -23,6 +25,10 @@ enum exit_code source_fail_open(const struct cli *cli, const char *path, int err
 	case EPROTO:
 		return cli_fail(cli, EXIT_CODE_FAILED,
 				"%s is of another version of ecdaq, or damaged", path);
+	case EPROTONOSUPPORT:
+		return cli_fail(cli, EXIT_CODE_FAILED,
+				"%s is of another version: restart ecdaqd of the same release",
+				path);
 	default:
 		return cli_fail(cli, EXIT_CODE_FAILED, "%s: %s", path, strerror(err));
 	}
@@ -107,13 +113,16 @@ void samples_take_table(struct samples *samples)
 	samples->channels = samples->table->channels;
 }
 
-int samples_try(struct cli *cli, struct samples *ret_samples)
+/* @ret_problem: if the version of the ring is the cause, the line about it, else "". */
+static int open_samples(struct cli *cli, struct samples *ret_samples,
+			char ret_problem[PROBLEM_BYTES])
 {
 	struct samples samples = { .reader = NULL };
 	char path[CONFIG_PATH_BYTES];
 	uint64_t lost;
 	int r;
 
+	ret_problem[0] = '\0';
 	if (cli_path(cli, CONFIG_RUN_SAMPLES, path) != EXIT_CODE_OK) {
 		return -ENAMETOOLONG;
 	}
@@ -123,6 +132,9 @@ int samples_try(struct cli *cli, struct samples *ret_samples)
 	}
 	if (reader_next(samples.reader, &lost) != READER_BEGUN) {
 		r = reader_error(samples.reader);
+		if (r == -EPROTONOSUPPORT) {
+			snprintf(ret_problem, PROBLEM_BYTES, "%s", reader_problem(samples.reader));
+		}
 		samples_close(&samples);
 		return r;
 	}
@@ -131,16 +143,27 @@ int samples_try(struct cli *cli, struct samples *ret_samples)
 	return 0;
 }
 
+int samples_try(struct cli *cli, struct samples *ret_samples)
+{
+	char problem[PROBLEM_BYTES];
+
+	return open_samples(cli, ret_samples, problem);
+}
+
 enum exit_code samples_open(struct cli *cli, struct samples *ret_samples)
 {
 	char path[CONFIG_PATH_BYTES];
 	enum exit_code result = cli_path(cli, CONFIG_RUN_SAMPLES, path);
+	char problem[PROBLEM_BYTES];
 	int r;
 
 	if (result != EXIT_CODE_OK) {
 		return result;
 	}
-	r = samples_try(cli, ret_samples);
+	r = open_samples(cli, ret_samples, problem);
+	if (problem[0] != '\0') {
+		return cli_fail(cli, EXIT_CODE_FAILED, "%s: %s", path, problem);
+	}
 	return r < 0 ? source_fail_open(cli, path, -r) : EXIT_CODE_OK;
 }
 

@@ -21,6 +21,7 @@ READING = [
 ]
 
 LIMIT_SLAVES = 512
+META = 4096  # where a ring has the description of its samples
 
 
 def can_become_nobody() -> bool:
@@ -102,6 +103,20 @@ def test_a_damaged_file_is_refused(daemon: Fake, name: str, content: str) -> Non
     )
     words = {"status": ["status"], "samples": ["channels"], "events": ["events"]}[name]
     fails(daemon(*words), FAILED, f"{path} is of another version of ecdaq, or damaged")
+
+
+@pytest.mark.parametrize("words", [["channels"], ["watch", "piccolo0.adc"], ["set", "led=1"]])
+def test_a_ring_of_an_older_ecdaqd_is_named_by_its_version(daemon: Fake, words: list[str]) -> None:
+    path = daemon.run_dir / "samples"
+    daemon.kill()
+    with path.open("r+b") as file:
+        file.seek(META)
+        file.write((1).to_bytes(4, "little"))
+    fails(
+        daemon(*words),
+        FAILED,
+        f"{path}: ring version 1, this program reads version 2: restart ecdaqd of the same release",
+    )
 
 
 def test_a_ring_with_a_wrong_description_never_crashes_the_reader(daemon: Fake) -> None:

@@ -34,7 +34,7 @@ struct ring *made_ring(const char *path, const struct made_meta *meta, uint64_t 
 void made_push(struct ring *ring, uint64_t cycle, uint64_t slaves_bad, uint32_t flags);
 
 /** Places in the header of a ring, which is part of its format. */
-enum made_place { MADE_PAYLOAD_BYTES = 12, MADE_HEAD = 128 };
+enum made_place { MADE_VERSION = 8, MADE_PAYLOAD_BYTES = 12, MADE_HEAD = 128 };
 
 void made_overwrite(const char *path, off_t offset, const void *bytes, size_t count);
 void made_truncate(const char *path, off_t bytes);

@@ -252,8 +252,7 @@ uint64_t ring_pushed(const struct ring *ring)
 
 static int header_is_sane(const struct ring_header *h, uint64_t file_bytes)
 {
-	return h->magic == RING_MAGIC && h->version == RING_VERSION &&
-	       h->total_bytes == file_bytes && h->slot_count >= 2 &&
+	return h->magic == RING_MAGIC && h->total_bytes == file_bytes && h->slot_count >= 2 &&
 	       (h->slot_count & (h->slot_count - 1)) == 0 && h->payload_bytes <= PAYLOAD_LIMIT &&
 	       h->slot_bytes == WORD_BYTES + round_up(h->payload_bytes, WORD_BYTES) &&
 	       h->meta_offset == PAGE_BYTES && h->meta_bytes <= META_LIMIT &&
@@ -306,8 +305,13 @@ static int open_file(struct ring_reader *reader)
 	if (reader->fd < 0) {
 		return reader->fd;
 	}
-	if (foreign_read(reader->fd, h, sizeof(*h), 0) < 0 ||
-	    !header_is_sane(h, (uint64_t)st.st_size)) {
+	if (foreign_read(reader->fd, h, sizeof(*h), 0) < 0) {
+		return -EPROTO;
+	}
+	if (h->magic == RING_MAGIC && h->version != RING_VERSION) {
+		return -EPROTONOSUPPORT;
+	}
+	if (!header_is_sane(h, (uint64_t)st.st_size)) {
 		return -EPROTO;
 	}
 	reader->dev = st.st_dev;

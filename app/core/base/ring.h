@@ -64,7 +64,8 @@ enum ring_result {
 
 /**
  * Open the ring at @path for reading; the cursor is set after the newest slot. 0, or -errno:
- * -ENOENT no ring, -EPROTO not a ring, or another version. Free with ring_reader_destroy().
+ * -ENOENT no ring, -EPROTO not a ring, -EPROTONOSUPPORT one of another RING_VERSION. Free with
+ * ring_reader_destroy().
  * Context of all below: one thread at a time for each reader; they never wait.
  */
 int ring_reader_open(const char *path, struct ring_reader **ret_reader);

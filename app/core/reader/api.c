@@ -232,7 +232,7 @@ int ecdaq_reader_next(struct ecdaq_reader *reader, int timeout_ms)
 
 const char *ecdaq_reader_problem(const struct ecdaq_reader *reader)
 {
-	return reader->problem == 0 ? "" : reader_error_to_str(reader->problem);
+	return reader->problem == 0 ? "" : reader_problem(reader->reader);
 }
 
 const struct ecdaq_sample *ecdaq_reader_sample(const struct ecdaq_reader *reader)

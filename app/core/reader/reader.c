@@ -3,6 +3,7 @@
 
 #include <assert.h>
 #include <errno.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,7 +18,8 @@ struct reader {
 	struct channel_table *table;
 	int is_done; /* the open ring is not read any more: wait for another one */
 	int starts_at_newest;
-	int error; /* as reader_error() has it */
+	int error;             /* as reader_error() has it */
+	char version_text[96]; /* reader_problem() of -EPROTONOSUPPORT */
 	struct sample_header header;
 	uint8_t *payload;    /* the sample read last, as it was in the ring */
 	uint32_t head_bytes; /* of it: where its image begins */
@@ -71,6 +73,35 @@ static int make_table(const struct ring_reader *ring, struct channel_table **ret
 	return r;
 }
 
+/* The meta area begins with its version; a ring of another RING_VERSION has none that is known. */
+static void note_version(struct reader *r)
+{
+	size_t bytes = 0;
+	const void *meta = r->ring == NULL ? NULL : ring_meta(r->ring, &bytes);
+	uint32_t version;
+
+	if (bytes < sizeof(version)) {
+		snprintf(r->version_text, sizeof(r->version_text),
+			 "ring of another version: restart ecdaqd of the same release");
+		return;
+	}
+	memcpy(&version, meta, sizeof(version));
+	snprintf(r->version_text, sizeof(r->version_text),
+		 "ring version %u, this program reads version %u: restart ecdaqd of the same "
+		 "release",
+		 version, SAMPLE_VERSION);
+}
+
+static enum reader_result refuse(struct reader *r)
+{
+	if (r->error == -EPROTONOSUPPORT) {
+		note_version(r);
+	}
+	ring_reader_destroy(r->ring);
+	r->ring = NULL;
+	return READER_WAITING;
+}
+
 static enum reader_result begin(struct reader *r)
 {
 	struct channel_table *table = NULL;
@@ -80,13 +111,11 @@ static enum reader_result begin(struct reader *r)
 	r->is_done = 0;
 	r->error = ring_reader_open(r->path, &r->ring);
 	if (r->error < 0) {
-		return READER_WAITING;
+		return refuse(r);
 	}
 	r->error = make_table(r->ring, &table);
 	if (r->error < 0) {
-		ring_reader_destroy(r->ring);
-		r->ring = NULL;
-		return READER_WAITING;
+		return refuse(r);
 	}
 	channel_table_destroy(r->table);
 	r->table = table;
@@ -149,9 +178,14 @@ int reader_error(const struct reader *r)
 	return r->error;
 }
 
+const char *reader_problem(const struct reader *r)
+{
+	return r->error == -EPROTONOSUPPORT ? r->version_text : reader_error_to_str(r->error);
+}
+
 const char *reader_error_to_str(int error)
 {
-	return error == -EPROTO  ? "not a sample ring of this version, or damaged"
+	return error == -EPROTO  ? "not a sample ring, or damaged"
 	       : error == -EIO   ? "truncated or overwritten while it was read"
 	       : error == -EPIPE ? "its ecdaqd ended without closing it"
 				 : strerror(-error);

@@ -51,12 +51,14 @@ void reader_destroy(struct reader *reader);
 enum reader_result reader_next(struct reader *reader, uint64_t *ret_lost);
 
 /**
- * After READER_WAITING: -ENOENT no ring, -EPROTO not a sample ring of this version or not
- * consistent, -EACCES, ... After READER_ENDED: 0 closed in order, -EPIPE its process is gone or
- * another ring is in its place, -EIO truncated or overwritten.
+ * After READER_WAITING: -ENOENT no ring, -EPROTO not a sample ring or not consistent,
+ * -EPROTONOSUPPORT one of another version, -EACCES, ... After READER_ENDED: 0 closed in order,
+ * -EPIPE its process is gone or another ring is in its place, -EIO truncated or overwritten.
  */
 int reader_error(const struct reader *reader);
-/** An error of reader_error() for people, "not a sample ring of this version". */
+/** reader_error() in one line, for people; with both numbers if the version is the cause. */
+const char *reader_problem(const struct reader *reader);
+/** The same for an error other than -EPROTONOSUPPORT, without a reader. */
 const char *reader_error_to_str(int error);
 
 /** Of the session, until the reader_next() that returns the next READER_BEGUN; NULL before. */

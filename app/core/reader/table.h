@@ -25,8 +25,8 @@ struct channel_table {
 };
 
 /**
- * Check and copy the meta area of a sample ring. 0; -EPROTO: another version, or not consistent;
- * -ENOMEM (ret untouched on failure). Free with channel_table_destroy().
+ * Check and copy the meta area of a sample ring. 0; -EPROTO: not consistent; -EPROTONOSUPPORT:
+ * another SAMPLE_VERSION; -ENOMEM (ret untouched on failure). Free with channel_table_destroy().
  */
 int channel_table_create(const void *meta, size_t meta_bytes, struct channel_table **ret_table);
 void channel_table_destroy(struct channel_table *table);

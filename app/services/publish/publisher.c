@@ -207,7 +207,7 @@ static void report_error(struct publisher *p)
 	int error = reader_error(p->reader);
 
 	if (error != p->reader_error && error < 0 && error != -ENOENT && error != -EPIPE) {
-		fprintf(stderr, "ecdaq-dds: %s: %s\n", p->ring_path, reader_error_to_str(error));
+		fprintf(stderr, "ecdaq-dds: %s: %s\n", p->ring_path, reader_problem(p->reader));
 	}
 	p->reader_error = error;
 }

@@ -165,7 +165,7 @@ static struct feed *open_feed(struct recorder *rec, enum sink_ring which)
 	return rec->feed[which];
 }
 
-static void note_ring_error(struct recorder *rec, int error)
+static void note_ring_error(struct recorder *rec, int error, const char *problem)
 {
 	if (error == rec->ring_error) {
 		return;
@@ -174,7 +174,7 @@ static void note_ring_error(struct recorder *rec, int error)
 	if (error == -ENOENT) {
 		say(rec, "waiting for %s", rec->opt.ring_path);
 	} else if (error < 0 && error != -EPIPE) {
-		say(rec, "%s: %s", rec->opt.ring_path, reader_error_to_str(error));
+		say(rec, "%s: %s", rec->opt.ring_path, problem);
 	}
 }
 
@@ -189,11 +189,11 @@ static void look_for_session(struct recorder *rec)
 	}
 	rec->looked_ns = now_ns(rec);
 	if (reader_next(rec->reader, &lost) != READER_BEGUN) {
-		note_ring_error(rec, reader_error(rec->reader));
+		note_ring_error(rec, reader_error(rec->reader), reader_problem(rec->reader));
 		return;
 	}
 	r = sample_feed_create(rec->reader, rec->sink, &rec->samples);
-	note_ring_error(rec, r);
+	note_ring_error(rec, r, reader_error_to_str(r));
 	if (r < 0) {
 		reader_skip_session(rec->reader);
 		return;

@@ -59,7 +59,9 @@ int master_open(struct master *m)
 		return 1;
 	}
 	if (reader_next(m->reader, &lost) != READER_BEGUN) {
-		return reader_error(m->reader) == -EPROTO ? -EPROTO : 0;
+		int error = reader_error(m->reader);
+
+		return error == -EPROTO || error == -EPROTONOSUPPORT ? -EPROTO : 0;
 	}
 	/* The ring of a master that has gone says nothing of now. */
 	if (reader_is_orphaned(m->reader)) {

@@ -213,7 +213,33 @@ TEST(reader, a_ring_of_another_kind_or_inconsistent_is_not_opened)
 	made_overwrite(b.path, 72, "event\0\0", 8);
 	expect(&b, READER_WAITING);
 	CHECK_EQ(reader_error(b.reader), -EPROTO);
-	CHECK_STR(reader_error_to_str(-EPROTO), "not a sample ring of this version, or damaged");
+	CHECK_STR(reader_problem(b.reader), "not a sample ring, or damaged");
+	ring_destroy(b.ring);
+	begin(&b, 2, 16);
+	expect(&b, READER_BEGUN);
+	bench_close(&b);
+}
+
+TEST(reader, a_ring_of_another_version_is_named_by_both_versions)
+{
+	struct made_meta meta = made_meta();
+	const uint32_t other = 77;
+	struct bench b;
+
+	bench_open(&b, READER_AT_OLDEST);
+	meta.head.version = 1;
+	b.ring = made_ring(b.path, &meta, 16);
+	expect(&b, READER_WAITING);
+	CHECK_EQ(reader_error(b.reader), -EPROTONOSUPPORT);
+	CHECK_STR(reader_problem(b.reader), "ring version 1, this program reads version 2: "
+					    "restart ecdaqd of the same release");
+	ring_destroy(b.ring);
+	begin(&b, 1, 16);
+	made_overwrite(b.path, MADE_VERSION, &other, sizeof(other));
+	expect(&b, READER_WAITING);
+	CHECK_EQ(reader_error(b.reader), -EPROTONOSUPPORT);
+	CHECK_STR(reader_problem(b.reader),
+		  "ring of another version: restart ecdaqd of the same release");
 	ring_destroy(b.ring);
 	begin(&b, 2, 16);
 	expect(&b, READER_BEGUN);
