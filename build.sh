@@ -48,6 +48,7 @@ usage: ./build.sh build [FLAVOUR...]
   asan      AddressSanitizer and UndefinedBehaviorSanitizer; build/asan/, build/asan/stage/
   tsan      ThreadSanitizer, the tests of what threads share; build/tsan/
   fuzz      the fuzz targets: clang, libFuzzer, both sanitizers; build/fuzz/
+  coverage  the fuzz targets, counting the lines they reach; build/coverage/
   clang     -O2 with the second compiler; build/clang/
 
 ccache is used where it is installed. Assertions stay on in every flavour.
@@ -74,6 +75,7 @@ Without GROUP all groups run, the fast ones first, cli and docs beside the compu
 Only when named:
   control  the tests of control programs in unit, sim, cli and live
   sync0    the tests of the SYNC0 check in unit, cli and live
+  coverage the lines of each parser that its fuzz target reaches; fails below 80 %
   long     hours of bus time and of SYNC0 edges on virtual time
   wire     SYNC0 on GPIO lines of the image in QEMU; as root, on an idle machine
 
@@ -177,14 +179,14 @@ do_build()
 	[ $# -gt 0 ] || set -- release
 	for flavour in "$@"; do
 		case $flavour in
-		release | asan | tsan | fuzz | clang) ;;
-		*) usage_error "build: no flavour '$flavour'; there are: release asan tsan fuzz clang" ;;
+		release | asan | tsan | fuzz | coverage | clang) ;;
+		*) usage_error "build: no flavour '$flavour'; there are: release asan tsan fuzz coverage clang" ;;
 		esac
 	done
 	prepare_build
 	for flavour in "$@"; do
 		case $flavour in
-		fuzz | clang) need_packages build test ;;
+		fuzz | coverage | clang) need_packages build test ;;
 		esac
 		build_flavour "$flavour"
 		note "built $flavour in build/$flavour/"

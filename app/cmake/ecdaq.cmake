@@ -51,6 +51,10 @@ endif()
 if(ECDAQ_FUZZ)
 	add_compile_options(-fsanitize=fuzzer-no-link)
 endif()
+if(ECDAQ_COVERAGE)
+	add_compile_options(-fprofile-instr-generate -fcoverage-mapping)
+	add_link_options(-fprofile-instr-generate)
+endif()
 
 # ecdaq_module(NAME SOURCES a.c b.c [DEPENDS module...] [LIBRARIES lib...])
 # A static library ecdaq_NAME. DEPENDS names other modules, LIBRARIES foreign ones.

@@ -25,6 +25,7 @@ from functools import partial
 from pathlib import Path
 
 from beside import Beside
+from fuzz_coverage import LEAST_PERCENT, CoverageError, make_seeds, reached
 from processes import adopt_orphans, end_group, wait_and_reap
 from test_report import Outcome, fail_unexpected_skips, read_junit, tail
 
@@ -188,11 +189,15 @@ def run_fuzz_target(suite: Suite, target: Path, seconds: int) -> Outcome:
     if (source / f"{name}.dict").exists():
         limits.append(f"-dict={source / f'{name}.dict'}")
     corpus = sorted((source / "corpus").glob("*"))
+    seeds = make_seeds(name, suite.build_dir / "seeds" / name)
     steps: list[tuple[str, list[str | Path], bool]] = [
-        ("corpus", [target, *limits, *corpus], False),
+        ("corpus", [target, *limits, *corpus, *seeds], False),
         (
             "search",
-            [target, *limits, f"-max_total_time={seconds}", found, source / "corpus"],
+            [
+                *(target, *limits, f"-max_total_time={seconds}", found, source / "corpus"),
+                *{path.parent for path in seeds},
+            ],
             False,
         ),
     ]
@@ -239,6 +244,22 @@ def run_fuzz(suite: Suite, options: argparse.Namespace) -> Outcome:
             for target in chosen[first : first + at_once]
         }
         add_results(outcome, running)
+    return outcome
+
+
+def run_coverage(suite: Suite, _options: argparse.Namespace) -> Outcome:
+    """One test for each parser: its fuzz target reaches enough of its lines."""
+    outcome = Outcome()
+    try:
+        rows = reached(suite.build_dir)
+    except CoverageError as why:
+        return Outcome(failures=[f"coverage: {why}"])
+    for row in rows:
+        print(row, flush=True)
+        if row.percent >= LEAST_PERCENT:
+            outcome.passed += 1
+        else:
+            outcome.failures.append(f"coverage: {row}: less than {LEAST_PERCENT} %")
     return outcome
 
 
@@ -319,13 +340,15 @@ GROUPS: dict[str, list[Suite]] = {
             ("tests/live", "-k", "test_sync0 or test_oneshot"),
         ),
     ],
+    # Lines that the fuzz targets reach.
+    "coverage": [Suite("coverage", "coverage", run_coverage)],
     # Hours of bus time.
     "long": [ctest("long", "release")],
     "boot": [booted("boot", f"--ignore-glob={WIRE_FILES}")],
     "wire": [booted("wire", "-k", "test_70_sync0 or test_80_sync0")],
 }
 # Part of other groups, long, or too exact for a loaded machine: only when named.
-ON_REQUEST = ("control", "sync0", "long", "wire")
+ON_REQUEST = ("control", "sync0", "coverage", "long", "wire")
 # These mostly wait, and run beside the computing ones. The rest measure time: each alone.
 WAITING = ("cli", "docs")
 COMPUTING = ("unit", "tidy", "replay", "sim", "fuzz", "recipes")

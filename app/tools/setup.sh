@@ -290,8 +290,12 @@ configure_flavour()
 		compiler=clang
 		set -- "$@" -DECDAQ_FUZZ=ON -DECDAQ_SANITIZE=address,undefined
 		;;
+	coverage)
+		compiler=clang
+		set -- "$@" -DECDAQ_FUZZ=ON -DECDAQ_COVERAGE=ON
+		;;
 	clang) compiler=clang ;;
-	*) die "no flavour '$1': release, asan, tsan, fuzz or clang" ;;
+	*) die "no flavour '$1': release, asan, tsan, fuzz, coverage or clang" ;;
 	esac
 	shift
 	if command -v ccache > /dev/null 2>&1; then
@@ -316,7 +320,7 @@ build_flavour()
 	stage=$build_dir/stage
 	target=${2:-all}
 	case $1 in
-	fuzz) target=fuzz_targets ;;
+	fuzz | coverage) target=fuzz_targets ;;
 	tsan) target=shared_state ;;
 	release) stage=$root/build/stage ;;
 	esac
@@ -324,6 +328,6 @@ build_flavour()
 		sed -n '/^FAILED:\|^ninja: error/,$p' "$build_dir/build.log" >&2
 		die "cannot build $1 (see above, and $build_dir/build.log)"
 	fi
-	case $1 in fuzz | tsan) return 0 ;; esac
+	case $1 in fuzz | coverage | tsan) return 0 ;; esac
 	cmake --install "$build_dir" --prefix "$stage" > "$build_dir/install.log"
 }

@@ -15,6 +15,7 @@ from project import ROOT
 
 sys.path.insert(0, str(ROOT / "app" / "tools"))
 import run_tests
+from fuzz_coverage import Reached
 from run_tests import Outcome, Suite
 
 OPTIONS = argparse.Namespace(only="", fail_fast=False, fuzz_seconds=1)
@@ -213,6 +214,16 @@ def fuzz_target(build: Path, name: str, script: str) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     target.write_text(f"#!/bin/sh\n{script}\n")
     target.chmod(0o755)
+
+
+def test_a_parser_that_its_fuzz_target_does_not_reach_is_a_failure(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rows = [Reached("a", "enough.c", 100, 80), Reached("a", "less.c", 1000, 799)]
+    monkeypatch.setattr(run_tests, "reached", lambda _build: rows)
+    outcome = run_tests.run_coverage(run_tests.GROUPS["coverage"][0], OPTIONS)
+    assert outcome.passed == 1
+    assert [name for name in heads(outcome) if "less.c" in name] == heads(outcome) != []
 
 
 def test_fuzz_targets_need_a_corpus_and_the_canary_must_be_found(own_build: Path) -> None:

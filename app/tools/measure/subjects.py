@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from measure import tests_run, tree
+from measure import fuzz, tests_run, tree
 from measure.page import NotMeasuredError, Subject
 
 SCENARIOS = "build/release/tests/sim/scenarios"
@@ -124,6 +124,12 @@ ALL = (
         "power-cuts",
         f"{CUTS} power cuts of the image in QEMU (ECDAQ_POWER_CUTS)",
         pytest("tests/boot/test_50_power_cut.py", keep=NOT_PYTEST),
+    ),
+    Subject(
+        "fuzz",
+        "Lines of the parsers that the fuzz targets reach",
+        ("./build.sh test coverage",),
+        fuzz.measure,
     ),
     Subject(
         "ci",

@@ -4,26 +4,28 @@
  * changed or lost on the way back, or one with an EEPROM from anywhere. Then it is watched while a
  * slave loses its power and returns.
  *
- * Byte 0 chooses the slaves, byte 1 the number of changes. A change is how many answers pass before
- * it, where it is (2 bytes), and what the byte there is XORed with; 0: the answer is lost. What
- * follows is the EEPROM.
+ * Byte 0 chooses the slaves and, divided by CHOICES, what the changes are of and what else is done;
+ * byte 1 is the number of changes (changes.h). What follows is the EEPROM.
  */
 #include <errno.h>
 #include <string.h>
 
-#include "base/bytes.h"
 #include "base/status.h"
 #include "bus/bus.h"
+#include "bus/esc_access.h"
+#include "changes.h"
 #include "devices/catalogue.h"
 #include "segment/in_process.h"
 #include "segment/segment.h"
-#include "wire/sii.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 enum {
-	CHANGE_BYTES = 4,
 	HEAD_BYTES = 2,
+	CHOICES = 12,
+	/* Of byte 0, divided by CHOICES; the two low bits are an enum change_what. */
+	WITH_IDENTIFICATION = 4,
+	WITH_EEPROM = 8,
 	SLAVES = 2,
 	TRANSMIT_NS = 4000,
 	LOOKS = 24,
@@ -39,9 +41,8 @@ struct hostile {
 	struct segment *segment;
 	struct in_process *host;
 	struct transport wire;
-	const uint8_t *changes;
-	size_t left;     /* changes */
-	unsigned passed; /* answers since the last one */
+	struct changes changes;
+	unsigned options;
 };
 
 static void must(int is_true)
@@ -68,26 +69,6 @@ static int wire_send(void *ctx, const uint8_t *frame, size_t len)
 	return h->wire.send(h->wire.ctx, frame, len);
 }
 
-/* 0: the answer is lost. */
-static int change(struct hostile *h, uint8_t *frame, size_t len)
-{
-	while (h->left > 0 && h->passed >= h->changes[0]) {
-		uint8_t with = h->changes[3];
-
-		if (with != 0 && len > 0) {
-			frame[get_le16(h->changes + 1) % len] ^= with;
-		}
-		h->changes += CHANGE_BYTES;
-		h->left--;
-		h->passed = 0;
-		if (with == 0) {
-			return 0;
-		}
-	}
-	h->passed++;
-	return 1;
-}
-
 static int wire_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadline, mono_t *ret_at)
 {
 	struct hostile *h = ctx;
@@ -95,13 +76,13 @@ static int wire_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadl
 
 	do {
 		r = h->wire.receive(h->wire.ctx, frame, capacity, deadline, ret_at);
-	} while (r > 0 && !change(h, frame, (size_t)r));
+	} while (r > 0 && !changes_apply(&h->changes, frame, (size_t)r));
 	return r;
 }
 
 /* --- the segment --- */
 
-static int make_slaves(uint8_t choice, const uint8_t *sii, size_t sii_bytes, struct hostile *h)
+static int make_slaves(unsigned choice, const uint8_t *sii, size_t sii_bytes, struct hostile *h)
 {
 	static const char *const names[] = { "el3104",      "akd",          "el2521",
 					     "lan9252_evb", "wago_750_354", "el6910" };
@@ -170,6 +151,38 @@ static void watch(struct hostile *h, struct line *line, struct bus *bus)
 	}
 }
 
+static void run_job(struct sii_job *job, int begun)
+{
+	int r = begun;
+
+	if (r == 0) {
+		do {
+			r = sii_job_step(job);
+		} while (r == 1);
+	}
+	check_line(r, job->error);
+}
+
+/* An alias into the EEPROM of the first slave, then all of it. */
+static void write_eeprom(struct bus *bus)
+{
+	static uint8_t image[SEGMENT_SII_BYTES];
+	struct sii_job job;
+
+	run_job(&job, sii_job_alias(&job, bus, 0, 0x1234, ESC_FORCED));
+	run_job(&job, sii_job_read(&job, bus, 0, image, sizeof(image)));
+}
+
+static void configure(const struct hostile *h, struct config *cfg)
+{
+	config_defaults(cfg);
+	cfg->bus_mailbox_timeout_ns = 100 * NS_PER_MS;
+	if ((h->options & WITH_IDENTIFICATION) != 0) {
+		cfg->slave_count = 1;
+		cfg->slave[0].identification = 5;
+	}
+}
+
 static void bring_up(struct hostile *h, struct line *line)
 {
 	static struct config cfg;
@@ -177,8 +190,7 @@ static void bring_up(struct hostile *h, struct line *line)
 	struct bus *bus;
 	int r;
 
-	config_defaults(&cfg);
-	cfg.bus_mailbox_timeout_ns = 100 * NS_PER_MS;
+	configure(h, &cfg);
 	must(bus_create(&cfg, line, &bus) == 0);
 	bus_listen(bus, ignore_event, NULL);
 	r = bus_scan(bus, error);
@@ -193,6 +205,9 @@ static void bring_up(struct hostile *h, struct line *line)
 	}
 	if (r >= 0) {
 		check_channels(bus);
+		if ((h->options & WITH_EEPROM) != 0) {
+			write_eeprom(bus);
+		}
 		watch(h, line, bus);
 	}
 	bus_stop(bus, error);
@@ -204,19 +219,21 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 	struct hostile h = { 0 };
 	struct transport transport = { .send = wire_send, .receive = wire_receive, .ctx = &h };
 	struct line *line;
-	uint8_t choice;
+	const uint8_t *eeprom;
 
 	if (size < HEAD_BYTES) {
 		return 0;
 	}
-	choice = data[0];
-	h.left = data[1];
-	h.changes = data + HEAD_BYTES;
-	if (h.left > (size - HEAD_BYTES) / CHANGE_BYTES) {
-		h.left = (size - HEAD_BYTES) / CHANGE_BYTES;
+	h.options = data[0] / CHOICES;
+	h.changes = (struct changes){ .what = (enum change_what)(h.options & 3),
+				      .next = data + HEAD_BYTES,
+				      .left = data[1] };
+	if (h.changes.left > (size - HEAD_BYTES) / CHANGE_BYTES) {
+		h.changes.left = (size - HEAD_BYTES) / CHANGE_BYTES;
 	}
-	size -= HEAD_BYTES + h.left * CHANGE_BYTES;
-	if (make_slaves(choice, h.changes + h.left * CHANGE_BYTES, size, &h) < 0) {
+	size -= HEAD_BYTES + h.changes.left * CHANGE_BYTES;
+	eeprom = h.changes.next + h.changes.left * CHANGE_BYTES;
+	if (make_slaves(data[0] % CHOICES, eeprom, size, &h) < 0) {
 		return 0;
 	}
 	must(in_process_create(&(struct in_process_spec){ .segment = h.segment,

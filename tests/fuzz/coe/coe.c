@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * A hostile slave's mailbox: CoE requests against mails from anywhere. The first bytes choose the
- * request; then each mail is a control byte (type in the low bits; 0x40: its header's length is the
- * control byte's value times 8; 0x80: it comes with the one before it), its length, its data.
+ * request; then each mail is a control byte (type in the low bits; 0x10: the slave refuses the next
+ * access; 0x20: the frame that reads the mail is lost; 0x40: its header's length is the control
+ * byte's value times 8; 0x80: it comes with the one before it), its length, its data.
  */
 #include <errno.h>
 #include <stdlib.h>
@@ -21,10 +22,17 @@ enum {
 	OUT_START = 0x1000,
 	IN_START = 0x1100,
 	PASS_NS = 50000,
+	LOOK_NS = 100,
 	PASSES_MAX = 200000,
 	CHOICE_BYTES = 6,
+	SM_IN = ESC_REG_SM + ESC_SM_BYTES,
+	SM_STATUS = 5,
+	SM_ACTIVATE = 6,
+	REFUSES = 0x10,
+	IS_LOST = 0x20,
 	LENGTH_WRONG = 0x40,
 	UNASKED = 0x80,
+	WAITS = 0xff, /* for cancel_after: not cancelled, but waited for */
 };
 
 struct slave {
@@ -33,6 +41,10 @@ struct slave {
 	uint8_t in[BOX];
 	uint8_t counter;
 	int is_full;
+	int refuses;      /* the next access */
+	int loses;        /* the next frame that reads the mail to its end */
+	int is_lost;      /* this frame */
+	uint8_t activate; /* of the SyncManager: its repeat bit is answered in the PDI control */
 	int64_t now_ns;
 	uint8_t frame[LIMIT_FRAME_BYTES];
 	size_t frame_len;
@@ -63,6 +75,8 @@ static void put_mail(struct slave *s)
 	s->data += len;
 	s->left -= len;
 	s->is_full = 1;
+	s->refuses = (control & REFUSES) != 0;
+	s->loses = (control & IS_LOST) != 0;
 }
 
 static uint16_t read_box(struct slave *s, const struct ecat_datagram *dg)
@@ -75,6 +89,8 @@ static uint16_t read_box(struct slave *s, const struct ecat_datagram *dg)
 	memcpy(dg->data, s->in + at, dg->data_len);
 	if (at + dg->data_len == BOX) {
 		s->is_full = 0;
+		s->is_lost = s->loses;
+		s->loses = 0;
 		if (s->left > 0 && (s->data[0] & UNASKED)) {
 			put_mail(s);
 		}
@@ -82,11 +98,30 @@ static uint16_t read_box(struct slave *s, const struct ecat_datagram *dg)
 	return 1;
 }
 
+/* Status, activation, PDI control; asked to repeat, the box is full again. */
+static uint16_t meet_sync_manager(struct slave *s, const struct ecat_datagram *dg)
+{
+	const uint8_t reg[] = { s->is_full ? 0x08 : 0, s->activate, s->activate };
+	size_t from = (size_t)dg->ado - (SM_IN + SM_STATUS);
+
+	if (dg->cmd == ECAT_CMD_FPWR) {
+		s->is_full |= from == 1 && dg->data[0] != s->activate;
+		s->activate = dg->data[0];
+	} else {
+		memcpy(dg->data, reg + from,
+		       dg->data_len < sizeof(reg) - from ? dg->data_len : sizeof(reg) - from);
+	}
+	return 1;
+}
+
 static uint16_t meet(struct slave *s, const struct ecat_datagram *dg)
 {
-	if (dg->cmd == ECAT_CMD_FPRD && dg->ado == ESC_REG_SM + ESC_SM_BYTES + 5) {
-		dg->data[0] = s->is_full ? 0x08 : 0;
-		return 1;
+	if (dg->ado == SM_IN + SM_STATUS || dg->ado == SM_IN + SM_ACTIVATE) {
+		return meet_sync_manager(s, dg);
+	}
+	if (s->refuses) {
+		s->refuses = 0;
+		return 0;
 	}
 	if (dg->cmd == ECAT_CMD_FPRD && dg->ado >= IN_START) {
 		return read_box(s, dg);
@@ -105,6 +140,7 @@ static int submit(void *ctx, const uint8_t *frame, size_t frame_len)
 
 	memcpy(s->frame, frame, frame_len);
 	s->frame_len = frame_len;
+	s->is_lost = 0;
 	while (ecat_frame_next(s->frame, frame_len, &pos, &dg) == 1) {
 		put_le16(dg.wkc, meet(s, &dg));
 	}
@@ -118,8 +154,12 @@ static int collect(void *ctx, uint8_t *ret_answer, size_t capacity)
 	if (s->frame_len > capacity) {
 		return -EMSGSIZE;
 	}
-	memcpy(ret_answer, s->frame, s->frame_len);
 	s->now_ns += PASS_NS;
+	if (s->is_lost) {
+		s->is_lost = 0;
+		return -ETIMEDOUT;
+	}
+	memcpy(ret_answer, s->frame, s->frame_len);
 	return (int)s->frame_len;
 }
 
@@ -131,7 +171,10 @@ static size_t frame_limit(void *ctx)
 
 static mono_t now(void *ctx)
 {
-	return (mono_t){ ((struct slave *)ctx)->now_ns };
+	struct slave *s = ctx;
+
+	s->now_ns += LOOK_NS; /* time passes without a frame, too */
+	return (mono_t){ s->now_ns };
 }
 
 static int sleep_for(void *ctx, span_t span)
@@ -169,6 +212,9 @@ static void run(struct mailbox_engine *mb, struct mailbox_request *rq, uint8_t c
 	if (mailbox_submit(mb, rq) < 0) {
 		__builtin_trap();
 	}
+	if (cancel_after == WAITS) {
+		mailbox_wait(mb, rq);
+	}
 	while (mailbox_is_running(rq)) {
 		mailbox_step(mb);
 		if (++passes > PASSES_MAX) {
@@ -188,6 +234,26 @@ static void take_mail(void *ctx, uint16_t slave_pos, const uint8_t *data, size_t
 	(void)ctx;
 	(void)slave_pos;
 	coe_emergency_get(data, len, &em);
+}
+
+/* With a request open, the slave goes. */
+static void leave(struct mailbox_engine *mb)
+{
+	uint8_t buffer[4];
+	struct mailbox_request rq = { .protocol = &coe_protocol,
+				      .with.coe = { .operation = COE_UPLOAD, .index = 0x6000 },
+				      .buffer = buffer,
+				      .capacity = sizeof(buffer),
+				      .timeout = { NS_PER_MS } };
+
+	if (mailbox_submit(mb, &rq) < 0) {
+		__builtin_trap();
+	}
+	mailbox_step(mb);
+	mailbox_slave_set(mb, 0, NULL);
+	if (rq.result != -ENODEV || mailbox_wait_all(mb) != 0) {
+		__builtin_trap();
+	}
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
@@ -214,6 +280,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 	mailbox_slave_set(mb, 0, &spec);
 	s.data = data + CHOICE_BYTES;
 	s.left = size - CHOICE_BYTES;
+	s.refuses = data[3] >> 1 & 1;
+	if (data[3] & 4) {
+		mailbox_status_hint(mb, 0, data[3] >> 3 & 1);
+	}
 	/* Twice: what is late for the first meets the second. */
 	for (int i = 0; i < 2; i++) {
 		size_t capacity = 1 + (size_t)data[2];
@@ -235,6 +305,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 		}
 		free(rq.buffer);
 	}
+	leave(mb);
 	mailbox_destroy(mb);
 	return 0;
 }

@@ -1,11 +1,34 @@
 /* SPDX-License-Identifier: MIT */
-/* Capture files from anywhere: every byte that a packet promises must be there. */
+/* Capture files from anywhere: every byte that a packet promises must be there, and a packet that
+ * is written is read again. */
+#include <stdlib.h>
+#include <string.h>
+
 #include "wire/pcapng.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 /* So that no compiler leaves the reading out. */
 static volatile unsigned touched;
+
+static void write_and_read(const struct pcapng_packet *packet)
+{
+	size_t bytes = PCAPNG_HEAD_BYTES + pcapng_packet_bytes(packet->len);
+	uint8_t *buf = malloc(bytes);
+	struct pcapng_packet again;
+	struct pcapng file;
+
+	if (buf == NULL) {
+		return;
+	}
+	if (pcapng_write_packet(buf + pcapng_write_head(buf), packet->t_ns, packet->bytes,
+				packet->len) != bytes - PCAPNG_HEAD_BYTES ||
+	    pcapng_open(&file, buf, bytes) < 0 || pcapng_next(&file, &again) != 1 ||
+	    again.len != packet->len || memcmp(again.bytes, packet->bytes, again.len) != 0) {
+		__builtin_trap();
+	}
+	free(buf);
+}
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
@@ -21,6 +44,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 		    packet.len > (size_t)(data + size - packet.bytes)) {
 			__builtin_trap();
 		}
+		write_and_read(&packet);
 		for (size_t i = 0; i < packet.len; i++) {
 			sum += packet.bytes[i];
 		}
