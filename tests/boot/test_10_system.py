@@ -88,6 +88,16 @@ def test_no_user_has_a_password(machine: Machine) -> None:
     assert [line for line in shadow if line.split(":")[1][:1] not in ("!", "*")] == []
 
 
+def test_the_name_server_of_dhcp_is_that_of_libc(machine: Machine) -> None:
+    # 10.0.2.3 is the name server that QEMU's network announces.
+    machine.wait_until("a name server", "grep -qx 'nameserver 10.0.2.3' /etc/resolv.conf")
+    assert machine.run("systemctl is-failed ecdaq-names.service || true").strip() != "failed"
+
+
+def test_the_time_is_kept_for_the_next_start(machine: Machine) -> None:
+    machine.wait_until("a stamp", "test -e /var/lib/ecdaq-clock/stamp")
+
+
 def test_passwords_and_root_are_refused_over_ssh(machine: Machine) -> None:
     settings = machine.run("sudo sshd -T").splitlines()
     for line in ("passwordauthentication no", "permitrootlogin no", "allowusers operator"):

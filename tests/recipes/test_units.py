@@ -44,3 +44,10 @@ def test_the_kernel_feeds_an_armed_watchdog_while_the_disk_is_checked(metadata: 
     assert "watchdog.handle_boot_enabled=1" in words
     (timeout,) = (int(w.partition("=")[2]) for w in words if w.startswith("watchdog.open_timeout="))
     assert 300 <= timeout <= 3600
+
+
+def test_libc_reads_what_is_written_when_the_network_changes() -> None:
+    assert values("ecdaq-names.path", "PathChanged") == ["/run/systemd/netif/state"]
+    assert "ecdaq-names" in values("ecdaq-names.service", "RuntimeDirectory")
+    links = (ROOT / "usr/lib/tmpfiles.d/ecdaq.conf").read_text()
+    assert "L /etc/resolv.conf - - - - /run/ecdaq-names/resolv.conf\n" in links
