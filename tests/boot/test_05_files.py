@@ -136,6 +136,13 @@ def test_the_root_file_system_is_clean_and_has_our_programs(built: Built) -> Non
         assert head[:6] == b"\x7fELF\x02\x01" and head[18:20] == b"\xb7\x00", program
 
 
+def test_the_data_partition_is_made_for_large_files(built: Built) -> None:
+    start = int(built.partitions()[3]["start"]) * 512
+    head = built.tool("dumpe2fs", "-h", f"{built.name}.img?offset={start}").decode()
+    assert re.search(r"^Block size: +4096$", head, re.M)
+    assert re.search(r"^Inodes per group: +2048$", head, re.M)
+
+
 def test_nothing_secret_and_nothing_of_one_machine_is_in_it(built: Built) -> None:
     shadow = built.root_file("/etc/shadow").decode().splitlines()
     assert len(shadow) > 10

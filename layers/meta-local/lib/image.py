@@ -52,7 +52,7 @@ def _plan(inputs: Inputs, layout: wks.Layout) -> str:
         given = part.uuid or str(uuid.uuid5(NAMESPACE, f"{inputs.name}/{part.label}"))
         lines.append(
             f"part {part.source or 'empty'} {part.fstype or 'none'} {part.label}"
-            f" {part.size_bytes} {given}"
+            f" {part.size_bytes} {given} {part.mkfs_options}".rstrip()
         )
     return "\n".join(lines) + "\n"
 

@@ -25,10 +25,11 @@ make_vfat()
 
 make_ext4()
 {
-	set --
+	# shellcheck disable=SC2086 # a list of options
+	set -- $options
 	if [ "$source" = rootfs ]; then
 		# Never written: no journal, no room kept back.
-		set -- -O ^has_journal -m 0 -d "$work/tar/rootfs.tar"
+		set -- "$@" -O ^has_journal -m 0 -d "$work/tar/rootfs.tar"
 	fi
 	mke2fs -q -t ext4 -L "$label" -U "$uuid" -E "hash_seed=$uuid,lazy_itable_init=0" "$@" "$part"
 }
@@ -56,7 +57,7 @@ place()
 	echo >> "$disk/table"
 }
 
-while read -r word a b c d e; do
+while read -r word a b c d e options; do
 	case $word in
 	disk)
 		image=$out/$a.img

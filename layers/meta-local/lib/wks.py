@@ -25,6 +25,7 @@ class Partition:
     label: str
     size_bytes: int
     uuid: str
+    mkfs_options: str = ""
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,7 @@ def _part_parser() -> _Parser:
     parser.add_argument("--part-name", default="")
     parser.add_argument("--fixed-size", required=True)
     parser.add_argument("--uuid", default="")
+    parser.add_argument("--mkfs-extraopts", default="")
     parser.add_argument("--active", action="store_true")
     parser.add_argument("--align", type=int, default=4096)
     return parser
@@ -87,6 +89,7 @@ def _parse_part(words: list[str]) -> Partition:
         label=given.label,
         size_bytes=_size(given.fixed_size),
         uuid=given.uuid,
+        mkfs_options=given.mkfs_extraopts,
     )
 
 
