@@ -19,7 +19,7 @@ def test_the_console_names_the_error_and_its_place(machine: Machine) -> None:
     assert "ecdaq.yaml:3" in console
     assert "colour" in console
     assert "hostname: 'notaname!' is not a host name" in console
-    assert "50-port.network: matches the EtherCAT port" in console
+    assert "50-port.network: names the EtherCAT port" in console
 
 
 def test_the_journal_has_the_same_messages(machine: Machine) -> None:

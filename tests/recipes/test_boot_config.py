@@ -129,13 +129,58 @@ def test_what_is_no_host_name_is_refused(place: Place, name: str) -> None:
     assert (place.target / "hostname").read_text() == "ecdaq\n"
 
 
-def test_network_files_are_taken_but_never_for_the_ethercat_port(place: Place) -> None:
+def network_files(place: Place, files: dict[str, str]) -> str:
+    """The output of the program with these files in network/."""
     (place.source / "network").mkdir()
-    (place.source / "network/10-a.network").write_text("[Match]\nName=lan0\n")
-    (place.source / "network/20-b.network").write_text("[Match]\nName=ecat0\n")
-    output = place.run()
-    assert [p.name for p in place.networkd.iterdir()] == ["10-a.network"]
-    assert "20-b.network: matches the EtherCAT port" in output
+    for name, text in files.items():
+        (place.source / "network" / name).write_text(text)
+    return place.run()
+
+
+# What takes or renames the port in networkd's or udev's order, if it is looked at first.
+TAKERS = {
+    "00-lan.network": "[Match]\nName=e*\n[Network]\nDHCP=yes\n",
+    "01-all.network": "[Match]\nType=ether\n[Network]\nDHCP=yes\n",
+    "01-x.link": "[Match]\nOriginalName=*\n[Link]\nName=lan0\n",
+    "10-ecat.network": "[Match]\nName=*\n[Network]\nDHCP=yes\n",
+    "10-ecat.link": "[Match]\nDriver=*\n[Link]\nName=lan0\n",
+}
+
+
+@pytest.mark.parametrize("name", TAKERS)
+def test_no_network_file_is_looked_at_before_those_of_the_ethercat_port(
+    place: Place, name: str
+) -> None:
+    network_files(place, {name: TAKERS[name]})
+    (taken,) = (p.name for p in place.networkd.iterdir())
+    kind = taken.rpartition(".")[2]
+    recipes = TOP / "recipes/recipes-core"
+    own = {p.name for p in recipes.rglob(f"*.{kind}")}
+    ports = {name for name in own if name.startswith("10-")}
+    assert ports
+    assert max(ports) < taken
+    assert all(taken < name for name in own - ports)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[Match]\nName=ecat0\n",
+        "[Match]\n Name = lan0 ECAT0\n",
+        "[NetDev]\nName=ecat0\nKind=dummy\n",
+        "[Link]\nAlternativeName=ecat0\n",
+        "[Match]\nName=lan0 \\\n ecat0\n",
+    ],
+)
+def test_a_network_file_that_names_the_ethercat_port_is_refused(place: Place, text: str) -> None:
+    output = network_files(place, {"10-a.network": "[Match]\nName=lan0\n", "20-b.netdev": text})
+    assert [p.name for p in place.networkd.iterdir()] == ["50-boot-10-a.network"]
+    assert "20-b.netdev: names the EtherCAT port" in output
+
+
+def test_a_network_file_with_a_strange_name_is_refused(place: Place) -> None:
+    assert "letters, digits" in network_files(place, {"a b.network": "[Match]\nName=lan0\n"})
+    assert list(place.networkd.iterdir()) == []
 
 
 def test_time_servers_are_addresses_and_nothing_else(place: Place) -> None:
