@@ -19,6 +19,12 @@ EXPOSURE_LIMITS = {
     "ecdaq-record.service": 1.5,
     "ecdaq-dds.service": 2.0,
     "ecdaq-sync0.service": 2.0,
+    "ecdaq-boot-config.service": 2.5,
+    "ecdaq-clock.service": 2.0,
+    "ecdaq-names.service": 1.5,
+    "ecdaq-nic.service": 3.5,
+    "ecdaq-ssh-key.service": 2.0,
+    "ecdaq-segment.service": 2.0,
 }
 
 

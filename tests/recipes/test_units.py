@@ -4,6 +4,9 @@
 from __future__ import annotations
 
 import re
+import shutil
+import subprocess
+from pathlib import Path
 
 import pytest
 from conftest import TOP
@@ -11,6 +14,9 @@ from metadata import Metadata
 
 ROOT = TOP / "recipes/recipes-core/ecdaq-config/files/root"
 UNITS = ROOT / "usr/lib/systemd/system"
+SERVICES = sorted((TOP / "recipes").rglob("*.service"))
+# systemd-analyze's figure for what a service may do: 0 is best, 10 worst.
+EXPOSURE_LIMIT = 5.0
 
 
 def values(unit: str, key: str) -> list[str]:
@@ -51,3 +57,13 @@ def test_libc_reads_what_is_written_when_the_network_changes() -> None:
     assert "ecdaq-names" in values("ecdaq-names.service", "RuntimeDirectory")
     links = (ROOT / "usr/lib/tmpfiles.d/ecdaq.conf").read_text()
     assert "L /etc/resolv.conf - - - - /run/ecdaq-names/resolv.conf\n" in links
+
+
+@pytest.mark.skipif(not shutil.which("systemd-analyze"), reason="no systemd-analyze here")
+@pytest.mark.parametrize("path", SERVICES, ids=lambda p: p.stem)
+def test_every_service_is_sandboxed(path: Path) -> None:
+    command = ["systemd-analyze", "security", "--offline=true", "--no-pager", str(path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    figure = float(re.findall(r"exposure level for \S+: ([\d.]+) ", done.stdout)[0])
+    print(f"{path.stem}: {figure}")
+    assert figure < EXPOSURE_LIMIT
