@@ -166,6 +166,11 @@ def test_the_bill_of_materials_names_every_package_with_its_source(built: Built)
     assert {name for name, _ in installed} <= {name for name, _ in named}
     assert {"ecdaq", "ecdaq-config", "linux-image-ecdaq"} <= {name for name, _ in installed}
     assert all(p["licenseDeclared"] for p in bill["packages"])
+    # What a CVE is looked up by: the kernel's own version, and what is compiled into programs.
+    config = built.path(".kernel-config").read_text()
+    kernel = re.findall(r"^# Linux/arm64 (\S+) Kernel", config, re.M)[0]
+    assert [v for n, v in named if n == "linux" and v.startswith(f"{kernel}-")]
+    assert "soem" in {name for name, _ in named}
 
 
 def test_the_block_map_covers_what_is_written(built: Built) -> None:

@@ -11,6 +11,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 DEP5 = re.compile(r"^Format:.*copyright-format", re.MULTILINE)
+BUILT_USING = re.compile(r"(\S+) \(= ([^)]+)\)")
 LICENSE = re.compile(r"^License:[ \t]*(\S[^\n]*)$", re.MULTILINE)
 
 
@@ -26,6 +27,8 @@ class Package:
     maintainer: str
     homepage: str
     licenses: tuple[str, ...]
+    # Name and version of sources that are in its files though no package of theirs is installed.
+    built_using: tuple[tuple[str, str], ...]
 
 
 def _stanza(text: str) -> dict[str, str]:
@@ -64,6 +67,7 @@ def installed_packages(rootfs: Path) -> list[Package]:
                 maintainer=fields.get("Maintainer", ""),
                 homepage=fields.get("Homepage", ""),
                 licenses=_licenses(rootfs, fields["Package"]),
+                built_using=tuple(BUILT_USING.findall(fields.get("Built-Using", ""))),
             )
         )
     return sorted(packages, key=lambda p: (p.name, p.architecture))
@@ -75,6 +79,12 @@ def manifest(packages: list[Package]) -> str:
         f"{p.name}\t{p.architecture}\t{p.version}\t{p.source}\t{p.source_version}\n"
         for p in packages
     )
+
+
+def _purl(package: Package) -> str:
+    # What our recipes make is not Debian's, whatever its name.
+    kind = "generic" if package.maintainer.endswith("@localhost>") else "deb/debian"
+    return f"pkg:{kind}/{package.name}@{package.version}?arch={package.architecture}"
 
 
 def _entry(package: Package) -> dict[str, object]:
@@ -100,18 +110,45 @@ def _entry(package: Package) -> dict[str, object]:
             {
                 "referenceCategory": "PACKAGE-MANAGER",
                 "referenceType": "purl",
-                "referenceLocator": (
-                    f"pkg:deb/debian/{package.name}@{package.version}?arch={package.architecture}"
-                ),
+                "referenceLocator": _purl(package),
             }
         ],
     }
+
+
+def _source_entry(name: str, version: str) -> dict[str, object]:
+    """A source that is compiled in. One with a Debian revision is Debian's."""
+    kind = "deb/debian" if "-" in version else "generic"
+    return {
+        "SPDXID": "SPDXRef-source-" + re.sub(r"[^A-Za-z0-9.-]", "-", name),
+        "name": name,
+        "versionInfo": version,
+        "supplier": "NOASSERTION",
+        "downloadLocation": "NOASSERTION",
+        "filesAnalyzed": False,
+        "licenseConcluded": "NOASSERTION",
+        "licenseDeclared": "NOASSERTION",
+        "copyrightText": "NOASSERTION",
+        "primaryPackagePurpose": "SOURCE",
+        "externalRefs": [
+            {
+                "referenceCategory": "PACKAGE-MANAGER",
+                "referenceType": "purl",
+                "referenceLocator": f"pkg:{kind}/{name}@{version}?arch=source",
+            }
+        ],
+    }
+
+
+def _relation(element: object, kind: str, other: object) -> dict[str, object]:
+    return {"spdxElementId": element, "relationshipType": kind, "relatedSpdxElement": other}
 
 
 def spdx(packages: list[Package], name: str, version: str, epoch: int) -> str:
     """The document; equal packages give equal bytes."""
     digest = hashlib.sha256(manifest(packages).encode()).hexdigest()
     entries = [_entry(p) for p in packages]
+    sources = {name: _source_entry(name, v) for p in packages for name, v in p.built_using}
     document = {
         "spdxVersion": "SPDX-2.3",
         "dataLicense": "CC0-1.0",
@@ -122,14 +159,14 @@ def spdx(packages: list[Package], name: str, version: str, epoch: int) -> str:
             "created": datetime.fromtimestamp(epoch, UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
             "creators": ["Tool: ecdaq-image"],
         },
-        "packages": entries,
+        "packages": [*entries, *sources.values()],
         "relationships": [
-            {
-                "spdxElementId": "SPDXRef-DOCUMENT",
-                "relationshipType": "DESCRIBES",
-                "relatedSpdxElement": entry["SPDXID"],
-            }
-            for entry in entries
+            *(_relation("SPDXRef-DOCUMENT", "DESCRIBES", e["SPDXID"]) for e in entries),
+            *(
+                _relation(e["SPDXID"], "GENERATED_FROM", sources[name]["SPDXID"])
+                for e, p in zip(entries, packages, strict=True)
+                for name, _ in p.built_using
+            ),
         ],
     }
     return json.dumps(document, indent=1) + "\n"
