@@ -136,6 +136,14 @@ def test_the_root_file_system_is_clean_and_has_our_programs(built: Built) -> Non
         assert head[:6] == b"\x7fELF\x02\x01" and head[18:20] == b"\xb7\x00", program
 
 
+def test_the_image_says_what_it_is(built: Built) -> None:
+    release = built.root_file("/usr/lib/os-release").decode()
+    name, version = built.root_file("/usr/lib/ecdaq/image").decode().split()
+    assert name == f"ecdaq-image-{built.machine}"
+    assert re.fullmatch(r"[0-9.]+-([0-9a-f]{7,40}(-dirty)?|unknown)", version)
+    assert f"\nIMAGE_ID={name}\nIMAGE_VERSION={version}\n" in release
+
+
 def test_the_data_partition_is_made_for_large_files(built: Built) -> None:
     start = int(built.partitions()[3]["start"]) * 512
     head = built.tool("dumpe2fs", "-h", f"{built.name}.img?offset={start}").decode()

@@ -36,7 +36,13 @@ def test_a_good_machine_has_nothing_to_fix(machine: Machine) -> None:
     found = checks(machine)
     assert {name for name, check in found.items() if check["level"] != "OK"} == OF_A_RUNNING_ECDAQD
     assert "port ecat0, cycle core 3, priority 80" in text.splitlines()[0]
-    assert text.splitlines()[-1] == "30 checks: 28 ok, 0 warn, 0 fail, 2 skipped"
+    assert text.splitlines()[-1] == "31 checks: 29 ok, 0 warn, 0 fail, 2 skipped"
+
+
+def test_the_image_and_the_commit_that_it_was_built_from_are_shown(machine: Machine) -> None:
+    assert checks(machine)["image"]["value"] == "ecdaq-image-raspberrypi4-64 0.1.0-1a2b3c4"
+    machine.change({"/usr/lib/ecdaq/image": None})
+    assert checks(machine)["image"]["level"] == "SKIP"
 
 
 # check, what is otherwise and still good, expected text
@@ -110,7 +116,7 @@ def test_a_bare_machine_skips_and_never_crashes(tmp_path: Path) -> None:
     result = ecdaq(None, "doctor", "--root", str(tmp_path), "--json")
     found = report(result)
     assert found["config"] == "defaults"
-    assert found["ok"] + found["warn"] + found["fail"] + found["skip"] == 30
+    assert found["ok"] + found["warn"] + found["fail"] + found["skip"] == 31
     assert found["fail"] == 0 and result.returncode == OK
 
 
@@ -153,7 +159,7 @@ def test_garbage_in_every_file_never_crashes(machine: Machine, garbage: str) -> 
         if not name.endswith("/") and not str(content).startswith("-> "):
             machine.change({name: garbage})
     found = report(examine(machine, "--json"))
-    assert len(found["check"]) == 30
+    assert len(found["check"]) == 31
 
 
 # --- with an ecdaqd ---
@@ -256,7 +262,7 @@ def test_the_command_line_of_the_ecdaqd_that_runs_is_what_counts(
 def test_this_machine_is_examined_with_the_port_of_the_ecdaqd_that_runs(daemon: Fake) -> None:
     found = report(daemon("doctor", "--json"))
     assert found["running"] is True and found["interface"] == "ecat0"
-    assert len(found["check"]) == 30
+    assert len(found["check"]) == 31
     assert report(daemon("doctor", "--json", "--interface", "lo"))["interface"] == "lo"
 
 

@@ -282,4 +282,6 @@ def test_what_is_wrong_is_named_with_its_remedy(
 
 
 def test_every_check_has_a_bad_machine(machine: Machine) -> None:
-    assert set(checks(machine)) - {name for name, *_ in BAD} == OF_A_RUNNING_ECDAQD
+    # Check image tells a fact, which cannot be bad.
+    found = set(checks(machine)) - {name for name, *_ in BAD} - {"image"}
+    assert found == OF_A_RUNNING_ECDAQD

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -137,8 +138,22 @@ def test_a_change_of_the_disk_contents_rebuilds_the_image(
     assert image_hash(changed) != image_hash(before)
 
 
-def image_hash(top: Path) -> str:
+def test_a_commit_that_changes_nothing_of_the_image_does_not_rebuild_it(tmp_path: Path) -> None:
+    top = tree_copy(tmp_path)
+    assert image_hash(top, ECDAQ_COMMIT="1111111") == image_hash(top, ECDAQ_COMMIT="2222222")
+
+
+def test_an_image_names_the_commit_that_it_is_built_from(metadata: Metadata) -> None:
+    image = metadata.recipes["ecdaq-image"]
+    assert "name_image" in image.value("ROOTFS_POSTPROCESS_COMMAND").split()
+    commit = image.value("ECDAQ_COMMIT")
+    assert re.fullmatch(r"[0-9a-f]{7,40}(-dirty)?", commit), commit
+    assert f"-{commit}" in image.value("name_image")
+
+
+def image_hash(top: Path, **more: str) -> str:
     settings = {"MACHINE": "qemuarm64", "DISTRO": "ecdaq", "TMPDIR": "/tmp", "ECDAQ_TOP": str(TOP)}
+    settings |= more
     return Graph(Metadata(top, top.parent / "build", settings)).hash(
         Task("ecdaq-image", "do_image")
     )

@@ -299,6 +299,10 @@ static void judge_idle_states(const struct target *t, struct finding *f)
 
 const struct check checks_of_kernel[] = {
 	{ .name = "machine", .judge = judge_machine },
+	{ .name = "image",
+	  .fact = "/usr/lib/ecdaq/image",
+	  .rules = { { FINDING_SKIP, "not an image of ecdaq", IF_ABSENT, NULL, NULL },
+		     { .level = FINDING_OK, .text = "{text}" } } },
 	{ .name = "kernel",
 	  .fact = "/proc/sys/kernel/osrelease",
 	  .rules = { { FINDING_OK, "{text} PREEMPT_RT", IF_AT_LEAST, "1", "/sys/kernel/realtime" },

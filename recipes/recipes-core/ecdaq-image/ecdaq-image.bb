@@ -18,6 +18,24 @@ remove_host_keys() {
 	run_privileged find "${IMAGE_ROOTFS}/etc/ssh" -name "ssh_host_*_key*" -delete
 }
 
+# The machine can say what it runs: version and commit, in os-release and for `ecdaq doctor`. An image that
+# is the same at a later commit is not built again, and names the one at which it was made.
+def ecdaq_commit(d):
+    import subprocess
+    command = ["git", "-C", d.getVar("ECDAQ_TOP"), "describe", "--always", "--dirty", "--exclude=*"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    return done.stdout.strip() or "unknown"
+
+ECDAQ_COMMIT ?= "${@ecdaq_commit(d)}"
+ROOTFS_POSTPROCESS_COMMAND =+ "name_image"
+name_image[vardepsexclude] += "ECDAQ_COMMIT"
+name_image() {
+	printf 'IMAGE_ID=%s\nIMAGE_VERSION=%s\n' "${PN}-${MACHINE}" "${PV}-${ECDAQ_COMMIT}" |
+		run_privileged tee -a "${IMAGE_ROOTFS}/usr/lib/os-release"
+	printf '%s %s\n' "${PN}-${MACHINE}" "${PV}-${ECDAQ_COMMIT}" |
+		run_privileged tee "${IMAGE_ROOTFS}/usr/lib/ecdaq/image"
+}
+
 # On the boot partition beside the machine's own files: the kernel's command line, and a description
 # of the ecdaq folder.
 IMAGE_BOOT_FILES += "${IMAGE_FULLNAME}.cmdline;cmdline.txt \
