@@ -501,7 +501,10 @@ def main(arguments: Sequence[str]) -> int:
         return 0
     usual = [g for g in GROUPS if g not in ON_REQUEST]
     wanted = [g for g in GROUPS if g in (options.groups or usual)]
+    started = time.monotonic()
     total = run_in_order(wanted, Builder(), options)
+    cpu = sum(seconds for *_, seconds in total.groups)
+    total.groups.append(("together", time.monotonic() - started, cpu))
     if os.environ.get("CI"):
         fail_unexpected_skips(total, ROOT / "tests" / "expected_skips.txt")
     if total.skips:
