@@ -284,7 +284,8 @@ def test_an_unexpected_skip_is_a_failure_in_ci(own_build: Path) -> None:
     ]
 
 
-def test_a_signal_ends_everything_that_was_started(own_build: Path) -> None:
+@pytest.mark.parametrize("run", ["start()", "run_tests.Beside(start).result()"])
+def test_a_signal_ends_everything_that_was_started(own_build: Path, run: str) -> None:
     """A process that has left the process group of its suite, too."""
     program = f"""
 import signal, sys
@@ -294,7 +295,10 @@ signal.signal(signal.SIGTERM, run_tests.end_on_signal)
 run_tests.adopt_orphans()
 script = "setsid sleep 600 & echo $! > hidden; sleep 600 & echo $! > visible; wait"
 run_tests.ROOT = run_tests.Path({str(own_build)!r})
-run_tests.run_logged(["sh", "-c", script], run_tests.ROOT / "log", {{"PATH": "/usr/bin:/bin"}})
+def start():
+    log, env = run_tests.ROOT / "log", {{"PATH": "/usr/bin:/bin"}}
+    return run_tests.run_logged(["sh", "-c", script], log, env)
+{run}
 """
     runner = subprocess.Popen([sys.executable, "-c", program], cwd=own_build)
     pids = [own_build / "hidden", own_build / "visible"]
