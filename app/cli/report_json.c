@@ -208,6 +208,7 @@ void report_slave_json(const struct status_page *page, uint32_t index, struct js
 	json_truth(js, "is_dc_reference", info.is_dc_reference != 0);
 	json_i64(js, "dc_delay_ns", info.dc_delay_ns);
 	json_i64(js, "dc_diff_ns", GET(slave->dc_diff_ns));
+	json_u64(js, "sync0_cycle_ns", info.sync0_cycle_ns);
 	json_i64(js, "sync0_shift_ns", info.sync0_shift_ns);
 	json_u64(js, "input_bits", info.input_bits);
 	json_u64(js, "output_bits", info.output_bits);

@@ -62,6 +62,8 @@ static void show_more(const struct status_page *page, uint32_t index)
 		printf("    %-16s %s%s\n", "DC delay", text_ns(info.dc_delay_ns, buf),
 		       info.is_dc_reference ? " (reference clock)" : "");
 		printf("    %-16s %s\n", "DC difference", text_ns(GET(slave->dc_diff_ns), buf));
+		printf("    %-16s %s\n", "SYNC0 cycle",
+		       info.sync0_cycle_ns == 0 ? "none" : text_ns(info.sync0_cycle_ns, buf));
 		printf("    %-16s %s\n", "SYNC0 shift", text_ns(info.sync0_shift_ns, buf));
 	} else {
 		printf("    %-16s none\n", "DC");

@@ -17,7 +17,7 @@
 
 #include "base/slave_set.h"
 
-#define SAMPLE_VERSION 2u
+#define SAMPLE_VERSION 3u
 
 enum sample_flag {
 	SAMPLE_LOST = 1u << 0,    /* no frame back before the receive deadline: inputs are stale */
@@ -101,12 +101,13 @@ struct slave_info {
 	int32_t counter_channel; /* its conversion counter in the channel table; -1: none */
 	uint32_t input_bits;
 	uint32_t output_bits;
-	int32_t sync0_shift_ns; /* of its SYNC0 against the grid: SII and configuration */
-	uint16_t config_item;   /* of slaves[], from 1; 0: it is not configured */
-	uint16_t reserved;
+	uint32_t sync0_cycle_ns; /* a multiple or a fraction of the period; 0: no cyclic SYNC0 */
+	int32_t sync0_shift_ns;  /* against the multiples of that: SII and configuration */
+	uint16_t config_item;    /* of slaves[], from 1; 0: it is not configured */
+	uint16_t reserved[3];
 };
 
-static_assert(sizeof(struct slave_info) == 144, "part of the ring's format");
+static_assert(sizeof(struct slave_info) == 152, "part of the ring's format");
 
 /* The meta area of the sample ring: this, slave_count slave_info, channel_count channel. */
 struct sample_meta {

@@ -36,6 +36,13 @@ static int is_terminated(const char *text, size_t bytes)
 	return memchr(text, 0, bytes) != NULL;
 }
 
+static int sync0_is_consistent(const struct slave_info *slave, uint32_t period_ns)
+{
+	uint32_t cycle_ns = slave->sync0_cycle_ns;
+
+	return cycle_ns == 0 || cycle_ns % period_ns == 0 || period_ns % cycle_ns == 0;
+}
+
 static int slaves_are_consistent(const struct channel_table *t)
 {
 	for (uint32_t i = 0; i < t->meta.slave_count; i++) {
@@ -43,7 +50,8 @@ static int slaves_are_consistent(const struct channel_table *t)
 
 		if (slave->slave_pos != i || !is_terminated(slave->name, sizeof(slave->name)) ||
 		    !is_terminated(slave->device, sizeof(slave->device)) ||
-		    slave->counter_channel >= (int32_t)t->meta.channel_count) {
+		    slave->counter_channel >= (int32_t)t->meta.channel_count ||
+		    !sync0_is_consistent(slave, (uint32_t)t->meta.period_ns)) {
 			return 0;
 		}
 	}

@@ -357,6 +357,8 @@ int64_t bus_clock_diff(struct bus *bus, size_t pos);
 
 /* --- sync0.c --- */
 
+/** Of the SYNC0 that the master starts in the slave; 0: it starts none. */
+uint32_t bus_sync0_cycle_ns(const struct bus *bus, size_t pos);
 /** 1 if the slave takes part in the common SYNC0, and it was started. */
 int bus_sync0_is_wanted(const struct bus *bus, size_t pos);
 /** SYNC unit of a slave that lost it: into the grid of the others, or back to its own controller.

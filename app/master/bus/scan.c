@@ -222,6 +222,7 @@ static int check_names(struct bus *bus)
 void bus_publish_slaves(struct bus *bus)
 {
 	for (size_t i = 0; i < bus->slave_count; i++) {
+		bus->slave[i].info.sync0_cycle_ns = bus_sync0_cycle_ns(bus, i);
 		bus->info[i] = bus->slave[i].info;
 	}
 }

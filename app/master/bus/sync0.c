@@ -297,7 +297,7 @@ int bus_sync0_start(struct bus *bus, int64_t dc_now_ns, char *error)
 
 	bus->error = error;
 	for (size_t i = 0; i < bus->slave_count; i++) {
-		wanted[i] = (uint8_t)(has_sync0(bus, i) && !is_pdi_owned(bus, i));
+		wanted[i] = bus_sync0_cycle_ns(bus, i) != 0;
 		left += wanted[i];
 	}
 	r = bus->plan.dc_reference != 0 ? give_to_pdi(bus) : 0;
@@ -339,9 +339,16 @@ int bus_sync0_restore(struct bus *bus, size_t pos)
 	return program(bus, pos, next_start(bus, now_ns, 1));
 }
 
+uint32_t bus_sync0_cycle_ns(const struct bus *bus, size_t pos)
+{
+	return has_sync0(bus, pos) && !is_pdi_owned(bus, pos)
+		       ? (uint32_t)bus->slave[pos].sync0_cycle_ns
+		       : 0;
+}
+
 int bus_sync0_is_wanted(const struct bus *bus, size_t pos)
 {
-	return has_sync0(bus, pos) && !is_pdi_owned(bus, pos) && bus->sync0_start_ns != 0;
+	return bus_sync0_cycle_ns(bus, pos) != 0 && bus->sync0_start_ns != 0;
 }
 
 void bus_sync0_stop(struct bus *bus)

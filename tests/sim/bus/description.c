@@ -369,6 +369,36 @@ TEST(description, the_stated_sync0_shift_is_that_of_the_sii_and_the_configuratio
 		 -30000);
 }
 
+/* After bring-up: what the slave was programmed with. */
+TEST(description, the_stated_sync0_cycle_is_that_of_the_slave_and_none_without_sync0)
+{
+	static const char *const off[] = { "slaves[0].assign_activate=none", NULL };
+	static const char *const shots[] = { "slaves[0].mode=oneshot", NULL };
+	const struct {
+		struct bus_bench *bench;
+		uint32_t cycle_ns;
+	} cases[] = {
+		{ make_mode(4, 250000, 0, 0, 45), 4000000 },
+		{ make_mode(-2, 0, 0, 0, 46), 500000 },
+		{ bench_create(&(struct bench_spec){ .piccolos = 1, .seed = 47 }), 1000000 },
+		{ bench_create(&(struct bench_spec){
+			  .catalogue = { "el4002" }, .clocked = 1, .seed = 48, .settings = off }),
+		  0 },
+		{ bench_create(
+			  &(struct bench_spec){ .piccolos = 1, .seed = 49, .settings = shots }),
+		  0 },
+	};
+
+	for (size_t i = 0; i < sizeof(cases) / sizeof(cases[0]); i++) {
+		size_t count;
+
+		bench_bring_up(cases[i].bench);
+		CHECK_EQ(bus_slaves(cases[i].bench->bus, &count)[0].sync0_cycle_ns,
+			 cases[i].cycle_ns);
+		bench_destroy(cases[i].bench);
+	}
+}
+
 static void check_refused(struct bus_bench *b, const char *what)
 {
 	CHECK_EQ(bench_find(b), -ENOTSUP);
