@@ -62,6 +62,12 @@ static int is_absent(const struct sync0_line_status *ls)
 	return ls->slave_pos == EVENT_NO_SLAVE;
 }
 
+/* Nothing of the line is judged while the master is the same. */
+static int is_unchecked(const struct sync0_line_status *ls)
+{
+	return is_absent(ls) || (ls->cycle_ns == 0 && !ls->is_oneshot);
+}
+
 /* "slave 1" */
 static const char *slave_text(const struct sync0_line_status *ls, char text[TEXT_BYTES])
 {
@@ -82,7 +88,7 @@ static void write_line(const struct view *view, uint32_t number)
 	       text_plain(ls->line, line, sizeof(line)), ls->is_oneshot ? ", one-shot" : "",
 	       ls->is_hte ? ", hardware timestamps" : "",
 	       !ls->is_open       ? "NOT OPEN"
-	       : is_absent(ls)    ? "NOT CHECKED"
+	       : is_unchecked(ls) ? "NOT CHECKED"
 	       : GET(ls->is_lost) ? "LOST"
 				  : sync0_verdict_to_str(GET(ls->verdict)),
 	       GET(ls->edges) == 0 ? ", no window yet" : "");
@@ -125,6 +131,9 @@ static void write_table(const struct view *view)
 	}
 	if (page->message[0] != '\0') {
 		printf("message    %s\n", text_plain(page->message, plain, sizeof(plain)));
+	}
+	if (sync0_beyond_format(page, text, sizeof(text)) > 0) {
+		puts(text_plain(text, plain, sizeof(plain)));
 	}
 	for (uint32_t i = 0; i < view->lines; i++) {
 		write_line(view, i);
@@ -206,6 +215,8 @@ static void write_line_json(struct json *js, const struct view *view, uint32_t n
 	json_truth(js, "open", ls->is_open != 0);
 	json_truth(js, "oneshot", ls->is_oneshot != 0);
 	json_truth(js, "hte", ls->is_hte != 0);
+	json_u64(js, "cycle_ns", ls->cycle_ns);
+	json_i64(js, "shift_ns", ls->shift_ns);
 	json_truth(js, "lost", GET(ls->is_lost) != 0);
 	json_text(js, "verdict", sync0_verdict_to_str(GET(ls->verdict)));
 	json_u64(js, "edges", GET(ls->edges));
@@ -241,6 +252,7 @@ static void write_json(const struct view *view)
 		json_i64(&js, "noise_p99_ns", GET(page->noise_p99_ns));
 	}
 	json_text(&js, "message", page->message);
+	json_u64(&js, "beyond", GET(page->beyond_count));
 	json_array_begin(&js, "lines");
 	for (uint32_t i = 0; i < view->lines; i++) {
 		write_line_json(&js, view, i);

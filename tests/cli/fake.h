@@ -34,6 +34,7 @@ struct fake {
 	unsigned slaves; /* claimed on the status page */
 	int has_long_names;
 	uint64_t page_faults;
+	long beyond;       /* slaves that ecdaq-sync0 has no line for; -1: it does not run */
 	unsigned control;  /* calls of a control program; 0: there is none */
 	uint32_t degraded; /* bit per enum event_rt */
 	struct meta meta;
@@ -66,6 +67,7 @@ void fake_describe(struct fake *f);
 void fake_make_rings(struct fake *f);
 void fake_make_status(struct fake *f);
 void fake_make_record_status(struct fake *f);
+void fake_make_sync0_status(struct fake *f);
 void fake_emit(struct fake *f, enum event_id id, uint16_t slave_pos, int64_t value, int32_t arg);
 
 void fake_listen(struct fake *f);

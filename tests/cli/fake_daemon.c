@@ -6,10 +6,10 @@
  * input, by `ecdaq stop`, or by SIGKILL.
  *
  * usage: test_fake_daemon RUN_DIR [SPEED=N] [JUMP=1] [RECORDER=0] [ADMIN=mute|garbage|none]
- * [MODE=octal] [SLAVES=N] [FAULTS=N] [DEGRADED=BITS] JUMP: every hundredth cycle number is followed
- * by a gap of five. Each 64th frame is lost. The admin socket: piccolo1.led belongs to the control
- * program; objects 0x1018:1, 0x1008:0, 0x8000:2 exist, 0x8000:1 cannot be written now; a one-shot
- * time must be in the future.
+ * [MODE=octal] [SLAVES=N] [FAULTS=N] [BEYOND=N] [DEGRADED=BITS] JUMP: every hundredth cycle number
+ * is followed by a gap of five. Each 64th frame is lost. The admin socket: piccolo1.led belongs to
+ * the control program; objects 0x1018:1, 0x1008:0, 0x8000:2 exist, 0x8000:1 cannot be written now;
+ * a one-shot time must be in the future.
  */
 #include <errno.h>
 #include <math.h>
@@ -118,6 +118,8 @@ static void parse(struct fake *f, int argc, char **argv)
 			f->slaves = (unsigned)strtoul(value, NULL, 10);
 		} else if (strcmp(argv[i], "LONG") == 0) {
 			f->has_long_names = value[0] == '1';
+		} else if (strcmp(argv[i], "BEYOND") == 0) {
+			f->beyond = strtol(value, NULL, 10);
 		} else if (strcmp(argv[i], "FAULTS") == 0) {
 			f->page_faults = strtoull(value, NULL, 10);
 		} else if (strcmp(argv[i], "CONTROL") == 0) {
@@ -170,6 +172,7 @@ static void live(struct fake *f)
 int main(int argc, char **argv)
 {
 	static struct fake f = { .speed = 1,
+				 .beyond = -1,
 				 .has_recorder = 1,
 				 .admin = "",
 				 .mode = 0640,
@@ -184,6 +187,9 @@ int main(int argc, char **argv)
 	fake_make_status(&f);
 	if (f.has_recorder) {
 		fake_make_record_status(&f);
+	}
+	if (f.beyond >= 0) {
+		fake_make_sync0_status(&f);
 	}
 	fake_listen(&f);
 	fake_emit(&f, EVENT_STARTED, EVENT_NO_SLAVE, STEP_NS, SLAVES);

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "base/sync0.h"
 #include "fake.h"
 #include "wire/al.h"
 
@@ -188,6 +189,21 @@ void fake_make_record_status(struct fake *f)
 	record->bytes_free = UINT64_C(3) << 30;
 	status_text_set(&record->text_sequence, record->path, sizeof(record->path),
 			"/var/lib/ecdaq/a.mcap.part");
+}
+
+void fake_make_sync0_status(struct fake *f)
+{
+	struct sync0_status *page = status_create(fake_path(f, CONFIG_RUN_SYNC0_STATUS),
+						  SYNC0_STATUS_MAGIC, sizeof(*page), f->mode);
+
+	if (page == NULL) {
+		fake_die("sync0-status", errno);
+	}
+	page->pid = getpid();
+	page->beyond_count = (uint32_t)f->beyond;
+	page->beyond_pos = LIMIT_SYNC0_LINES;
+	snprintf(page->beyond_slave, sizeof(page->beyond_slave), "valve7");
+	status_unmap(page, sizeof(*page));
 }
 
 void fake_make_rings(struct fake *f)

@@ -27,7 +27,7 @@ record:
 """
 
 # Checks without a result while no ecdaqd runs.
-OF_A_RUNNING_ECDAQD = {"cycle_thread", "page_faults"}
+OF_RUNNING_PROGRAMS = {"cycle_thread", "page_faults", "sync0"}
 
 # A path that ends in a slash is a folder, one with -> a symbolic link, None takes a file away.
 Files = dict[str, "str | bytes | None"]

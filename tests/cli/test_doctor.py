@@ -16,7 +16,7 @@ from made_machine import (
     GOOD,
     KTHREAD,
     NET,
-    OF_A_RUNNING_ECDAQD,
+    OF_RUNNING_PROGRAMS,
     OTHER,
     Files,
     Machine,
@@ -34,9 +34,9 @@ from made_machine import (
 def test_a_good_machine_has_nothing_to_fix(machine: Machine) -> None:
     text = works(examine(machine, "--strict"))
     found = checks(machine)
-    assert {name for name, check in found.items() if check["level"] != "OK"} == OF_A_RUNNING_ECDAQD
+    assert {name for name, check in found.items() if check["level"] != "OK"} == OF_RUNNING_PROGRAMS
     assert "port ecat0, cycle core 3, priority 80" in text.splitlines()[0]
-    assert text.splitlines()[-1] == "31 checks: 29 ok, 0 warn, 0 fail, 2 skipped"
+    assert text.splitlines()[-1] == "32 checks: 29 ok, 0 warn, 0 fail, 3 skipped"
 
 
 def test_the_image_and_the_commit_that_it_was_built_from_are_shown(machine: Machine) -> None:
@@ -116,7 +116,7 @@ def test_a_bare_machine_skips_and_never_crashes(tmp_path: Path) -> None:
     result = ecdaq(None, "doctor", "--root", str(tmp_path), "--json")
     found = report(result)
     assert found["config"] == "defaults"
-    assert found["ok"] + found["warn"] + found["fail"] + found["skip"] == 31
+    assert found["ok"] + found["warn"] + found["fail"] + found["skip"] == 32
     assert found["fail"] == 0 and result.returncode == OK
 
 
@@ -159,7 +159,7 @@ def test_garbage_in_every_file_never_crashes(machine: Machine, garbage: str) -> 
         if not name.endswith("/") and not str(content).startswith("-> "):
             machine.change({name: garbage})
     found = report(examine(machine, "--json"))
-    assert len(found["check"]) == 31
+    assert len(found["check"]) == 32
 
 
 # --- with an ecdaqd ---
@@ -171,6 +171,9 @@ RUNNING: list[tuple[str, tuple[str, ...], dict[str, Any], str, str]] = [
     ("cycle_thread", (), {"cores": "0-3"}, "FAIL", "may run on 0-3 instead of core 3 alone"),
     ("page_faults", (), {}, "OK", "0 in"),
     ("page_faults", ("FAULTS=7",), {}, "FAIL", "7 in"),
+    ("sync0", (), {}, "SKIP", "ecdaq-sync0 is not running"),
+    ("sync0", ("BEYOND=0",), {}, "OK", "every slave with SYNC0"),
+    ("sync0", ("BEYOND=1",), {}, "WARN", "not checked: slave 64 (valve7): only 64 lines"),
     ("core_users", (), {}, "OK", "no other thread"),
     ("memory_lock", ("DEGRADED=0",), {}, "OK", "131072 KiB"),
     ("memory_lock", ("DEGRADED=4",), {}, "FAIL", "LimitMEMLOCK=infinity"),
@@ -262,7 +265,7 @@ def test_the_command_line_of_the_ecdaqd_that_runs_is_what_counts(
 def test_this_machine_is_examined_with_the_port_of_the_ecdaqd_that_runs(daemon: Fake) -> None:
     found = report(daemon("doctor", "--json"))
     assert found["running"] is True and found["interface"] == "ecat0"
-    assert len(found["check"]) == 31
+    assert len(found["check"]) == 32
     assert report(daemon("doctor", "--json", "--interface", "lo"))["interface"] == "lo"
 
 

@@ -10,7 +10,7 @@ from made_machine import (
     CPU,
     KTHREAD,
     NET,
-    OF_A_RUNNING_ECDAQD,
+    OF_RUNNING_PROGRAMS,
     Files,
     Machine,
     checks,
@@ -284,4 +284,4 @@ def test_what_is_wrong_is_named_with_its_remedy(
 def test_every_check_has_a_bad_machine(machine: Machine) -> None:
     # Check image tells a fact, which cannot be bad.
     found = set(checks(machine)) - {name for name, *_ in BAD} - {"image"}
-    assert found == OF_A_RUNNING_ECDAQD
+    assert found == OF_RUNNING_PROGRAMS

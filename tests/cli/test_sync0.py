@@ -9,7 +9,7 @@ import re
 import signal
 import subprocess
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ from ecdaq import (
     FAILED,
     NO_DAEMON,
     USAGE,
+    Fake,
     ecdaq,
     environment,
     fails,
@@ -132,6 +133,51 @@ def test_recorded_shots_are_checked_against_their_commands(tmp_path: Path) -> No
     assert check("--replay", str(file)).returncode == 0
 
 
+def dumped(cycles: int, shift: int, *line: str) -> Iterable[str]:
+    """A dump: SYNC0 of slave 0 in every cycle, that of slave 1 in every second one, shifted."""
+    yield from line
+    for cycle in range(cycles):
+        dc, at = 845 * 10**15 + cycle * PERIOD, START + cycle * PERIOD
+        yield f"0 {at} 0 {cycle + 1}"
+        if cycle % 2 == 0:
+            yield f"1 {at + shift} 0 {cycle // 2 + 1}"
+        yield f"c {cycle} {dc} {dc + 500_000} {at + 500_000} 10000 12 1"
+
+
+def test_recorded_cycle_shift_and_name_are_taken_and_not_those_of_the_position(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "dump"
+    line = "l 1 0 2000000 300000 drive"
+    file.write_text("\n".join(dumped(12000, 300_000, line)) + "\n")
+    settings = ("slaves[0].mode=periodic", "slaves[1].sync0_shift=-200us", "slaves[1].mode=oneshot")
+    other = [word for setting in settings for word in ("--set", setting)]
+    got = check("--replay", str(file), "--json", *other)
+    assert got.returncode == 0, got.stdout + got.stderr
+    assert [(m["slave"], m["edges"], m["missing"], m["extra"]) for m in windows(got.stdout)] == [
+        (0, 10000, 0, 0),
+        (1, 5000, 0, 0),
+    ]
+    (told,) = [m for m in map(json.loads, got.stdout.splitlines()) if m.get("sync0") == "line"]
+    assert told == {
+        "sync0": "line",
+        "slave": 1,
+        "name": "drive",
+        "cycle_ns": 2000000,
+        "shift_ns": 300000,
+    }
+    assert "slave 1 (drive): SYNC0 cycle 2000000 ns" in check("--replay", str(file)).stdout
+    file.write_text("\n".join(dumped(12000, 300_000)) + "\n")
+    assert check("--replay", str(file)).returncode == CHECK_FAILED  # every second one is missing
+
+
+def test_slaves_of_a_recording_beyond_the_lines_are_named(tmp_path: Path) -> None:
+    many = ((slave, START + cycle * PERIOD) for cycle in range(2000) for slave in range(66))
+    got = check("--replay", write(tmp_path / "e", many), "--set", "sync0.window=1s")
+    assert got.returncode == 0
+    assert "not checked: the edges of 2 slaves behind slave 63: only 64 lines" in got.stderr
+
+
 def test_an_empty_or_foreign_file_is_refused_in_one_line(tmp_path: Path) -> None:
     one_line(check("--replay", str(tmp_path / "none")), FAILED, "No such file")
     (tmp_path / "empty").write_text("# nothing\n")
@@ -210,6 +256,14 @@ def test_without_ecdaq_sync0_the_verb_reports_it(run_dir: Path) -> None:
     fails(ecdaq(run_dir, "sync0", "measure"), USAGE, "calibrate")
     fails(ecdaq(run_dir, "sync0", "--json", "--histogram"), USAGE, "exclude each other")
     fails(ecdaq(run_dir, "sync0", "calibrate", "--json"), USAGE, "not supported")
+
+
+def test_slaves_that_have_no_line_are_named(fake: Callable[..., Fake]) -> None:
+    run_dir = fake("BEYOND=3").run_dir
+    text = works(ecdaq(run_dir, "sync0"))
+    assert "not checked: slave 64 (valve7) and 2 more: only 64 lines" in text
+    assert json.loads(works(ecdaq(run_dir, "sync0", "--json")))["beyond"] == 3
+    assert "not checked" not in works(ecdaq(fake("BEYOND=0").run_dir, "sync0"))
 
 
 def test_a_calibration_needs_two_lines(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@
 #include <stdint.h>
 
 #include "base/status.h"
+#include "base/sync0.h"
 #include "cli/doctor/probe.h"
 #include "config/config.h"
 
@@ -54,13 +55,14 @@ struct thread {
 struct target {
 	struct probe probe;
 	const struct config *cfg;
-	int64_t pid;                    /* of an ecdaqd that runs; 0: none is seen */
-	const struct status_page *page; /* its page; NULL: none, or it cannot be read */
-	int page_err;                   /* why: 0 there is none, else -errno */
-	const char *nic;                /* "": none is configured */
-	int is_nic_elsewhere;           /* in a network namespace of ecdaqd's own */
-	int cpu;                        /* the cycle's core; -1: not pinned */
-	struct thread cycle;            /* the cycle's thread; tid 0: there is none */
+	int64_t pid;                      /* of an ecdaqd that runs; 0: none is seen */
+	const struct status_page *page;   /* its page; NULL: none, or it cannot be read */
+	int page_err;                     /* why: 0 there is none, else -errno */
+	const struct sync0_status *sync0; /* page of an ecdaq-sync0 that runs; NULL: none */
+	const char *nic;                  /* "": none is configured */
+	int is_nic_elsewhere;             /* in a network namespace of ecdaqd's own */
+	int cpu;                          /* the cycle's core; -1: not pinned */
+	struct thread cycle;              /* the cycle's thread; tid 0: there is none */
 };
 
 /** Does the kernel keep other work off @cpu, by its command line or by a cpuset partition? */

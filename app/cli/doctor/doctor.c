@@ -14,6 +14,7 @@
 #include "cli/doctor/thread.h"
 #include "cli/running.h"
 #include "cli/source.h"
+#include "cli/sync0_source.h"
 #include "cli/text.h"
 #include "program/json.h"
 
@@ -48,6 +49,11 @@ static enum exit_code find_daemon(struct doctor *d)
 		t->pid = resolve_find_daemon(&t->probe);
 		t->page_err = t->pid == 0 ? 0 : -ENOENT;
 		return EXIT_CODE_OK;
+	}
+	t->sync0 = sync0_source_try(d->cli);
+	if (t->sync0 != NULL && !running_is_alive(t->sync0->pid)) {
+		sync0_source_close(t->sync0);
+		t->sync0 = NULL;
 	}
 	r = source_try_status(d->cli, &page);
 	if (r < 0 && r != -ENOENT) {
@@ -267,6 +273,7 @@ static enum exit_code run(struct doctor *d)
 	if (d->target.page != NULL) {
 		source_status_close(d->target.page);
 	}
+	sync0_source_close(d->target.sync0);
 	return verdict(d);
 }
 

@@ -199,6 +199,19 @@ static void judge_power(const struct target *t, struct finding *f)
 	}
 }
 
+static void judge_sync0(const struct target *t, struct finding *f)
+{
+	char text[FINDING_TEXT_BYTES / 2];
+
+	if (t->sync0 == NULL) {
+		finding_set(f, FINDING_SKIP, "ecdaq-sync0 is not running");
+	} else if (sync0_beyond_format(t->sync0, text, sizeof(text)) > 0) {
+		finding_set(f, FINDING_WARN, "%s" REMEDY "check those with an oscilloscope", text);
+	} else {
+		finding_set(f, FINDING_OK, "every slave with SYNC0 has a line that is checked");
+	}
+}
+
 /* TAI - UTC is 37 s since 2017. Leap seconds are announced half a year ahead; it only grows. */
 const struct check checks_of_system[] = {
 	{ .name = "clocksource",
@@ -236,5 +249,6 @@ const struct check checks_of_system[] = {
 		     { .level = FINDING_FAIL,
 		       .text = "{dir}: {text} inodes free" INODES_REMEDY } } },
 	{ .name = "power", .judge = judge_power },
+	{ .name = "sync0", .judge = judge_sync0 },
 	{ .name = NULL },
 };

@@ -165,3 +165,20 @@ int sync0_result_format(const struct sync0_result *r, char *buf, size_t buf_len)
 	}
 	return (int)t.len;
 }
+
+int sync0_beyond_format(const struct sync0_status *page, char *buf, size_t buf_len)
+{
+	uint32_t count = atomic_load_explicit(&page->beyond_count, memory_order_relaxed);
+	char more[32] = "";
+
+	if (count == 0) {
+		buf[0] = '\0';
+		return 0;
+	}
+	if (count > 1) {
+		snprintf(more, sizeof(more), " and %" PRIu32 " more", count - 1);
+	}
+	return snprintf(buf, buf_len, "not checked: slave %" PRIu32 " (%.31s)%s: only %d lines",
+			atomic_load_explicit(&page->beyond_pos, memory_order_relaxed),
+			page->beyond_slave, more, LIMIT_SYNC0_LINES);
+}

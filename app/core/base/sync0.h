@@ -120,7 +120,9 @@ struct sync0_line_status {
 	uint32_t slave_pos;
 	uint32_t is_open;
 	uint32_t is_oneshot;
-	uint32_t is_hte; /* times are of the hardware timestamp engine */
+	uint32_t is_hte;   /* times are of the hardware timestamp engine */
+	uint32_t cycle_ns; /* of its SYNC0, as the master states it; 0: none */
+	int32_t shift_ns;
 	_Atomic uint64_t edges;
 	_Atomic uint64_t missing;
 	_Atomic uint64_t extra;
@@ -149,6 +151,10 @@ struct sync0_status {
 	_Atomic int64_t noise_p99_ns; /* of the calibration; -1: not calibrated */
 	_Atomic int64_t noise_sd_ns;
 	_Atomic int64_t window_ns;
+	/* Slaves with SYNC0 that have no line, as all LIMIT_SYNC0_LINES are taken; the first. */
+	_Atomic uint32_t beyond_count;
+	_Atomic uint32_t beyond_pos;
+	char beyond_slave[32];
 	struct sync0_line_status line[LIMIT_SYNC0_LINES];
 };
 
@@ -157,6 +163,9 @@ struct sync0_status {
  * Returns its length as snprintf does.
  */
 int sync0_result_format(const struct sync0_result *r, char *buf, size_t buf_len);
+
+/** The slaves without a line in one line of text; "" and 0: there are none. */
+int sync0_beyond_format(const struct sync0_status *page, char *buf, size_t buf_len);
 
 const char *sync0_source_to_str(uint32_t source);
 const char *sync0_verdict_to_str(uint32_t verdict);

@@ -65,6 +65,7 @@ int page_read_sync0(const char *path, struct sync0_status *ret_page)
 		return r;
 	}
 	TERMINATE(ret_page->message);
+	TERMINATE(ret_page->beyond_slave);
 	bound(&ret_page->line_count, LIMIT_SYNC0_LINES);
 	for (unsigned i = 0; i < LIMIT_SYNC0_LINES; i++) {
 		TERMINATE(ret_page->line[i].slave);

@@ -8,9 +8,12 @@
 #include "sync0/checker_internal.h"
 
 enum {
-	GRACE_CYCLES = 64, /* a window stays open so long: held edges, late samples */
+	GRACE_PULSES = 64, /* of the slowest line: a window stays open so long, for held edges and
+			    * late samples */
 	MASTER_BEHIND = 16,
-	WINDOW_CYCLES_MIN = 16,
+	WINDOW_PULSES_MIN = 16,
+	WINDOW_PULSES = 100, /* as config_check() has it for the period of the configuration */
+	LOST_PULSES_MIN = 3,
 	WINDOWS_AT_ONCE = 16,
 	FAR_WINDOWS = 4, /* behind the open ones */
 };
@@ -27,13 +30,80 @@ static int open_windows(const struct checker_spec *spec)
 	return n < OPEN_WINDOWS ? (int)n : OPEN_WINDOWS;
 }
 
+static int64_t cycle_ns_of(const struct checker_spec *spec, size_t line)
+{
+	return spec->line[line].cycle_ns > 0 ? spec->line[line].cycle_ns : spec->period_ns;
+}
+
+int checker_fit_window(struct checker_spec *spec)
+{
+	int64_t least_ns = WINDOW_PULSES * spec->period_ns;
+
+	for (size_t i = 0; i < spec->line_count; i++) {
+		int64_t line_ns = WINDOW_PULSES * cycle_ns_of(spec, i);
+
+		least_ns = line_ns > least_ns ? line_ns : least_ns;
+	}
+	if (spec->window_ns >= least_ns) {
+		return 0;
+	}
+	spec->window_ns = least_ns;
+	return 1;
+}
+
+static int is_valid(const struct checker_spec *spec)
+{
+	if (spec->line_count == 0 || spec->line_count > LIMIT_SYNC0_LINES || spec->period_ns <= 0 ||
+	    spec->window_ns / spec->period_ns < WINDOW_PULSES_MIN) {
+		return 0;
+	}
+	for (size_t i = 0; i < spec->line_count; i++) {
+		int64_t pulses = spec->window_ns / cycle_ns_of(spec, i);
+
+		if (pulses < WINDOW_PULSES_MIN || pulses > CHECKER_PULSES_MAX) {
+			return 0;
+		}
+	}
+	return 1;
+}
+
+/* Everything that depends on how many pulses of each line a window holds. */
+static int create_windows(struct checker *ck)
+{
+	uint32_t room[LIMIT_SYNC0_LINES];
+	uint32_t most = ck->window_cycles;
+	int r = 0;
+
+	for (size_t i = 0; i < ck->spec.line_count; i++) {
+		int64_t cycle_ns = cycle_ns_of(&ck->spec, i);
+
+		room[i] = (uint32_t)(ck->spec.window_ns / cycle_ns) + 1;
+		most = room[i] > most ? room[i] : most;
+	}
+	for (int i = 0; r == 0 && i < ck->open_windows; i++) {
+		r = window_create(ck->window_cycles, ck->spec.line_count, room, &ck->window[i]);
+	}
+	return r < 0 ? r : measure_scratch_create(most, &ck->scratch);
+}
+
+static void create_rows(struct checker *ck)
+{
+	ck->slow_cycles = 1;
+	for (size_t i = 0; i < ck->spec.line_count; i++) {
+		int64_t cycles = cycle_ns_of(&ck->spec, i) / ck->spec.period_ns;
+
+		ck->line[i].row.grid = ck->grid;
+		ck->line[i].row.period_ns = cycle_ns_of(&ck->spec, i);
+		ck->slow_cycles = cycles > ck->slow_cycles ? cycles : ck->slow_cycles;
+	}
+}
+
 int checker_create(const struct checker_spec *spec, struct checker **ret_checker)
 {
 	struct checker *ck;
 	int r;
 
-	if (spec->line_count == 0 || spec->line_count > LIMIT_SYNC0_LINES || spec->period_ns <= 0 ||
-	    spec->window_ns / spec->period_ns < WINDOW_CYCLES_MIN) {
+	if (!is_valid(spec)) {
 		return -EINVAL;
 	}
 	ck = calloc(1, sizeof(*ck));
@@ -44,10 +114,8 @@ int checker_create(const struct checker_spec *spec, struct checker **ret_checker
 	ck->window_cycles = (uint32_t)(spec->window_ns / spec->period_ns);
 	ck->open_windows = open_windows(spec);
 	ck->grid = grid_create(spec->period_ns);
-	r = ck->grid == NULL ? -ENOMEM : measure_scratch_create(ck->window_cycles, &ck->scratch);
-	for (int i = 0; r == 0 && i < ck->open_windows; i++) {
-		r = window_create(ck->window_cycles, spec->line_count, &ck->window[i]);
-	}
+	create_rows(ck);
+	r = ck->grid == NULL ? -ENOMEM : create_windows(ck);
 	if (r < 0) {
 		checker_destroy(ck);
 		return r;
@@ -91,7 +159,64 @@ struct event checker_event(const struct checker *ck, size_t line, enum event_id 
 	};
 }
 
+/* --- pulses --- */
+
+static int64_t div_floor(int64_t a, int64_t m)
+{
+	return (a - mod_floor(a, m)) / m;
+}
+
+int64_t checker_cycle_of(const struct checker *ck, size_t line, int64_t pulse)
+{
+	const struct line *ln = &ck->line[line];
+
+	return div_floor(ln->base_ns + pulse * ln->row.period_ns, ck->spec.period_ns);
+}
+
+int64_t checker_pulse_from(const struct checker *ck, size_t line, int64_t cycle)
+{
+	const struct line *ln = &ck->line[line];
+
+	return -div_floor(ln->base_ns - cycle * ck->spec.period_ns, ln->row.period_ns);
+}
+
+static void place_pulses(const struct checker *ck, struct window *w)
+{
+	for (size_t i = 0; i < w->line_count; i++) {
+		struct window_line *wl = &w->line[i];
+
+		wl->first = checker_pulse_from(ck, i, w->first_cycle);
+		wl->pulses = (uint32_t)(checker_pulse_from(ck, i, w->first_cycle + w->cycles) -
+					wl->first);
+	}
+}
+
+/* The master starts SYNC0 at multiples of the slave's own cycle in DC time. */
+void checker_set_origin(struct checker *ck, int64_t origin_dc_ns)
+{
+	int64_t grid_dc_ns = origin_dc_ns - mod_floor(origin_dc_ns, ck->spec.period_ns);
+
+	ck->has_origin = 1;
+	ck->origin_dc_ns = origin_dc_ns;
+	grid_set_origin(ck->grid, origin_dc_ns);
+	for (size_t i = 0; i < ck->spec.line_count; i++) {
+		struct line *ln = &ck->line[i];
+
+		ln->base_ns = mod_floor(-grid_dc_ns, ln->row.period_ns);
+		ln->row.origin_dc_ns = origin_dc_ns + ln->base_ns + ck->spec.line[i].shift_ns;
+	}
+	for (int i = 0; ck->has_base && i < ck->open_windows; i++) {
+		place_pulses(ck, ck->window[i]);
+	}
+}
+
 /* --- windows --- */
+
+void checker_open_window(const struct checker *ck, struct window *w, int64_t first_cycle)
+{
+	window_clear(w, first_cycle);
+	place_pulses(ck, w);
+}
 
 void checker_begin_at(struct checker *ck, int64_t cycle)
 {
@@ -99,7 +224,7 @@ void checker_begin_at(struct checker *ck, int64_t cycle)
 	ck->base = cycle;
 	ck->window_number = 0;
 	for (int i = 0; i < ck->open_windows; i++) {
-		window_clear(ck->window[i], cycle + (int64_t)i * ck->window_cycles);
+		checker_open_window(ck, ck->window[i], cycle + (int64_t)i * ck->window_cycles);
 	}
 }
 
@@ -130,12 +255,12 @@ static void disturb(struct checker *ck, int64_t cycle, int64_t step_ns)
 	for (size_t i = 0; i < ck->spec.line_count; i++) {
 		tracker_reset(&ck->line[i].track);
 		ck->line[i].has_last = 0;
-		ck->line[i].last_cycle = cycle;
+		ck->line[i].last_pulse = checker_pulse_from(ck, i, cycle);
 	}
 	for (int i = 0; ck->has_base && i < ck->open_windows; i++) {
 		struct window *w = ck->window[i];
 
-		if (w->first_cycle <= cycle + GRACE_CYCLES) {
+		if (w->first_cycle <= cycle + GRACE_PULSES * ck->slow_cycles) {
 			w->clock_step_ns = step_ns;
 		}
 	}
@@ -166,13 +291,12 @@ static void pair(struct checker *ck, const struct checker_cycle *cy)
 
 static void have_base(struct checker *ck, const struct checker_cycle *cy)
 {
-	int64_t late_ns;
 	int64_t first;
 
 	if (ck->has_base || !cy->is_judged || !grid_is_ready(ck->grid)) {
 		return;
 	}
-	first = grid_cycle(ck->grid, ck->spec.since_ns, 0, &late_ns) + 2;
+	first = grid_cycle(ck->grid, ck->spec.since_ns) + 2;
 	checker_begin_at(ck, first > cy->cycle + 1 ? first : cy->cycle + 1);
 }
 
@@ -185,9 +309,9 @@ static void have_origin(struct checker *ck, const struct checker_cycle *cy)
 	if (ck->has_origin && origin_dc_ns != ck->origin_dc_ns && grid_is_ready(ck->grid)) {
 		disturb(ck, cy->cycle, ck->origin_dc_ns - origin_dc_ns);
 	}
-	ck->has_origin = 1;
-	ck->origin_dc_ns = origin_dc_ns;
-	grid_set_origin(ck->grid, origin_dc_ns);
+	if (!ck->has_origin || origin_dc_ns != ck->origin_dc_ns) {
+		checker_set_origin(ck, origin_dc_ns);
+	}
 }
 
 void checker_cycle(struct checker *ck, const struct checker_cycle *cy)
@@ -219,20 +343,25 @@ void checker_cycle(struct checker *ck, const struct checker_cycle *cy)
 
 /* --- time --- */
 
-static void look_for_lost(struct checker *ck, size_t number, int64_t cycle)
+/* @mono_ns: all edges before it were given. */
+static void look_for_lost(struct checker *ck, size_t number, int64_t mono_ns)
 {
 	struct line *ln = &ck->line[number];
-	int64_t limit = ck->spec.lost_ns / ck->spec.period_ns;
-	int64_t last = ln->last_cycle >= ck->base ? ln->last_cycle : ck->base - 1;
+	int64_t limit = ck->spec.lost_ns / ln->row.period_ns;
+	int64_t first = checker_pulse_from(ck, number, ck->base);
+	int64_t last = ln->last_pulse >= first ? ln->last_pulse : first - 1;
+	int64_t late_ns;
+	int64_t pulse = grid_row_pulse(&ln->row, mono_ns, 0, &late_ns) - 1;
 	struct event ev;
 
+	limit = limit > LOST_PULSES_MIN ? limit : LOST_PULSES_MIN;
 	if (ln->is_lost) {
-		if (ln->back_count > 0 && cycle - last > limit) {
+		if (ln->back_count > 0 && pulse - last > limit) {
 			ln->back_count = 0; /* a few came, and none again */
 		}
 		return;
 	}
-	if (cycle - last <= limit) {
+	if (pulse - last <= limit) {
 		return;
 	}
 	ln->is_lost = 1;
@@ -240,15 +369,16 @@ static void look_for_lost(struct checker *ck, size_t number, int64_t cycle)
 	ln->lost_from = last + 1;
 	ln->lost_to = INT64_MAX;
 	ck->alarms++;
-	ev = checker_event(ck, number, EVENT_SYNC0_LOST, last + 1);
-	ev.arg[0] = alarm_clamp((double)(cycle - last));
+	ev = checker_event(ck, number, EVENT_SYNC0_LOST, checker_cycle_of(ck, number, last + 1));
+	ev.arg[0] = alarm_clamp((double)(pulse - last));
 	checker_emit(ck, &ev);
 }
 
 static int is_full(const struct checker *ck, int64_t mono_ns)
 {
 	int64_t end = checker_oldest(ck)->first_cycle + (int64_t)ck->window_cycles;
-	int64_t end_ns = grid_mono_ns(ck->grid, grid_due_dc_ns(ck->grid, end + GRACE_CYCLES));
+	int64_t end_ns = grid_mono_ns(
+		ck->grid, grid_due_dc_ns(ck->grid, end + GRACE_PULSES * ck->slow_cycles));
 
 	return mono_ns > end_ns + MASTER_GONE_NS ||
 	       (mono_ns > end_ns && ck->newest_cycle >= end + MASTER_BEHIND);
@@ -256,7 +386,6 @@ static int is_full(const struct checker *ck, int64_t mono_ns)
 
 void checker_advance(struct checker *ck, int64_t mono_ns)
 {
-	int64_t late_ns;
 	int64_t cycle;
 
 	if (!grid_is_ready(ck->grid) || !ck->has_origin) {
@@ -270,12 +399,12 @@ void checker_advance(struct checker *ck, int64_t mono_ns)
 	if (!ck->has_base) {
 		return;
 	}
-	cycle = grid_cycle(ck->grid, mono_ns, 0, &late_ns) - 1;
 	for (size_t i = 0; i < ck->spec.line_count; i++) {
 		if (ck->spec.line[i].mode == CHECKER_PERIODIC) {
-			look_for_lost(ck, i, cycle);
+			look_for_lost(ck, i, mono_ns);
 		}
 	}
+	cycle = grid_cycle(ck->grid, mono_ns) - 1;
 	/* Nobody listened for so long, or the clock says so: nothing is known of what lies between.
 	 */
 	if (cycle - checker_oldest(ck)->first_cycle >
@@ -288,13 +417,27 @@ void checker_advance(struct checker *ck, int64_t mono_ns)
 	}
 }
 
+/* By how much the last pulse of a cycle comes after its end, at most. */
+static int64_t latest_shift_ns(const struct checker *ck)
+{
+	int64_t latest_ns = 0;
+
+	for (size_t i = 0; i < ck->spec.line_count; i++) {
+		if (ck->spec.line[i].mode == CHECKER_PERIODIC &&
+		    ck->spec.line[i].shift_ns > latest_ns) {
+			latest_ns = ck->spec.line[i].shift_ns;
+		}
+	}
+	return latest_ns;
+}
+
 /* Nothing of the oldest window is still on its way. */
 static int is_whole(const struct checker *ck)
 {
 	int64_t end = checker_oldest(ck)->first_cycle + (int64_t)ck->window_cycles;
-	int64_t way = ck->spec.source == SYNC0_RECORDED ? 0 : FINISH_NS / ck->spec.period_ns;
+	int64_t way_ns = ck->spec.source == SYNC0_RECORDED ? 0 : FINISH_NS;
 
-	return ck->newest_cycle >= end + way;
+	return ck->newest_cycle >= end + (way_ns + latest_shift_ns(ck)) / ck->spec.period_ns;
 }
 
 void checker_finish(struct checker *ck)
@@ -311,7 +454,7 @@ void checker_finish(struct checker *ck)
 			checker_look_at_shots(ck, i, newest_ns - FINISH_NS);
 			continue;
 		}
-		tracker_finish(&ck->line[i].track, ck->grid, &out);
+		tracker_finish(&ck->line[i].track, &ck->line[i].row, &out);
 		checker_take(ck, i, &out);
 	}
 	for (int n = 0; n < ck->open_windows && is_whole(ck); n++) {

@@ -31,8 +31,12 @@ enum checker_mode {
 struct checker_line {
 	uint16_t slave_pos;
 	enum checker_mode mode;
-	int64_t shift_ns; /* of its SYNC0 against the grid */
+	int64_t cycle_ns; /* of its SYNC0: a multiple or a fraction of the period; 0: the period */
+	int64_t shift_ns; /* of its SYNC0 against the multiples of that */
 };
+
+/* Most pulses of one line in a window. */
+enum { CHECKER_PULSES_MAX = 1 << 20 };
 
 struct checker_spec {
 	int64_t period_ns;
@@ -56,7 +60,12 @@ struct checker_spec {
 
 struct checker;
 
-/** Everything is allocated here. 0, -EINVAL (no line, no period, a window of no cycle) or -ENOMEM.
+/** Make the window hold 100 pulses of the slowest line at least. 1 if it was shorter. */
+int checker_fit_window(struct checker_spec *spec);
+
+/**
+ * Everything is allocated here. 0, -ENOMEM or -EINVAL: no line, no period, or a window that holds
+ * too few or too many pulses of a line.
  */
 int checker_create(const struct checker_spec *spec, struct checker **ret_checker);
 void checker_destroy(struct checker *ck);

@@ -19,21 +19,22 @@ static int is_told(const struct line *ln, int64_t first, int64_t end)
 
 static void report_missing(struct checker *ck, const struct window *w, size_t number)
 {
-	const uint8_t *mark = w->line[number].mark;
+	const struct window_line *wl = &w->line[number];
 	int reported = 0;
 
-	for (uint32_t i = 0; i < w->cycles && reported < MISSING_REPORTED; i++) {
+	for (uint32_t i = 0; i < wl->pulses && reported < MISSING_REPORTED; i++) {
 		uint32_t end = i;
 		struct event ev;
 
-		while (end < w->cycles && mark[end] == WINDOW_UNSEEN) {
+		while (end < wl->pulses && wl->mark[end] == WINDOW_UNSEEN) {
 			end++;
 		}
 		if (end == i) {
 			continue;
 		}
-		if (!is_told(&ck->line[number], w->first_cycle + i, w->first_cycle + end)) {
-			ev = checker_event(ck, number, EVENT_SYNC0_MISSING, w->first_cycle + i);
+		if (!is_told(&ck->line[number], wl->first + i, wl->first + end)) {
+			ev = checker_event(ck, number, EVENT_SYNC0_MISSING,
+					   checker_cycle_of(ck, number, wl->first + i));
 			ev.arg[0] = (int32_t)(end - i);
 			checker_emit(ck, &ev);
 			reported++;
@@ -49,12 +50,14 @@ static void report_counts(struct checker *ck, const struct window *w, size_t num
 
 	report_missing(ck, w, number);
 	if (wl->extra > 0) {
-		ev = checker_event(ck, number, EVENT_SYNC0_EXTRA, wl->first_extra);
+		ev = checker_event(ck, number, EVENT_SYNC0_EXTRA,
+				   checker_cycle_of(ck, number, wl->first_extra));
 		ev.arg[0] = alarm_clamp((double)wl->extra);
 		checker_emit(ck, &ev);
 	}
 	if (wl->step_ns != 0) {
-		ev = checker_event(ck, number, EVENT_SYNC0_PHASE_STEP, wl->step_cycle);
+		ev = checker_event(ck, number, EVENT_SYNC0_PHASE_STEP,
+				   checker_cycle_of(ck, number, wl->step_pulse));
 		ev.arg[0] = alarm_clamp((double)wl->step_ns);
 		checker_emit(ck, &ev);
 	}
@@ -87,7 +90,7 @@ static int64_t common_step(const struct checker *ck, const struct window *w, int
 			return 0;
 		}
 		step_ns = wl->step_ns;
-		*ret_cycle = wl->step_cycle;
+		*ret_cycle = checker_cycle_of(ck, i, wl->step_pulse);
 		lines++;
 	}
 	return lines > 1 ? step_ns : 0;
@@ -131,6 +134,8 @@ static void close_line(struct checker *ck, const struct window *w, size_t number
 	const struct measure_spec spec = {
 		.period_ns = ck->spec.period_ns,
 		.origin_dc_ns = ck->origin_dc_ns,
+		.row = &ck->line[number].row,
+		.first_row = &ck->line[0].row,
 		.shift_ns = ck->spec.line[number].shift_ns,
 		.first_shift_ns = ck->spec.line[0].shift_ns,
 	};
@@ -161,7 +166,7 @@ void checker_close_window(struct checker *ck)
 	}
 	ck->windows++;
 	ck->window_number++;
-	window_clear(w, w->first_cycle + (int64_t)ck->open_windows * w->cycles);
+	checker_open_window(ck, w, w->first_cycle + (int64_t)ck->open_windows * w->cycles);
 }
 
 /* --- shots --- */
@@ -179,10 +184,9 @@ static void report_shot(struct checker *ck, size_t number, const struct shot_ver
 {
 	struct sync0_result r = begin_result(ck, number, v->mono_ns);
 	struct event ev;
-	int64_t late_ns;
 
 	r.kind = SYNC0_SHOT;
-	r.first_cycle = (uint64_t)grid_cycle(ck->grid, v->mono_ns, 0, &late_ns);
+	r.first_cycle = (uint64_t)grid_cycle(ck->grid, v->mono_ns);
 	r.cycles = 1;
 	r.has_come = v->outcome == SHOT_CAME;
 	r.edges = r.has_come;
@@ -204,9 +208,8 @@ static void report_shot(struct checker *ck, size_t number, const struct shot_ver
 
 static void report_extra_shot(struct checker *ck, size_t number, int64_t mono_ns)
 {
-	int64_t late_ns;
-	struct event ev = checker_event(ck, number, EVENT_SYNC0_EXTRA,
-					grid_cycle(ck->grid, mono_ns, 0, &late_ns));
+	struct event ev =
+		checker_event(ck, number, EVENT_SYNC0_EXTRA, grid_cycle(ck->grid, mono_ns));
 
 	ev.mono_ns = mono_ns;
 	ev.arg[0] = 1;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The way of an edge: its line's track gives it a cycle, the cycle's window takes it. */
+/* The way of an edge: its line's track gives it a pulse, the window of the pulse takes it. */
 #include "sync0/checker_internal.h"
 
 enum {
@@ -17,9 +17,8 @@ static void cycle_by_edge(struct checker *ck, const struct edge *edge)
 		return;
 	}
 	if (!ck->has_origin) {
-		ck->has_origin = 1;
-		ck->origin_dc_ns = self.dc_ns - self.cycle * ck->spec.period_ns;
-		grid_set_origin(ck->grid, ck->origin_dc_ns);
+		checker_set_origin(ck, self.dc_ns - self.cycle * ck->spec.period_ns -
+					       ck->spec.line[0].shift_ns);
 	}
 	if (grid_pair(ck->grid, self.dc_ns, edge->mono_ns, 0, &step_ns) == GRID_STEPPED) {
 		checker_clock_stepped(ck, self.cycle, step_ns);
@@ -30,7 +29,7 @@ static void cycle_by_edge(struct checker *ck, const struct edge *edge)
 	}
 }
 
-static void report_back(struct checker *ck, size_t number, int64_t cycle)
+static void report_back(struct checker *ck, size_t number, int64_t pulse)
 {
 	struct line *ln = &ck->line[number];
 	struct event ev;
@@ -39,79 +38,86 @@ static void report_back(struct checker *ck, size_t number, int64_t cycle)
 		return;
 	}
 	if (ln->back_count == 0) {
-		ln->lost_to = cycle;
+		ln->lost_to = pulse;
 	}
 	if (++ln->back_count < BACK_EDGES) {
 		return;
 	}
 	ln->is_lost = 0;
-	ev = checker_event(ck, number, EVENT_SYNC0_BACK, ln->lost_to);
+	ev = checker_event(ck, number, EVENT_SYNC0_BACK, checker_cycle_of(ck, number, ln->lost_to));
 	ev.arg[0] = alarm_clamp((double)(ln->lost_to - ln->lost_from));
 	checker_emit(ck, &ev);
 }
 
+/* The window of a pulse of the line; NULL if it is not judged. */
+static struct window *window_of(struct checker *ck, size_t number, int64_t pulse)
+{
+	return checker_window(ck, checker_cycle_of(ck, number, pulse));
+}
+
 /* What the kernel dropped lies just before the edge that it gave. */
-static void mark_overflow(struct checker *ck, size_t number, int64_t cycle)
+static void mark_overflow(struct checker *ck, size_t number, int64_t pulse)
 {
 	struct line *ln = &ck->line[number];
 
-	for (int64_t c = cycle - 1; ln->dropped > 0 && ln->has_last && c > ln->last_cycle; c--) {
-		struct window *w =
-			c >= checker_oldest(ck)->first_cycle ? checker_window(ck, c) : NULL;
+	for (int64_t p = pulse - 1; ln->dropped > 0 && ln->has_last && p > ln->last_pulse; p--) {
+		struct window *w = window_of(ck, number, p);
 
 		if (w == NULL) {
 			break;
 		}
-		w->line[number].mark[c - w->first_cycle] = WINDOW_OVERFLOWN;
+		w->line[number].mark[p - w->line[number].first] = WINDOW_OVERFLOWN;
 		ln->dropped--;
 	}
 	ln->dropped = 0;
 }
 
-static void take_cycle(struct checker *ck, size_t number, const struct tracker_item *item)
+static void take_pulse(struct checker *ck, size_t number, const struct tracker_item *item)
 {
 	struct line *ln = &ck->line[number];
-	struct window *w = checker_window(ck, item->cycle);
+	struct window *w = window_of(ck, number, item->pulse);
+	struct window_line *wl;
 
 	if (w == NULL) {
 		return;
 	}
-	mark_overflow(ck, number, item->cycle);
-	w->line[number].mark[item->cycle - w->first_cycle] = WINDOW_SEEN;
-	w->line[number].mono_ns[item->cycle - w->first_cycle] = item->mono_ns;
-	if (ln->has_last && item->cycle == ln->last_cycle + 1 && ck->spec.deviation != NULL) {
+	mark_overflow(ck, number, item->pulse);
+	wl = &w->line[number];
+	wl->mark[item->pulse - wl->first] = WINDOW_SEEN;
+	wl->mono_ns[item->pulse - wl->first] = item->mono_ns;
+	if (ln->has_last && item->pulse == ln->last_pulse + 1 && ck->spec.deviation != NULL) {
 		ck->spec.deviation(ck->spec.ctx, number,
-				   item->mono_ns - ln->last_mono_ns - ck->spec.period_ns);
+				   item->mono_ns - ln->last_mono_ns - ln->row.period_ns);
 	}
 	ln->has_last = 1;
-	ln->last_cycle = item->cycle;
+	ln->last_pulse = item->pulse;
 	ln->last_mono_ns = item->mono_ns;
-	report_back(ck, number, item->cycle);
+	report_back(ck, number, item->pulse);
 }
 
 static void take_item(struct checker *ck, size_t number, const struct tracker_item *item)
 {
 	struct window *w;
 
-	if (item->kind == TRACKER_CYCLE) {
-		take_cycle(ck, number, item);
+	if (item->kind == TRACKER_PULSE) {
+		take_pulse(ck, number, item);
 		return;
 	}
-	w = checker_window(ck, item->cycle);
+	w = window_of(ck, number, item->pulse);
 	if (w != NULL) {
 		if (w->line[number].extra++ == 0) {
-			w->line[number].first_extra = item->cycle;
+			w->line[number].first_extra = item->pulse;
 		}
 	}
 }
 
 static void note_step(struct checker *ck, size_t number, const struct tracker_out *out)
 {
-	struct window *w = out->step_ns != 0 ? checker_window(ck, out->step_cycle) : NULL;
+	struct window *w = out->step_ns != 0 ? window_of(ck, number, out->step_pulse) : NULL;
 
 	if (w != NULL) {
 		w->line[number].step_ns = out->step_ns;
-		w->line[number].step_cycle = out->step_cycle;
+		w->line[number].step_pulse = out->step_pulse;
 	}
 }
 
@@ -127,12 +133,11 @@ static void note_seqno(struct checker *ck, const struct edge *edge)
 {
 	struct line *ln = &ck->line[edge->line];
 	uint32_t gap = edge->seqno - ln->last_seqno - 1;
-	int64_t late_ns;
 	struct window *w;
 
 	if (edge->seqno != 0 && ln->last_seqno != 0 && gap != 0 && gap < UINT32_MAX / 2) {
 		ln->dropped += gap;
-		w = checker_window(ck, grid_cycle(ck->grid, edge->mono_ns, 0, &late_ns));
+		w = checker_window(ck, grid_cycle(ck->grid, edge->mono_ns));
 		if (w != NULL) {
 			w->line[edge->line].overflow += gap;
 		}
@@ -158,7 +163,7 @@ void checker_edge(struct checker *ck, const struct edge *edge)
 		return;
 	}
 	note_seqno(ck, edge);
-	tracker_edge(&ck->line[edge->line].track, ck->grid, edge, &out);
+	tracker_edge(&ck->line[edge->line].track, &ck->line[edge->line].row, edge, &out);
 	checker_take(ck, edge->line, &out);
 }
 

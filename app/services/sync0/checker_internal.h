@@ -15,16 +15,18 @@
 enum { OPEN_WINDOWS = 32 };
 
 struct line {
+	struct grid_row row; /* its pulses */
+	int64_t base_ns;     /* from cycle 0 to pulse 0, its shift left out */
 	struct tracker track;
 	struct alarm_line alarm;
 	struct shot_line shot;
 	uint32_t last_seqno;
 	uint64_t dropped;     /* by the kernel, before the next edge */
-	int has_last;         /* a cycle that is judged had its edge */
-	int64_t last_cycle;   /* the newest of them */
+	int has_last;         /* a pulse that is judged had its edge */
+	int64_t last_pulse;   /* the newest of them */
 	int64_t last_mono_ns; /* and its edge */
 	int is_lost;
-	int64_t lost_from; /* first cycle without an edge, and first with one again */
+	int64_t lost_from; /* first pulse without an edge, and first with one again */
 	int64_t lost_to;
 	int back_count;
 };
@@ -38,6 +40,7 @@ struct checker {
 	int open_windows;
 	int64_t window_number;
 	uint32_t window_cycles;
+	int64_t slow_cycles; /* that the slowest SYNC0 takes */
 	int has_base;
 	int64_t base; /* first cycle that is judged */
 	int has_origin;
@@ -55,12 +58,20 @@ static inline struct window *checker_oldest(const struct checker *ck)
 
 /** Judge from @cycle on. */
 void checker_begin_at(struct checker *ck, int64_t cycle);
+/** Cycle 0 was at DC time @origin_dc_ns. */
+void checker_set_origin(struct checker *ck, int64_t origin_dc_ns);
+/** Clear @w, which begins at @first_cycle from now on. */
+void checker_open_window(const struct checker *ck, struct window *w, int64_t first_cycle);
 /** The host's clock went ahead of DC time by @step_ns in about @cycle. */
 void checker_clock_stepped(struct checker *ck, int64_t cycle, int64_t step_ns);
 /** Take what has become clear of @line. */
 void checker_take(struct checker *ck, size_t number, const struct tracker_out *out);
 /** The open window that holds @cycle, closing older ones if it must; NULL if it is not judged. */
 struct window *checker_window(struct checker *ck, int64_t cycle);
+/** The cycle in which @pulse of the line belongs, its shift left out. */
+int64_t checker_cycle_of(const struct checker *ck, size_t line, int64_t pulse);
+/** The first pulse of the line in @cycle or after it. */
+int64_t checker_pulse_from(const struct checker *ck, size_t line, int64_t cycle);
 /** Measure, judge and report the oldest open window, and open the next. */
 void checker_close_window(struct checker *ck);
 void checker_emit(struct checker *ck, const struct event *ev);

@@ -3,6 +3,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -26,29 +27,28 @@ struct edge_file {
 	char buffer[BUFFER_BYTES];
 };
 
-/* Decimal numbers with blanks between, and nothing else. Their count, or -EINVAL. */
-static int parse_numbers(const char *text, int64_t value[FIELDS_MAX])
+/*
+ * At most @most decimal numbers with blanks between. Their count, or -EINVAL; *ret_rest is what
+ * follows them.
+ */
+static int parse_numbers(const char *text, int most, int64_t *value, const char **ret_rest)
 {
-	int n = 0;
-
-	for (;;) {
+	for (int n = 0;; n++) {
 		char *end;
 		long long v;
 
 		text += strspn(text, " \t\r\n");
-		if (*text == '\0') {
+		*ret_rest = text;
+		if (*text == '\0' || n == most) {
 			return n;
-		}
-		if (n == FIELDS_MAX || (*text != '-' && (*text < '0' || *text > '9'))) {
-			return -EINVAL;
 		}
 		errno = 0;
 		v = strtoll(text, &end, 10);
-		if (errno != 0 || end == text || v > TIME_LIMIT || v < -TIME_LIMIT ||
-		    strchr(" \t\r\n", *end) == NULL) {
+		if ((*text != '-' && (*text < '0' || *text > '9')) || errno != 0 || end == text ||
+		    v > TIME_LIMIT || v < -TIME_LIMIT || strchr(" \t\r\n", *end) == NULL) {
 			return -EINVAL;
 		}
-		value[n++] = v;
+		value[n] = v;
 		text = end;
 	}
 }
@@ -95,9 +95,38 @@ static int parse_shot(const int64_t *v, int count, struct edge_item *ret)
 	return 0;
 }
 
+static int parse_line(const int64_t *v, int count, const char *name, struct edge_item *ret)
+{
+	size_t len = strcspn(name, "\r\n");
+
+	if (count != 4 || v[0] < 0 || v[0] >= LIMIT_SLAVES || v[1] < 0 || v[1] > CHECKER_OFF ||
+	    v[2] < 0 || v[2] > UINT32_MAX || v[3] < -INT32_MAX || v[3] > INT32_MAX || len == 0 ||
+	    len >= sizeof(ret->name)) {
+		return -EINVAL;
+	}
+	*ret = (struct edge_item){ .kind = EDGE_ITEM_LINE,
+				   .line = { .slave_pos = (uint16_t)v[0],
+					     .mode = (enum checker_mode)v[1],
+					     .cycle_ns = v[2],
+					     .shift_ns = v[3] } };
+	memcpy(ret->name, name, len);
+	return 0;
+}
+
+void edge_file_write_line(FILE *out, const struct checker_line *line, const char *name)
+{
+	fprintf(out, "l %u %d %" PRId64 " %" PRId64 " ", line->slave_pos, (int)line->mode,
+		line->cycle_ns, line->shift_ns);
+	for (int i = 0; i < 31 && (name[i] != '\0' || i == 0); i++) {
+		fputc(name[i] > ' ' && name[i] <= '~' ? name[i] : '?', out);
+	}
+	fputc('\n', out);
+}
+
 int edge_line_parse(const char *line, struct edge_item *ret)
 {
 	int64_t value[FIELDS_MAX];
+	const char *rest;
 	char first;
 	int count;
 
@@ -107,12 +136,16 @@ int edge_line_parse(const char *line, struct edge_item *ret)
 		return 0;
 	}
 	first = *line;
-	count = parse_numbers(line + (first == 'c' || first == 's'), value);
-	if (count < 0) {
-		return count;
+	if (first == 'c' || first == 's' || first == 'l') {
+		line++;
+	}
+	count = parse_numbers(line, first == 'l' ? 4 : FIELDS_MAX, value, &rest);
+	if (count < 0 || (first != 'l' && *rest != '\0')) {
+		return -EINVAL;
 	}
 	return first == 'c'   ? parse_cycle(value, count, ret)
 	       : first == 's' ? parse_shot(value, count, ret)
+	       : first == 'l' ? parse_line(value, count, rest, ret)
 			      : parse_edge(value, count, ret);
 }
 

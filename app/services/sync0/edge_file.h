@@ -6,6 +6,7 @@
  *   c CYCLE DUE_DC_NS FRAME_DC_NS FRAME_MONO_NS LATENCY_NS DC_DIFF_NS JUDGED
  *                                    the master's data of a cycle (--dump)
  *   s SLAVE AT_DC_NS DUE_DC_NS       the time of its one-shot was set (--dump); checker_shot()
+ *   l SLAVE MODE CYCLE_NS SHIFT_NS NAME  what the master states of the slave (--dump)
  *   # comment
  *
  * Nothing in it is trusted. Context: blocking.
@@ -14,11 +15,18 @@
 #define SYNC0_EDGE_FILE_H
 
 #include <stdint.h>
+#include <stdio.h>
 
 #include "sync0/checker.h"
 #include "sync0/edge.h"
 
-enum edge_item_kind { EDGE_ITEM_NONE, EDGE_ITEM_EDGE, EDGE_ITEM_CYCLE, EDGE_ITEM_SHOT };
+enum edge_item_kind {
+	EDGE_ITEM_NONE,
+	EDGE_ITEM_EDGE,
+	EDGE_ITEM_CYCLE,
+	EDGE_ITEM_SHOT,
+	EDGE_ITEM_LINE
+};
 
 struct edge_shot {
 	uint16_t slave_pos;
@@ -31,10 +39,15 @@ struct edge_item {
 	struct edge edge; /* its line is the slave's position */
 	struct checker_cycle cycle;
 	struct edge_shot shot;
+	struct checker_line line;
+	char name[32]; /* of its slave */
 };
 
 /** Take a line apart. 0, or -EINVAL (ret untouched). */
 int edge_line_parse(const char *line, struct edge_item *ret);
+
+/** Write what edge_line_parse() takes as EDGE_ITEM_LINE. */
+void edge_file_write_line(FILE *out, const struct checker_line *line, const char *name);
 
 struct edge_file;
 

@@ -139,16 +139,20 @@ static int64_t dc_ns_at(const struct grid *grid, int64_t mono_ns)
 	       (int64_t)((double)since * (double)s.rate_ppb / (1e9 + (double)s.rate_ppb));
 }
 
-int64_t grid_cycle(const struct grid *grid, int64_t mono_ns, int64_t shift_ns, int64_t *ret_late_ns)
+int64_t grid_row_pulse(const struct grid_row *row, int64_t mono_ns, int64_t shift_ns,
+		       int64_t *ret_late_ns)
 {
-	int64_t since = dc_ns_at(grid, mono_ns) - grid->origin_dc_ns;
-	int64_t folded = fold_ns(since - shift_ns, grid->period_ns);
+	int64_t since = dc_ns_at(row->grid, mono_ns) - row->origin_dc_ns;
+	int64_t folded = fold_ns(since - shift_ns, row->period_ns);
 
 	*ret_late_ns = folded + shift_ns;
-	return (since - shift_ns - folded) / grid->period_ns;
+	return (since - shift_ns - folded) / row->period_ns;
 }
 
-int64_t grid_period_ns(const struct grid *grid)
+int64_t grid_cycle(const struct grid *grid, int64_t mono_ns)
 {
-	return grid->period_ns;
+	const struct grid_row cycles = { grid, grid->period_ns, grid->origin_dc_ns };
+	int64_t late_ns;
+
+	return grid_row_pulse(&cycles, mono_ns, 0, &late_ns);
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The grid of cycles on the host's clock: base/timemap.h, fed with CLOCK_MONOTONIC beside DC time,
- * says when the SYNC0 edge of a cycle is due and which cycle an instant belongs to. A clock that
+ * says when a SYNC0 edge is due and which cycle or pulse an instant belongs to. A clock that
  * stepped (the host's or the reference's) restarts the map and is reported. Context: blocking.
  */
 #ifndef SYNC0_GRID_H
@@ -36,14 +36,23 @@ int64_t grid_mono_ns(const struct grid *grid, int64_t dc_ns);
 /** What grid_mono_ns() may be off by. */
 int64_t grid_uncertainty_ns(const struct grid *grid);
 
-/** DC time at which the SYNC0 of @cycle is due. */
+/** DC time at which @cycle begins. */
 int64_t grid_due_dc_ns(const struct grid *grid, int64_t cycle);
+/** The cycle whose beginning is nearest to @mono_ns. */
+int64_t grid_cycle(const struct grid *grid, int64_t mono_ns);
+
+/* The pulses of one line: number p is due at DC time origin_dc_ns + p * period_ns. */
+struct grid_row {
+	const struct grid *grid;
+	int64_t period_ns;
+	int64_t origin_dc_ns;
+};
+
 /**
- * The cycle whose due time, shifted by @shift_ns, is nearest to @mono_ns; *ret_late_ns is how far
+ * The pulse whose due time, shifted by @shift_ns, is nearest to @mono_ns; *ret_late_ns is how far
  * @mono_ns is behind the due time itself.
  */
-int64_t grid_cycle(const struct grid *grid, int64_t mono_ns, int64_t shift_ns,
-		   int64_t *ret_late_ns);
-int64_t grid_period_ns(const struct grid *grid);
+int64_t grid_row_pulse(const struct grid_row *row, int64_t mono_ns, int64_t shift_ns,
+		       int64_t *ret_late_ns);
 
 #endif

@@ -55,6 +55,27 @@ void print_result_json(const struct sync0_result *r, FILE *out)
 	json_end_line(&js);
 }
 
+void print_line(const struct edge_item *item, FILE *out)
+{
+	fprintf(out, "slave %u (%s): SYNC0 cycle %" PRId64 " ns, shift %" PRId64 " ns\n",
+		item->line.slave_pos, item->name, item->line.cycle_ns, item->line.shift_ns);
+}
+
+void print_line_json(const struct edge_item *item, FILE *out)
+{
+	struct json js;
+
+	json_init(&js, out);
+	json_object_begin(&js, NULL);
+	json_text(&js, "sync0", "line");
+	json_u64(&js, "slave", item->line.slave_pos);
+	json_text(&js, "name", item->name);
+	json_i64(&js, "cycle_ns", item->line.cycle_ns);
+	json_i64(&js, "shift_ns", item->line.shift_ns);
+	json_object_end(&js);
+	json_end_line(&js);
+}
+
 void print_event(const struct event *ev, FILE *out)
 {
 	char text[256];

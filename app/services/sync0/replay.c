@@ -18,6 +18,7 @@ enum { WHY_BYTES = 512, ADVANCE_EDGES = 64 };
 struct contents {
 	uint64_t edges[LIMIT_SLAVES];
 	uint64_t shots[LIMIT_SLAVES];
+	struct edge_item line[LIMIT_SLAVES]; /* EDGE_ITEM_NONE: not recorded */
 	uint64_t cycles;
 	int64_t first_ns;
 	int64_t cycle_first; /* with its due time, and the last one: they give the period */
@@ -30,6 +31,7 @@ struct replay_run {
 	const struct replay_spec *spec;
 	struct checker *checker;
 	uint64_t line_of_slave[LIMIT_SLAVES]; /* plus one */
+	unsigned beyond;                      /* slaves that have no line */
 	uint64_t windows;
 	uint64_t bad;
 };
@@ -94,6 +96,8 @@ static void look(void *ctx, const struct edge_item *item)
 		c->first_ns = c->first_ns == 0 ? item->edge.mono_ns : c->first_ns;
 	} else if (item->kind == EDGE_ITEM_SHOT) {
 		c->shots[item->shot.slave_pos]++;
+	} else if (item->kind == EDGE_ITEM_LINE) {
+		c->line[item->line.slave_pos] = *item;
 	} else if (c->cycles++ == 0) {
 		c->cycle_first = item->cycle.cycle;
 		c->cycle_first_dc_ns = item->cycle.due_dc_ns;
@@ -108,6 +112,9 @@ static void feed(void *ctx, const struct edge_item *item)
 	struct replay_run *run = ctx;
 	struct edge edge = item->edge;
 
+	if (item->kind == EDGE_ITEM_LINE) {
+		return;
+	}
 	if (item->kind == EDGE_ITEM_CYCLE) {
 		checker_cycle(run->checker, &item->cycle);
 		return;
@@ -134,22 +141,47 @@ static int has_config_period(const struct contents *c, int64_t *ret_period_ns)
 	return 1;
 }
 
-static void fill_lines(struct replay_run *run, const struct contents *c, struct checker_spec *spec)
+/* As recorded; else that of the configuration's slave at the same position. */
+static struct checker_line line_of(const struct replay_run *run, const struct contents *c,
+				   uint16_t pos)
 {
 	const struct config *cfg = run->spec->cfg;
+	int is_oneshot = c->shots[pos] > 0 || config_is_oneshot(cfg, pos);
 
+	if (c->line[pos].kind == EDGE_ITEM_LINE) {
+		return c->line[pos].line;
+	}
+	return (struct checker_line){
+		.slave_pos = pos,
+		.mode = is_oneshot ? CHECKER_ONESHOT : CHECKER_PERIODIC,
+		.shift_ns = cfg->slave[pos].sync0_shift_ns,
+	};
+}
+
+static void fill_lines(struct replay_run *run, const struct contents *c, struct checker_spec *spec)
+{
 	for (uint16_t pos = 0; pos < LIMIT_SLAVES; pos++) {
-		int is_oneshot = c->shots[pos] > 0 || config_is_oneshot(cfg, pos);
-
-		if (c->edges[pos] + c->shots[pos] == 0 || spec->line_count == LIMIT_SYNC0_LINES) {
+		if (c->edges[pos] + c->shots[pos] == 0) {
+			continue;
+		}
+		if (spec->line_count == LIMIT_SYNC0_LINES) {
+			run->beyond++;
 			continue;
 		}
 		run->line_of_slave[pos] = spec->line_count + 1;
-		spec->line[spec->line_count++] = (struct checker_line){
-			.slave_pos = pos,
-			.mode = is_oneshot ? CHECKER_ONESHOT : CHECKER_PERIODIC,
-			.shift_ns = cfg->slave[pos].sync0_shift_ns,
-		};
+		spec->line[spec->line_count++] = line_of(run, c, pos);
+		if (c->line[pos].kind == EDGE_ITEM_LINE && run->spec->form == REPLAY_JSON) {
+			print_line_json(&c->line[pos], run->spec->out);
+		} else if (c->line[pos].kind == EDGE_ITEM_LINE) {
+			print_line(&c->line[pos], run->spec->out);
+		}
+	}
+	if (run->beyond > 0) {
+		fprintf(stderr,
+			"ecdaq-sync0: %s: not checked: the edges of %u slaves behind slave %u: "
+			"only %d lines\n",
+			run->spec->path, run->beyond, spec->line[LIMIT_SYNC0_LINES - 1].slave_pos,
+			LIMIT_SYNC0_LINES);
 	}
 }
 
@@ -179,6 +211,7 @@ static struct checker_spec spec_of(struct replay_run *run, const struct contents
 		spec.noise = calibration.noise;
 	}
 	fill_lines(run, c, &spec);
+	(void)checker_fit_window(&spec);
 	return spec;
 }
 
@@ -199,7 +232,9 @@ int replay(const struct replay_spec *spec, enum replay_outcome *ret_outcome, cha
 	}
 	r = checker_create(&checker, &run.checker);
 	if (r < 0) {
-		snprintf(why, WHY_BYTES, "%s", strerror(-r));
+		snprintf(why, WHY_BYTES, "%.200s: %s", spec->path,
+			 r == -EINVAL ? "a SYNC0 cycle is too short for sync0.window"
+				      : strerror(-r));
 		return r;
 	}
 	r = each(spec->path, feed, &run, why);

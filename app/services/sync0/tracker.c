@@ -18,32 +18,33 @@ void tracker_reset(struct tracker *track)
 	*track = (struct tracker){ .is_locked = 0 };
 }
 
-static void emit(struct tracker_out *out, enum tracker_kind kind, int64_t cycle, int64_t mono_ns)
+static void emit(struct tracker_out *out, enum tracker_kind kind, int64_t pulse, int64_t mono_ns)
 {
 	out->item[out->count++] =
-		(struct tracker_item){ .kind = kind, .cycle = cycle, .mono_ns = mono_ns };
+		(struct tracker_item){ .kind = kind, .pulse = pulse, .mono_ns = mono_ns };
 }
 
-static void emit_extra(const struct tracker *track, const struct grid *grid,
+static void emit_extra(const struct tracker *track, const struct grid_row *row,
 		       const struct edge *edge, struct tracker_out *out)
 {
 	int64_t late_ns;
 
 	emit(out, TRACKER_EXTRA,
-	     grid_cycle(grid, edge->mono_ns, (int64_t)track->phase_ns, &late_ns), edge->mono_ns);
+	     grid_row_pulse(row, edge->mono_ns, (int64_t)track->phase_ns, &late_ns), edge->mono_ns);
 }
 
-static void held_are_extra(struct tracker *track, const struct grid *grid, struct tracker_out *out)
+static void held_are_extra(struct tracker *track, const struct grid_row *row,
+			   struct tracker_out *out)
 {
 	for (int i = 0; i < track->held_count; i++) {
-		emit_extra(track, grid, &track->held[i], out);
+		emit_extra(track, row, &track->held[i], out);
 	}
 	track->held_count = 0;
 }
 
-static void drop_oldest(struct tracker *track, const struct grid *grid, struct tracker_out *out)
+static void drop_oldest(struct tracker *track, const struct grid_row *row, struct tracker_out *out)
 {
-	emit_extra(track, grid, &track->held[0], out);
+	emit_extra(track, row, &track->held[0], out);
 	track->held_count--;
 	for (int i = 0; i < track->held_count; i++) {
 		track->held[i] = track->held[i + 1];
@@ -51,7 +52,7 @@ static void drop_oldest(struct tracker *track, const struct grid *grid, struct t
 	}
 }
 
-/* Are the held edges a cycle apart, at one place of it? Then that place is *ret_phase_ns. */
+/* Are the held edges a period apart, at one phase? Then that place is *ret_phase_ns. */
 static int held_are_alike(const struct tracker *track, int64_t period_ns, int64_t *ret_phase_ns)
 {
 	int64_t off[TRACKER_HELD];
@@ -67,22 +68,22 @@ static int held_are_alike(const struct tracker *track, int64_t period_ns, int64_
 	return off[TRACKER_HELD - 1] - off[0] < period_ns / ALIKE_SHARE;
 }
 
-static void take(struct tracker *track, int64_t cycle, int64_t mono_ns, struct tracker_out *out)
+static void take(struct tracker *track, int64_t pulse, int64_t mono_ns, struct tracker_out *out)
 {
-	if (track->has_last && cycle <= track->last_cycle) {
-		emit(out, TRACKER_EXTRA, cycle, mono_ns);
+	if (track->has_last && pulse <= track->last_pulse) {
+		emit(out, TRACKER_EXTRA, pulse, mono_ns);
 		return;
 	}
-	emit(out, TRACKER_CYCLE, cycle, mono_ns);
+	emit(out, TRACKER_PULSE, pulse, mono_ns);
 	track->has_last = 1;
-	track->last_cycle = cycle;
+	track->last_pulse = pulse;
 	track->last_mono_ns = mono_ns;
 }
 
-static void lock_to(struct tracker *track, const struct grid *grid, int64_t phase_ns,
+static void lock_to(struct tracker *track, const struct grid_row *row, int64_t phase_ns,
 		    struct tracker_out *out)
 {
-	int64_t period_ns = grid_period_ns(grid);
+	int64_t period_ns = row->period_ns;
 
 	phase_ns = fold_ns(phase_ns, period_ns);
 	if (track->is_locked) {
@@ -94,14 +95,14 @@ static void lock_to(struct tracker *track, const struct grid *grid, int64_t phas
 	for (int i = 0; i < track->held_count; i++) {
 		int64_t late_ns;
 
-		take(track, grid_cycle(grid, track->held[i].mono_ns, phase_ns, &late_ns),
+		take(track, grid_row_pulse(row, track->held[i].mono_ns, phase_ns, &late_ns),
 		     track->held[i].mono_ns, out);
 	}
-	out->step_cycle = out->item[out->count - track->held_count].cycle;
+	out->step_pulse = out->item[out->count - track->held_count].pulse;
 	track->held_count = 0;
 }
 
-static void hold(struct tracker *track, const struct grid *grid, const struct edge *edge,
+static void hold(struct tracker *track, const struct grid_row *row, const struct edge *edge,
 		 int64_t late_ns, struct tracker_out *out)
 {
 	int64_t phase_ns;
@@ -111,10 +112,10 @@ static void hold(struct tracker *track, const struct grid *grid, const struct ed
 	if (track->held_count < TRACKER_HELD) {
 		return;
 	}
-	if (held_are_alike(track, grid_period_ns(grid), &phase_ns)) {
-		lock_to(track, grid, phase_ns, out);
+	if (held_are_alike(track, row->period_ns, &phase_ns)) {
+		lock_to(track, row, phase_ns, out);
 	} else {
-		drop_oldest(track, grid, out);
+		drop_oldest(track, row, out);
 	}
 }
 
@@ -157,13 +158,13 @@ static void follow(struct tracker *track, double off_ns, double jump_ns, int64_t
 	}
 	if (run_is_step(track, &middle_ns)) {
 		out->step_ns = (int64_t)track->run_jump_ns;
-		out->step_cycle = track->last_cycle - TRACKER_HELD + 1;
+		out->step_pulse = track->last_pulse - TRACKER_HELD + 1;
 	}
 	track->phase_ns += middle_ns;
 	track->run_count = 0;
 }
 
-/* A phase that has wandered past half a period belongs to the neighbouring cycle. */
+/* A phase that has wandered past half a period belongs to the next pulse. */
 static void keep_near(struct tracker *track, int64_t period_ns)
 {
 	double limit_ns = (double)period_ns * 5 / 8;
@@ -175,39 +176,39 @@ static void keep_near(struct tracker *track, int64_t period_ns)
 	}
 }
 
-void tracker_edge(struct tracker *track, const struct grid *grid, const struct edge *edge,
+void tracker_edge(struct tracker *track, const struct grid_row *row, const struct edge *edge,
 		  struct tracker_out *ret_out)
 {
-	int64_t period_ns = grid_period_ns(grid);
+	int64_t period_ns = row->period_ns;
 	int64_t late_ns;
-	int64_t cycle;
+	int64_t pulse;
 	double off_ns;
 	double jump_ns;
 
 	keep_near(track, period_ns);
-	cycle = grid_cycle(grid, edge->mono_ns, (int64_t)track->phase_ns, &late_ns);
+	pulse = grid_row_pulse(row, edge->mono_ns, (int64_t)track->phase_ns, &late_ns);
 	off_ns = (double)late_ns - track->phase_ns;
 	ret_out->count = 0;
 	ret_out->step_ns = 0;
 	if (!track->is_locked || fabs(off_ns) > (double)period_ns / ASTRAY_SHARE) {
-		hold(track, grid, edge, late_ns, ret_out);
+		hold(track, row, edge, late_ns, ret_out);
 		return;
 	}
-	held_are_extra(track, grid, ret_out);
+	held_are_extra(track, row, ret_out);
 	jump_ns = track->has_last ? (double)(edge->mono_ns - track->last_mono_ns -
-					     (cycle - track->last_cycle) * period_ns)
+					     (pulse - track->last_pulse) * period_ns)
 				  : 0;
-	if (track->has_last && cycle <= track->last_cycle) {
-		emit(ret_out, TRACKER_EXTRA, cycle, edge->mono_ns);
+	if (track->has_last && pulse <= track->last_pulse) {
+		emit(ret_out, TRACKER_EXTRA, pulse, edge->mono_ns);
 		return;
 	}
-	take(track, cycle, edge->mono_ns, ret_out);
+	take(track, pulse, edge->mono_ns, ret_out);
 	follow(track, off_ns, jump_ns, period_ns, ret_out);
 }
 
-void tracker_finish(struct tracker *track, const struct grid *grid, struct tracker_out *ret_out)
+void tracker_finish(struct tracker *track, const struct grid_row *row, struct tracker_out *ret_out)
 {
 	ret_out->count = 0;
 	ret_out->step_ns = 0;
-	held_are_extra(track, grid, ret_out);
+	held_are_extra(track, row, ret_out);
 }

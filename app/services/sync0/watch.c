@@ -92,6 +92,8 @@ void watch_name_lines(struct watch *w)
 		ls->is_open = (uint32_t)(w->lines == NULL ? w->edges != NULL
 							  : gpio_lines_is_open(w->lines, i));
 		ls->is_oneshot = (uint32_t)config_is_oneshot(w->spec.cfg, line->item);
+		ls->cycle_ns = (uint32_t)line->cycle_ns;
+		ls->shift_ns = (int32_t)line->shift_ns;
 		snprintf(ls->line, sizeof(ls->line), "%.95s", line_text(w, i));
 		snprintf(ls->slave, sizeof(ls->slave), "%.31s", name);
 	}

@@ -15,7 +15,8 @@
 struct watch_line {
 	uint16_t item;      /* of slaves[], from 0; WATCH_NO_ITEM: it is not configured */
 	uint16_t slave_pos; /* EVENT_NO_SLAVE: it is absent. Before a session: as configured */
-	int64_t shift_ns;   /* of its SYNC0, as the master states it */
+	int64_t cycle_ns;   /* of its SYNC0, as the master states it; 0: none */
+	int64_t shift_ns;
 };
 
 #define WATCH_NO_ITEM UINT16_C(0xffff)

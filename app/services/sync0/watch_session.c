@@ -11,9 +11,6 @@
 /* A margin after the start, when edges are certainly received. */
 #define SETTLE_NS (NS_PER_S / 10)
 
-/* As config_check() has them for the period of the configuration. */
-enum { WINDOW_CYCLES_MIN = 100, LOST_CYCLES_MIN = 3 };
-
 /* --- what comes out of the checker --- */
 
 static void on_result(void *ctx, const struct sync0_result *r)
@@ -43,14 +40,30 @@ static void on_deviation(void *ctx, size_t line, int64_t ns)
 	histogram_add(&output_page(w->out)->line[line].deviation, ns);
 }
 
+/* A slave that a line would be needed for. */
+static void note_beyond(struct watch *w, const struct slave_info *slave)
+{
+	struct sync0_status *page = output_page(w->out);
+
+	if (atomic_fetch_add_explicit(&page->beyond_count, 1, memory_order_relaxed) == 0) {
+		atomic_store_explicit(&page->beyond_pos, slave->slave_pos, memory_order_relaxed);
+		snprintf(page->beyond_slave, sizeof(page->beyond_slave), "%s", slave->name);
+	}
+}
+
 /* The line of a slave of this session; NULL: it has none. */
 static struct watch_line *line_of(struct watch *w, const struct slave_info *slave)
 {
 	uint16_t item = slave->config_item > 0 ? slave->config_item - 1 : WATCH_NO_ITEM;
 
 	if (w->lines == NULL) {
-		/* A simulation has an edge of every slave with DC: each is a line. */
-		if (!slave->has_dc || w->line_count == LIMIT_SYNC0_LINES) {
+		/* A simulation has the edges of every slave with SYNC0: each is a line. */
+		if (slave->sync0_cycle_ns == 0 &&
+		    !(slave->has_dc && config_is_oneshot(w->spec.cfg, item))) {
+			return NULL;
+		}
+		if (w->line_count == LIMIT_SYNC0_LINES) {
+			note_beyond(w, slave);
 			return NULL;
 		}
 		w->line[w->line_count].item = item;
@@ -64,18 +77,38 @@ static struct watch_line *line_of(struct watch *w, const struct slave_info *slav
 	return NULL;
 }
 
-static void report_absent(struct watch *w)
+/* Why a line is not checked; NULL: it is. */
+static const char *why_unchecked(const struct watch *w, const struct watch_line *line)
+{
+	if (line->slave_pos == EVENT_NO_SLAVE) {
+		return "its slave is absent";
+	}
+	if (config_is_oneshot(w->spec.cfg, line->item)) {
+		return NULL;
+	}
+	if (line->cycle_ns == 0) {
+		return "the master starts no SYNC0 in its slave";
+	}
+	return w->spec.cfg->sync0_window_ns / line->cycle_ns > CHECKER_PULSES_MAX
+		       ? "the SYNC0 cycle of its slave is too short"
+		       : NULL;
+}
+
+static void report_unchecked(struct watch *w)
 {
 	char text[WATCH_WHY_BYTES];
+	const char *why = NULL;
 
-	for (size_t i = 0; i < w->line_count; i++) {
-		if (w->line[i].slave_pos == EVENT_NO_SLAVE) {
-			snprintf(text, sizeof(text),
-				 "line '%.95s' is not checked: slaves[%u] is absent",
-				 output_page(w->out)->line[i].line, w->line[i].item);
+	for (size_t i = 0; why == NULL && i < w->line_count; i++) {
+		why = why_unchecked(w, &w->line[i]);
+		if (why != NULL) {
+			snprintf(text, sizeof(text), "line '%.95s' is not checked: %s (slaves[%u])",
+				 output_page(w->out)->line[i].line, why, w->line[i].item);
 			output_message(w->out, text);
-			return;
 		}
+	}
+	if (sync0_beyond_format(output_page(w->out), text, sizeof(text)) > 0) {
+		fprintf(stderr, "ecdaq-sync0: %s\n", text);
 	}
 }
 
@@ -88,17 +121,20 @@ static void lines_of_session(struct watch *w)
 	struct sync0_status *page = output_page(w->out);
 
 	memset(w->line_of_slave, 0, sizeof(w->line_of_slave));
+	atomic_store_explicit(&page->beyond_count, 0, memory_order_relaxed);
 	if (w->lines == NULL) {
 		w->line_count = 0;
 	}
 	for (size_t i = 0; i < w->line_count; i++) {
-		w->line[i].slave_pos = EVENT_NO_SLAVE;
+		w->line[i] =
+			(struct watch_line){ .item = w->line[i].item, .slave_pos = EVENT_NO_SLAVE };
 	}
 	for (uint32_t i = 0; i < meta->slave_count; i++) {
 		struct watch_line *line = line_of(w, &slave[i]);
 
 		if (line != NULL) {
 			line->slave_pos = slave[i].slave_pos;
+			line->cycle_ns = slave[i].sync0_cycle_ns;
 			line->shift_ns = slave[i].sync0_shift_ns;
 			w->line_of_slave[line->slave_pos] = (uint64_t)(line - w->line) + 1;
 		}
@@ -112,12 +148,12 @@ static void lines_of_session(struct watch *w)
 				 slave[i].name);
 		}
 	}
-	report_absent(w);
+	report_unchecked(w);
 }
 
 static enum checker_mode mode_of(const struct watch *w, size_t line)
 {
-	if (!watch_has_source(w) || w->line[line].slave_pos == EVENT_NO_SLAVE ||
+	if (!watch_has_source(w) || why_unchecked(w, &w->line[line]) != NULL ||
 	    (w->lines != NULL && !gpio_lines_is_open(w->lines, line))) {
 		return CHECKER_OFF;
 	}
@@ -129,29 +165,37 @@ static void fill_lines(const struct watch *w, struct checker_spec *spec)
 {
 	spec->line_count = w->line_count;
 	for (size_t i = 0; i < w->line_count; i++) {
+		enum checker_mode mode = mode_of(w, i);
+
 		spec->line[i] = (struct checker_line){
 			.slave_pos = w->line[i].slave_pos,
-			.mode = mode_of(w, i),
-			.shift_ns = w->line[i].shift_ns,
+			.mode = mode,
+			.cycle_ns = mode == CHECKER_PERIODIC ? w->line[i].cycle_ns : 0,
+			.shift_ns = mode == CHECKER_PERIODIC ? w->line[i].shift_ns : 0,
 		};
 	}
 }
 
+static void dump_lines(const struct watch *w, const struct checker_spec *spec)
+{
+	for (size_t i = 0; w->spec.dump != NULL && i < spec->line_count; i++) {
+		if (spec->line[i].slave_pos != EVENT_NO_SLAVE) {
+			edge_file_write_line(w->spec.dump, &spec->line[i],
+					     output_page(w->out)->line[i].slave);
+		}
+	}
+}
+
 /* The master's period need not be that of our own configuration. */
-static void fit_to_period(struct watch *w, struct checker_spec *spec)
+static void fit_window(struct watch *w, struct checker_spec *spec)
 {
 	char text[WATCH_WHY_BYTES];
-	int64_t least_ns = WINDOW_CYCLES_MIN * spec->period_ns;
 
-	if (spec->lost_ns < LOST_CYCLES_MIN * spec->period_ns) {
-		spec->lost_ns = LOST_CYCLES_MIN * spec->period_ns;
-	}
-	if (spec->window_ns < least_ns) {
-		spec->window_ns = least_ns;
+	if (checker_fit_window(spec)) {
 		snprintf(text, sizeof(text),
-			 "sync0.window is less than %d cycles of the master: %" PRId64
+			 "sync0.window is less than 100 cycles of the slowest SYNC0: %" PRId64
 			 " ms are taken",
-			 WINDOW_CYCLES_MIN, least_ns / NS_PER_MS);
+			 spec->window_ns / NS_PER_MS);
 		output_message(w->out, text);
 	}
 	atomic_store_explicit(&output_page(w->out)->window_ns, spec->window_ns,
@@ -186,7 +230,7 @@ static struct checker_spec session_spec(struct watch *w)
 	};
 
 	fill_lines(w, &spec);
-	fit_to_period(w, &spec);
+	fit_window(w, &spec);
 	return spec;
 }
 
@@ -200,12 +244,12 @@ void watch_begin_session(struct watch *w)
 	w->lines_changed = 0;
 	lines_of_session(w);
 	spec = session_spec(w);
+	dump_lines(w, &spec);
 	r = checker_create(&spec, &w->checker);
 	if (r < 0) {
 		w->checker = NULL;
-		output_message(w->out, r == -EINVAL
-					       ? "no slave of the segment has distributed clocks"
-					       : strerror(-r));
+		output_message(w->out,
+			       r == -EINVAL ? "no slave of the segment has SYNC0" : strerror(-r));
 		watch_set_state(w, SYNC0_NO_DC);
 		return;
 	}

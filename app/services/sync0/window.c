@@ -15,14 +15,16 @@ static int have_frames(struct window *w)
 	       w->frame_latency_ns != NULL;
 }
 
-static int have_line(struct window_line *wl, uint32_t cycles)
+static int have_line(struct window_line *wl, uint32_t room)
 {
-	wl->mono_ns = calloc(cycles, sizeof(wl->mono_ns[0]));
-	wl->mark = calloc(cycles, sizeof(wl->mark[0]));
+	wl->room = room;
+	wl->mono_ns = calloc(room, sizeof(wl->mono_ns[0]));
+	wl->mark = calloc(room, sizeof(wl->mark[0]));
 	return wl->mono_ns != NULL && wl->mark != NULL;
 }
 
-int window_create(uint32_t cycles, size_t line_count, struct window **ret_window)
+int window_create(uint32_t cycles, size_t line_count, const uint32_t *room,
+		  struct window **ret_window)
 {
 	struct window *w = calloc(1, sizeof(*w));
 	int is_whole;
@@ -35,7 +37,7 @@ int window_create(uint32_t cycles, size_t line_count, struct window **ret_window
 	is_whole = w->line != NULL && have_frames(w);
 	for (size_t i = 0; is_whole && i < line_count; i++) {
 		w->line_count = i + 1;
-		is_whole = have_line(&w->line[i], cycles);
+		is_whole = have_line(&w->line[i], room[i]);
 	}
 	if (!is_whole) {
 		window_destroy(w);
@@ -72,11 +74,11 @@ void window_clear(struct window *w, int64_t first_cycle)
 	for (size_t i = 0; i < w->line_count; i++) {
 		struct window_line *wl = &w->line[i];
 
-		memset(wl->mark, WINDOW_UNSEEN, w->cycles * sizeof(wl->mark[0]));
+		memset(wl->mark, WINDOW_UNSEEN, wl->room * sizeof(wl->mark[0]));
 		wl->extra = 0;
 		wl->first_extra = 0;
 		wl->overflow = 0;
 		wl->step_ns = 0;
-		wl->step_cycle = 0;
+		wl->step_pulse = 0;
 	}
 }

@@ -9,13 +9,16 @@
 enum window_mark { WINDOW_UNSEEN = 0, WINDOW_SEEN, WINDOW_OVERFLOWN };
 
 struct window_line {
-	int64_t *mono_ns; /* by cycle, where mark is WINDOW_SEEN */
+	int64_t first;    /* pulse */
+	uint32_t pulses;  /* that are due in this window */
+	uint32_t room;    /* for so many */
+	int64_t *mono_ns; /* by pulse, where mark is WINDOW_SEEN */
 	uint8_t *mark;    /* enum window_mark */
 	uint64_t extra;
-	int64_t first_extra; /* cycle */
+	int64_t first_extra; /* pulse */
 	uint64_t overflow;
 	int64_t step_ns;
-	int64_t step_cycle;
+	int64_t step_pulse;
 };
 
 struct window {
@@ -32,10 +35,11 @@ struct window {
 	int64_t clock_step_ns;     /* 0: none */
 };
 
-/** 0 or -ENOMEM. Free with window_destroy(). */
-int window_create(uint32_t cycles, size_t line_count, struct window **ret_window);
+/** @room: for the pulses of each line. 0 or -ENOMEM. Free with window_destroy(). */
+int window_create(uint32_t cycles, size_t line_count, const uint32_t *room,
+		  struct window **ret_window);
 void window_destroy(struct window *w);
-/** Clear all counts; the window starts at @first_cycle. */
+/** Clear all counts; the window starts at @first_cycle. The pulses of its lines are not set. */
 void window_clear(struct window *w, int64_t first_cycle);
 
 #endif

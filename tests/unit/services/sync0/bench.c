@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "base/clock.h"
 #include "harness/test.h"
 
 static void on_result(void *ctx, const struct sync0_result *r)
@@ -122,11 +123,10 @@ static void give_cycle(struct bench *b)
 	checker_cycle(b->checker, &cy);
 }
 
-static void give_edge(struct bench *b, unsigned line)
+static void give_edge(struct bench *b, unsigned line, int64_t due_ns)
 {
 	double run_ns = (double)b->cycle * (double)BENCH_PERIOD_NS * -b->line_ppm[line] * 1e-6;
-	int64_t dc_ns =
-		BENCH_DC0_NS + b->cycle * BENCH_PERIOD_NS + b->line_ns[line] + llround(run_ns);
+	int64_t dc_ns = due_ns + b->line_ns[line] + llround(run_ns);
 	struct edge edge = { .mono_ns = bench_mono_ns(b, dc_ns), .line = (uint16_t)line };
 
 	if (b->noise == BENCH_PI) {
@@ -145,11 +145,23 @@ static void give_edge(struct bench *b, unsigned line)
 	b->seqno[line] = edge.seqno;
 }
 
+/* The pulses that are due in this cycle: at multiples of the slave's own SYNC0 cycle. */
+static void give_edges(struct bench *b, unsigned line)
+{
+	int64_t due_ns = BENCH_DC0_NS + b->cycle * BENCH_PERIOD_NS;
+	int64_t cycle_ns = b->cycle_ns[line] > 0 ? b->cycle_ns[line] : BENCH_PERIOD_NS;
+
+	for (int64_t at_ns = due_ns + mod_floor(-due_ns, cycle_ns);
+	     at_ns < due_ns + BENCH_PERIOD_NS; at_ns += cycle_ns) {
+		give_edge(b, line, at_ns);
+	}
+}
+
 void bench_run(struct bench *b, int64_t cycles)
 {
 	for (int64_t end = b->cycle + cycles; b->cycle < end; b->cycle++) {
 		for (unsigned line = 0; line < b->spec.line_count; line++) {
-			give_edge(b, line);
+			give_edges(b, line);
 		}
 		if (b->spec.grid == CHECKER_GRID_MASTER) {
 			give_cycle(b);

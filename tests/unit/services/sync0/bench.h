@@ -25,11 +25,12 @@ struct bench {
 	struct checker *checker;
 	struct prng prng;
 	enum bench_noise noise;
-	double dc_ppm;                /* DC clock against the host's */
-	double line_ppm[BENCH_LINES]; /* SYNC0 against DC */
-	int64_t line_ns[BENCH_LINES]; /* and behind its time */
-	int64_t pair_noise_ns;        /* wakes are late by up to this */
-	int64_t cycle;                /* next */
+	double dc_ppm;                 /* DC clock against the host's */
+	double line_ppm[BENCH_LINES];  /* SYNC0 against DC */
+	int64_t cycle_ns[BENCH_LINES]; /* of the pulses; 0: BENCH_PERIOD_NS */
+	int64_t line_ns[BENCH_LINES];  /* and behind its time */
+	int64_t pair_noise_ns;         /* wakes are late by up to this */
+	int64_t cycle;                 /* next */
 	/* Called for each edge; it may change it, and give others itself. */
 	enum bench_fate (*alter)(struct bench *b, unsigned line, int64_t cycle, struct edge *edge);
 	int64_t number_step;  /* added to the master's cycle numbers from now on */

@@ -34,6 +34,13 @@ TEST(sync0, a_line_of_edges_is_slave_time_dc_time_and_number)
 	CHECK_EQ(item.shot.slave_pos, 63);
 	CHECK_EQ(item.shot.at_dc_ns, 1000);
 	CHECK_EQ(item.shot.due_dc_ns, 0);
+	CHECK_EQ(edge_line_parse("l 5 0 2000000 -250000 drive x\n", &item), 0);
+	CHECK_EQ(item.kind, EDGE_ITEM_LINE);
+	CHECK_EQ(item.line.slave_pos, 5);
+	CHECK_EQ(item.line.mode, CHECKER_PERIODIC);
+	CHECK_EQ(item.line.cycle_ns, 2000000);
+	CHECK_EQ(item.line.shift_ns, -250000);
+	CHECK_STR(item.name, "drive x");
 }
 
 TEST(sync0, a_line_that_is_none_is_refused_and_leaves_the_output_untouched)
@@ -65,6 +72,14 @@ TEST(sync0, a_line_that_is_none_is_refused_and_leaves_the_output_untouched)
 		"s 1 2 3 4",
 		"s 1 -2 3",
 		"sc 1 2 3",
+		"l 5 0 1000000 0",
+		"l 5 0 1000000 0 \n",
+		"l 5 3 1000000 0 name",
+		"l 512 0 1000000 0 name",
+		"l 5 0 -1 0 name",
+		"l 5 0 4294967296 0 name",
+		"l 5 0 1000000 2147483648 name",
+		"l 5 0 1000000 0 a_name_of_thirty-two_characters_",
 	};
 
 	for (size_t i = 0; i < sizeof(bad) / sizeof(bad[0]); i++) {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The ring of an ecdaqd with two slaves, both with a clock, the second with a shot's time. */
+/* The ring of an ecdaqd with two slaves or more, all with a clock, the second with a shot's time.
+ */
 #ifndef TESTS_UNIT_SYNC0_FAKE_MASTER_H
 #define TESTS_UNIT_SYNC0_FAKE_MASTER_H
 
@@ -16,9 +17,12 @@ struct fake_master {
 	char path[128];
 	struct ring *ring;
 	int64_t period_ns;
-	int64_t cycle;    /* next */
-	int64_t dc_ns;    /* of its SYNC0; goes on over restarts */
+	int64_t cycle;     /* next */
+	int64_t dc_ns;     /* of its SYNC0; goes on over restarts */
+	int has_own_cycle; /* the second slave's SYNC0 has a cycle of its own */
+	uint32_t cycle_ns;
 	int32_t shift_ns; /* of the second slave */
+	unsigned more;    /* slaves behind the second */
 	uint16_t absent;  /* items of slaves[] before the second slave */
 };
 

@@ -27,6 +27,7 @@ struct watch_bench {
 	FILE *edges; /* NULL: the file is not there */
 	int64_t now_ns;
 	int64_t late_ns;     /* of the second slave's pulses */
+	int64_t every;       /* it has a pulse in every n-th cycle only; 0: in each */
 	int64_t silent_from; /* cycle from which on the second slave has no pulse */
 	char why[WATCH_WHY_BYTES];
 };
@@ -137,7 +138,8 @@ static void write_cycle(uint64_t shot_ns)
 	int64_t edge_ns = fake_mono_ns(b.fake.dc_ns);
 
 	for (int slave = 0; b.edges != NULL && slave < FAKE_SLAVES; slave++) {
-		if (slave == 0 || b.fake.cycle < b.silent_from) {
+		if (slave == 0 || (b.fake.cycle < b.silent_from &&
+				   (b.every == 0 || b.fake.cycle % b.every == 0))) {
 			fprintf(b.edges, "%d %lld 0\n", slave,
 				(long long)edge_ns + (slave == FAKE_SHOT_SLAVE ? b.late_ns : 0));
 		}
@@ -215,7 +217,8 @@ TEST(sync0_watch, a_period_that_is_not_that_of_the_configuration_is_followed)
 	run(1000);
 	CHECK(page()->windows >= 5);
 	CHECK_EQ(page()->window_ns, NS_PER_S);
-	CHECK(strstr(page()->message, "100 cycles of the master: 1000 ms are taken") != NULL);
+	CHECK(strstr(page()->message, "100 cycles of the slowest SYNC0: 1000 ms are taken") !=
+	      NULL);
 	CHECK_EQ(page()->alarms, 0);
 	CHECK_EQ(page()->line[0].missing, 0);
 	end();
@@ -309,6 +312,71 @@ TEST(sync0_watch, the_shift_that_the_master_states_is_expected)
 	start(NS_PER_MS);
 	run(2000);
 	CHECK(page()->alarms > 0);
+	end();
+}
+
+TEST(sync0_watch, the_sync0_cycle_that_the_master_states_is_expected)
+{
+	begin();
+	b.every = 2;
+	b.late_ns = 300 * NS_PER_US;
+	b.fake.has_own_cycle = 1;
+	b.fake.cycle_ns = 2 * NS_PER_MS;
+	b.fake.shift_ns = 300 * (int32_t)NS_PER_US;
+	start(NS_PER_MS);
+	run(2000);
+	CHECK(page()->windows >= 5);
+	CHECK_EQ(page()->window_ns, 200 * NS_PER_MS);
+	CHECK_EQ(page()->line[1].cycle_ns, 2 * NS_PER_MS);
+	CHECK(page()->line[1].edges >= 500);
+	CHECK_EQ(page()->line[0].edges, 2 * page()->line[1].edges);
+	CHECK_EQ(page()->line[1].missing + page()->line[1].extra, 0);
+	CHECK_EQ(page()->alarms, 0);
+	end();
+}
+
+/* A line is configured for a slave that has no SYNC0: that is said, and nothing is missed. */
+TEST(sync0_watch, a_line_of_a_slave_without_sync0_is_not_checked)
+{
+	begin();
+	b.cfg.sync0_edges[0] = '\0';
+	set("slaves[0].sync0_line=chip:4");
+	set("slaves[1].sync0_line=chip:5");
+	CHECK_EQ(try_watch(&b.watch), 0);
+	b.fake.has_own_cycle = 1;
+	fake_master_start(&b.fake, b.dir, NS_PER_MS);
+	run(500);
+	CHECK_EQ(page()->line_count, 2);
+	CHECK_EQ(page()->line[1].cycle_ns, 0);
+	CHECK(strstr(page()->message, "line 'chip:5' is not checked: the master starts no SYNC0 in "
+				      "its slave (slaves[1])") != NULL);
+	end();
+	begin();
+	b.fake.has_own_cycle = 1;
+	start(NS_PER_MS);
+	run(2000);
+	CHECK_EQ(page()->line_count, 1);
+	CHECK_EQ(page()->alarms, 0);
+	end();
+}
+
+TEST(sync0_watch, slaves_beyond_the_lines_are_named)
+{
+	char text[128];
+
+	begin();
+	b.fake.more = LIMIT_SYNC0_LINES - FAKE_SLAVES;
+	start(NS_PER_MS);
+	run(500);
+	CHECK_EQ(page()->line_count, LIMIT_SYNC0_LINES);
+	CHECK_EQ(sync0_beyond_format(page(), text, sizeof(text)), 0);
+	fake_master_stop(&b.fake);
+	b.fake.more += 3;
+	fake_master_start(&b.fake, b.dir, NS_PER_MS);
+	run(500);
+	CHECK_EQ(page()->line_count, LIMIT_SYNC0_LINES);
+	CHECK(sync0_beyond_format(page(), text, sizeof(text)) > 0);
+	CHECK_STR(text, "not checked: slave 64 (slave64) and 2 more: only 64 lines");
 	end();
 }
 
