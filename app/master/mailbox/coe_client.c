@@ -7,38 +7,6 @@
 #include "mailbox/coe_internal.h"
 #include "wire/sii.h"
 
-enum sdo_command {
-	SDO_SPECIFIER = 0xe0, /* the three bits that say which command it is */
-	SDO_DOWNLOAD = 0x20,
-	SDO_DOWNLOADED = 0x60,
-	SDO_DOWNLOAD_SEGMENT = 0x00,
-	SDO_SEGMENT_DOWNLOADED = 0x20,
-	SDO_UPLOAD = 0x40,
-	SDO_UPLOADED = 0x40,
-	SDO_UPLOAD_SEGMENT = 0x60,
-	SDO_SEGMENT_UPLOADED = 0x00,
-	SDO_ABORT = 0x80,
-	SDO_COMPLETE_ACCESS = 0x10,
-	SDO_TOGGLE = 0x10,
-	SDO_EXPEDITED = 0x02,
-	SDO_SIZE_INDICATED = 0x01,
-	SDO_LAST_SEGMENT = 0x01,
-	SDO_UNUSED_SHIFT = 1, /* in a segment */
-	SDO_UNUSED_MASK = 0x07,
-	SDO_EXPEDITED_SHIFT = 2,
-};
-
-enum layout {
-	COMMAND_AT = 2,
-	INDEX_AT = 3,
-	SUBINDEX_AT = 5,
-	DATA_AT = 6,
-	SDO_BYTES = 10,
-	EXPEDITED_BYTES = 4,
-	SEGMENT_AT = 3,
-	SEGMENT_MIN = 7, /* data of the shortest segment */
-};
-
 static int is_information(const struct mailbox_request *rq)
 {
 	return rq->with.coe.operation >= COE_LIST;

@@ -13,16 +13,11 @@ enum opcode {
 	OBJECT = 4,
 	GET_ENTRY = 5,
 	ENTRY = 6,
-	INFORMATION_ERROR = 7,
-	OPCODE_MASK = 0x7f,
 };
 
 enum layout {
-	OPCODE_AT = 2,
-	FRAGMENTS_AT = 4,
-	BODY_AT = 6,
 	INDEX_BYTES = 2,
-	ENTRY_REQUEST_BYTES = BODY_AT + 4,
+	ENTRY_REQUEST_BYTES = INFORMATION_BODY_AT + 4,
 	OBJECT_BYTES = 6,
 	ENTRY_BYTES = 10,
 	/* access rights, category, mapping: the name follows at once */
@@ -53,14 +48,14 @@ int coe_information_compose(struct mailbox_request *rq, uint8_t *data, size_t ca
 	}
 	memset(data, 0, ENTRY_REQUEST_BYTES);
 	put_le16(data, (uint16_t)(COE_SDO_INFORMATION << COE_SERVICE_SHIFT));
-	data[OPCODE_AT] = opcode_of(rq);
-	put_le16(data + BODY_AT,
+	data[INFORMATION_OPCODE_AT] = opcode_of(rq);
+	put_le16(data + INFORMATION_BODY_AT,
 		 with->operation == COE_LIST ? (uint16_t)with->list_type : with->index);
 	if (with->operation != COE_ENTRY) {
-		return BODY_AT + INDEX_BYTES;
+		return INFORMATION_BODY_AT + INDEX_BYTES;
 	}
-	data[BODY_AT + 2] = with->subindex;
-	data[BODY_AT + 3] = VALUE_INFO;
+	data[INFORMATION_BODY_AT + 2] = with->subindex;
+	data[INFORMATION_BODY_AT + 3] = VALUE_INFO;
 	return ENTRY_REQUEST_BYTES;
 }
 
@@ -94,12 +89,12 @@ static int take_fragment(struct mailbox_request *rq, const uint8_t *body, size_t
 int coe_information_received(struct mailbox_request *rq, const uint8_t *data, size_t len)
 {
 	struct coe_state *st = &rq->state.coe;
-	const uint8_t *body = data + BODY_AT;
-	size_t body_len = len - BODY_AT;
-	uint8_t opcode = data[OPCODE_AT] & OPCODE_MASK;
+	const uint8_t *body = data + INFORMATION_BODY_AT;
+	size_t body_len = len - INFORMATION_BODY_AT;
+	uint8_t opcode = data[INFORMATION_OPCODE_AT] & INFORMATION_OPCODE_MASK;
 	uint16_t left;
 
-	if (len < BODY_AT + INDEX_BYTES) {
+	if (len < INFORMATION_BODY_AT + INDEX_BYTES) {
 		return -EPROTO;
 	}
 	if (opcode == INFORMATION_ERROR) {
@@ -109,7 +104,7 @@ int coe_information_received(struct mailbox_request *rq, const uint8_t *data, si
 	if (opcode != opcode_of(rq) + 1) {
 		return MAILBOX_IGNORE;
 	}
-	left = get_le16(data + FRAGMENTS_AT);
+	left = get_le16(data + INFORMATION_FRAGMENTS_AT);
 	if (st->has_fragment) {
 		/* One lost in between would make a list with a hole. */
 		return left + 1 == st->fragments_left ? take_fragment(rq, body, body_len, left)

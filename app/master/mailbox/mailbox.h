@@ -25,6 +25,7 @@
 #include "mailbox/coe.h"
 #include "mailbox/eoe.h"
 #include "mailbox/foe.h"
+#include "mailbox/raw.h"
 #include "mailbox/soe.h"
 #include "mailbox/voe.h"
 #include "wire/mailbox.h"
@@ -98,6 +99,7 @@ struct mailbox_request {
 		struct eoe_parameters eoe;
 		struct aoe_parameters aoe;
 		struct voe_parameters voe;
+		struct raw_parameters raw;
 	} with;          /* parameters */
 	uint8_t *buffer; /* what is written, or where it is read to */
 	size_t capacity; /* of the buffer; of what is written: its length */
@@ -123,6 +125,7 @@ struct mailbox_request {
 		struct eoe_state eoe;
 		struct aoe_state aoe;
 		struct voe_state voe;
+		struct raw_state raw;
 	} state;
 	uint16_t mail_capacity; /* data bytes of a mail to this slave */
 	uint16_t mail_room;     /* data bytes of a mail of this slave */
