@@ -21,7 +21,8 @@ enum {
 	FRAME_BYTES = ECAT_ETHERNET_BYTES + ECAT_FRAME_HEADER_BYTES,
 };
 
-/* While an answer is awaited: each pass at first, then every millisecond. */
+/* While an answer is awaited: each pass at first, then every millisecond. After a mail that has no
+ * answer of its own (an EoE fragment): every millisecond for as long. */
 #define FRESH_NS (20 * NS_PER_MS)
 #define AWAIT_NS NS_PER_MS
 /* While none is: emergencies and EoE frames may come at any time. */
@@ -306,8 +307,10 @@ static void poll_done(struct box_slave *sl, uint8_t status, mono_t now)
 		return;
 	}
 	sl->drain = 0;
-	if (sl->awaited > 0) {
-		rd->poll_at = mono_add(now, (span_t){ is_fresh(sl, now) ? 0 : AWAIT_NS });
+	if (sl->awaited > 0 || is_fresh(sl, now)) {
+		int is_each_pass = sl->awaited > 0 && is_fresh(sl, now);
+
+		rd->poll_at = mono_add(now, (span_t){ is_each_pass ? 0 : AWAIT_NS });
 		return;
 	}
 	rd->poll_at = mono_add(now, rd->idle);
