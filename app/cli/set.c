@@ -112,7 +112,9 @@ static enum exit_code run(struct setting *setting, const struct args *args)
 
 	if (args->operand_count > ADMIN_ITEMS) {
 		return cli_fail(setting->cli, EXIT_CODE_USAGE,
-				"more than ADMIN_ITEMS = %d outputs at once", ADMIN_ITEMS);
+				"%d outputs: one command sets up to %d, all in the same cycle; "
+				"use several commands, each takes effect in a cycle of its own",
+				args->operand_count, ADMIN_ITEMS);
 	}
 	for (int i = 0; i < args->operand_count; i++) {
 		result = take_word(setting, args->operands[i], &setting->request.item[i]);

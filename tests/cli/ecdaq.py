@@ -93,10 +93,12 @@ def wait_until(what: Callable[[], bool], seconds: float = 20.0) -> None:
 class Fake:
     """A fake ecdaqd in a run directory of its own; @how is a program that starts it."""
 
-    def __init__(self, run_dir: Path, *settings: str, how: Sequence[str] = ()) -> None:
+    def __init__(
+        self, run_dir: Path, *settings: str, how: Sequence[str] = (), program: Path = FAKE
+    ) -> None:
         self.run_dir = run_dir
         self.process = subprocess.Popen(
-            [*how, FAKE, run_dir, *settings],
+            [*how, program, run_dir, *settings],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,

@@ -13,9 +13,12 @@
 #include "base/status.h"
 #include "config/config.h"
 
-enum { SLAVES = 2, ENTRIES = 6, CHANNELS = SLAVES * ENTRIES };
+#ifndef FAKE_SLAVES
+#define FAKE_SLAVES 2
+#endif
+enum { SLAVES = FAKE_SLAVES, ENTRIES = 6, CHANNELS = SLAVES * ENTRIES };
 enum { OUT_BYTES = 9, IN_BYTES = 13, IMAGE_BYTES = SLAVES * (OUT_BYTES + IN_BYTES) };
-enum { SII_BYTES = 2048 };
+enum { SII_BYTES = 2048, RING_SLOTS = SLAVES > 2 ? 4096 : 65536 };
 enum { FIRST_CYCLE = 1000, STEP_NS = 1000000 };
 
 struct meta {

@@ -211,7 +211,7 @@ void fake_make_rings(struct fake *f)
 	struct ring_spec samples = {
 		.kind = "sample",
 		.payload_bytes = sample_head_bytes(SLAVES) + IMAGE_BYTES,
-		.slot_count = 65536,
+		.slot_count = RING_SLOTS,
 		.meta = &f->meta,
 		.meta_bytes = sizeof(f->meta),
 		.period_ns = STEP_NS,

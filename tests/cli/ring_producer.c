@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A master without a bus: writes synthetic samples of two slaves to a sample ring, so that what
- * reads rings is tested alone. piccolo0.adc is a 1 Hz sine of 0.5 V around 1 V, piccolo1.adc the
- * same a quarter period later; counters count; sample_time is the DC time of the edge.
+ * A master without a bus: writes synthetic samples of two slaves (PRODUCER_SLAVES) to a sample
+ * ring, so that what reads rings is tested alone. piccolo0.adc is a 1 Hz sine of 0.5 V around 1 V,
+ * that of the next slave the same a quarter period later; counters count; sample_time is the DC
+ * time of the edge.
  *
  * usage: test_ring_producer RUN_DIR --cycles N [--pace] [--first N] [--skip FROM:COUNT] [--depth N]
  *        [--no-close] [--wait] [--events N] [--bad N]
  * --pace: one sample each millisecond; otherwise at once. --skip: cycle numbers with no sample.
  * --no-close: leave the ring open, as after a crash. --wait: end when standard input does. --bad:
- * in every Nth cycle, from 0, the sample of piccolo1 is bad.
+ * in every Nth cycle, from 0, the sample of the last slave is bad.
  */
 #include <errno.h>
 #include <inttypes.h>
@@ -28,7 +29,15 @@
 #include "base/slave_set.h"
 #include "config/config.h"
 
-enum { SLAVES = 2, CHANNELS = 7, SLAVE_BYTES = 14, IMAGE_BYTES = 1 + SLAVES * SLAVE_BYTES };
+#ifndef PRODUCER_SLAVES
+#define PRODUCER_SLAVES 2
+#endif
+enum {
+	SLAVES = PRODUCER_SLAVES,
+	CHANNELS = 3 * SLAVES + 1,
+	SLAVE_BYTES = 14,
+	IMAGE_BYTES = 1 + SLAVES * SLAVE_BYTES
+};
 
 #define PERIOD_NS NS_PER_MS
 
@@ -171,10 +180,10 @@ static void push(struct ring *ring, const struct arguments *a, uint64_t cycle, i
 		.wkc = 6,
 		.wkc_expected = 6,
 	};
-	uint8_t image[IMAGE_BYTES];
+	static uint8_t image[IMAGE_BYTES];
 
 	if (a->bad_every > 0 && cycle % a->bad_every == 0) {
-		slave_set_add(&h.slaves_bad, 1);
+		slave_set_add(&h.slaves_bad, SLAVES - 1);
 	}
 	fill_image(image, cycle, dc_ns);
 	ring_push(ring, &h, sample_head_bytes(SLAVES), image, sizeof(image));
@@ -227,7 +236,7 @@ static int make_ring(const char *dir, const char *file, struct ring_spec spec,
 int main(int argc, char **argv)
 {
 	struct arguments a;
-	struct meta meta;
+	static struct meta meta;
 	struct ring *ring;
 	struct ring *events;
 
