@@ -7,7 +7,6 @@ import json
 import math
 import signal
 import subprocess
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -107,10 +106,7 @@ def record(folder: Path, cycles: int, bad_every: int) -> Path:
     subprocess.run([producer, run_dir, *options], check=True, capture_output=True)
     command = [str(BIN / "ecdaq-record"), "--run-dir", str(run_dir)]
     recorder = subprocess.Popen([*command, "--set", f"record.dir={record_dir}"])
-    end = time.monotonic() + 60
-    while not list(record_dir.glob("*.mcap")):
-        assert time.monotonic() < end and recorder.poll() is None
-        time.sleep(0.02)
+    wait_until(lambda: list(record_dir.glob("*.mcap")) != [], 60)
     recorder.send_signal(signal.SIGTERM)
     assert recorder.wait(60) == 0
     return record_dir

@@ -7,29 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Length of the UTF-8 sequence at @p, 0 if it is none. */
-static size_t utf8_len(const unsigned char *p, size_t left)
-{
-	size_t len = p[0] < 0x80                   ? 1
-		     : p[0] >= 0xc2 && p[0] < 0xe0 ? 2
-		     : (p[0] & 0xf0) == 0xe0       ? 3
-		     : p[0] >= 0xf0 && p[0] < 0xf5 ? 4
-						   : 0;
-
-	if (len == 0 || len > left) {
-		return 0;
-	}
-	for (size_t i = 1; i < len; i++) {
-		if ((p[i] & 0xc0) != 0x80) {
-			return 0;
-		}
-	}
-	if ((p[0] == 0xe0 && p[1] < 0xa0) || (p[0] == 0xed && p[1] > 0x9f) ||
-	    (p[0] == 0xf0 && p[1] < 0x90) || (p[0] == 0xf4 && p[1] > 0x8f)) {
-		return 0; /* overlong, surrogate, beyond U+10FFFF */
-	}
-	return len;
-}
+#include "base/utf8.h"
 
 void json_put_text_n(FILE *out, const char *text, size_t len)
 {
@@ -38,10 +16,10 @@ void json_put_text_n(FILE *out, const char *text, size_t len)
 
 	fputc('"', out);
 	while (i < len && p[i] != '\0') {
-		size_t n = utf8_len(p + i, len - i);
+		size_t n = utf8_len(text + i, len - i);
 
 		if (n == 0) {
-			fputs("\xef\xbf\xbd", out);
+			fputs(UTF8_REPLACEMENT, out);
 			n = 1;
 		} else if (p[i] == '"' || p[i] == '\\') {
 			fprintf(out, "\\%c", p[i]);

@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/utf8.h"
 #include "config/output.h"
 #include "ecdaq.h"
 #include "image/image.h"
@@ -34,6 +35,15 @@ void state_put_idl(const struct topics *topics)
 		(sequence)._release = true;                                                        \
 	} while (0)
 
+/* A DDS string is UTF-8. */
+static char *dup_text(const char *text)
+{
+	char utf8[3 * LIMIT_NAME_BYTES];
+
+	utf8_copy(text, utf8, sizeof(utf8));
+	return dds_string_dup(utf8);
+}
+
 static void put_slaves(ecdaq_ChannelsV1 *m, const struct channel_table *t)
 {
 	uint32_t n = t->meta.slave_count;
@@ -43,8 +53,8 @@ static void put_slaves(ecdaq_ChannelsV1 *m, const struct channel_table *t)
 	SEQUENCE(m->slave_vendor, n);
 	SEQUENCE(m->slave_product, n);
 	for (uint32_t i = 0; i < n; i++) {
-		m->slave_name._buffer[i] = dds_string_dup(t->slaves[i].name);
-		m->slave_device._buffer[i] = dds_string_dup(t->slaves[i].device);
+		m->slave_name._buffer[i] = dup_text(t->slaves[i].name);
+		m->slave_device._buffer[i] = dup_text(t->slaves[i].device);
 		m->slave_vendor._buffer[i] = t->slaves[i].vendor;
 		m->slave_product._buffer[i] = t->slaves[i].product;
 	}
@@ -58,8 +68,8 @@ static void put_channel(ecdaq_ChannelsV1 *m, uint32_t i, const struct channel *c
 	char type[TYPE_BYTES];
 
 	image_type_format(ch, type, sizeof(type));
-	m->name._buffer[i] = dds_string_dup(ch->name);
-	m->unit._buffer[i] = dds_string_dup(ch->unit);
+	m->name._buffer[i] = dup_text(ch->name);
+	m->unit._buffer[i] = dup_text(ch->unit);
 	m->type._buffer[i] = dds_string_dup(type);
 	m->slave._buffer[i] = ch->slave_pos;
 	m->is_output._buffer[i] = is_output != 0;
