@@ -224,6 +224,7 @@ TEST(reader, a_ring_of_another_version_is_named_by_both_versions)
 {
 	struct made_meta meta = made_meta();
 	const uint32_t other = 77;
+	char wanted[128];
 	struct bench b;
 
 	bench_open(&b, READER_AT_OLDEST);
@@ -231,8 +232,11 @@ TEST(reader, a_ring_of_another_version_is_named_by_both_versions)
 	b.ring = made_ring(b.path, &meta, 16);
 	expect(&b, READER_WAITING);
 	CHECK_EQ(reader_error(b.reader), -EPROTONOSUPPORT);
-	CHECK_STR(reader_problem(b.reader), "ring version 1, this program reads version 2: "
-					    "restart ecdaqd of the same release");
+	snprintf(
+		wanted, sizeof(wanted),
+		"ring version 1, this program reads version %u: restart ecdaqd of the same release",
+		SAMPLE_VERSION);
+	CHECK_STR(reader_problem(b.reader), wanted);
 	ring_destroy(b.ring);
 	begin(&b, 1, 16);
 	made_overwrite(b.path, MADE_VERSION, &other, sizeof(other));
