@@ -2,6 +2,7 @@
 #include "cli/admin_client.h"
 
 #include <errno.h>
+#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,8 +10,12 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "base/stop.h"
+
 /* ecdaqd ends each request by a time-out of its own; these are a little longer. */
 enum { REPLY_TIMEOUT_S = 25, LONG_TIMEOUT_S = 605 };
+/* From one look whether the user wants the end to the next. */
+enum { LOOK_MS = 200 };
 
 static int timeout_s(const struct admin_request *request)
 {
@@ -97,7 +102,12 @@ static int connect_to(const char *path, int reply_timeout_s)
 
 static int post(int fd, const struct admin_request *message)
 {
-	return send(fd, message, sizeof(*message), MSG_NOSIGNAL) < 0 ? -errno : 0;
+	ssize_t n;
+
+	do {
+		n = send(fd, message, sizeof(*message), MSG_NOSIGNAL);
+	} while (n < 0 && errno == EINTR);
+	return n < 0 ? -errno : 0;
 }
 
 /* The request, and what does not fit into its first message. */
@@ -127,25 +137,58 @@ static int send_all(int fd, const struct admin_transfer *tr)
 	return r;
 }
 
-/* One message of @request's answer. 0 or -errno. */
-static int receive(int fd, const struct admin_request *request, struct admin_reply *ret_reply)
+/* The user wants the end of it: said once, and its answer waited for. 0 or -errno. */
+static int cancel(int fd, struct admin_transfer *tr)
 {
-	ssize_t n;
+	struct admin_request message = { .magic = ADMIN_MAGIC,
+					 .verb = ADMIN_CANCEL,
+					 .id = tr->request->id };
 
-	do {
-		n = recv(fd, ret_reply, sizeof(*ret_reply), 0);
-	} while (n < 0 && errno == EINTR);
+	if (!tr->can_cancel || !stop_requested()) {
+		return 0;
+	}
+	tr->can_cancel = 0;
+	return post(fd, &message);
+}
+
+/* Until there is a message. 0; -EAGAIN: not in time. */
+static int wait_message(int fd, struct admin_transfer *tr)
+{
+	struct pollfd pfd = { .fd = fd, .events = POLLIN };
+
+	for (int left_ms = timeout_s(tr->request) * 1000; left_ms > 0; left_ms -= LOOK_MS) {
+		int r = cancel(fd, tr);
+		int n = r < 0 ? r : poll(&pfd, 1, LOOK_MS);
+
+		if (r < 0 || n > 0 || (n < 0 && errno != EINTR)) {
+			return r < 0 ? r : n > 0 ? 0 : -errno;
+		}
+	}
+	return -EAGAIN;
+}
+
+/* One message of the answer. 0 or -errno. */
+static int receive(int fd, struct admin_transfer *tr)
+{
+	struct admin_reply *reply = &tr->reply;
+	ssize_t n;
+	int r = wait_message(fd, tr);
+
+	if (r < 0) {
+		return r;
+	}
+	n = recv(fd, reply, sizeof(*reply), 0);
 	if (n < 0) {
 		return -errno;
 	}
 	if (n == 0) {
 		return -ECONNRESET;
 	}
-	if ((size_t)n != sizeof(*ret_reply) || ret_reply->magic != ADMIN_MAGIC ||
-	    ret_reply->id != request->id || ret_reply->data_len > ADMIN_DATA_BYTES) {
+	if ((size_t)n != sizeof(*reply) || reply->magic != ADMIN_MAGIC ||
+	    reply->id != tr->request->id || reply->data_len > ADMIN_DATA_BYTES) {
 		return -EPROTO;
 	}
-	ret_reply->text[sizeof(ret_reply->text) - 1] = '\0';
+	reply->text[sizeof(reply->text) - 1] = '\0';
 	return 0;
 }
 
@@ -153,20 +196,22 @@ static int receive(int fd, const struct admin_request *request, struct admin_rep
 static int gather(struct admin_transfer *tr, const struct admin_reply *reply)
 {
 	uint8_t *room;
+	size_t len;
 
 	if (reply->kind == ADMIN_REPLY_PROGRESS || reply->data_len == 0) {
 		return 0;
 	}
-	if (reply->data_offset != tr->answer_len || reply->data_total > ADMIN_TRANSFER_BYTES) {
+	len = tr->answer_len + reply->data_len;
+	if (reply->data_offset != tr->answer_len || len > ADMIN_TRANSFER_BYTES) {
 		return -EPROTO;
 	}
-	room = realloc(tr->answer, tr->answer_len + reply->data_len);
+	room = realloc(tr->answer, len);
 	if (room == NULL) {
 		return -ENOMEM;
 	}
 	memcpy(room + tr->answer_len, reply->data, reply->data_len);
 	tr->answer = room;
-	tr->answer_len += reply->data_len;
+	tr->answer_len = len;
 	return 0;
 }
 
@@ -176,7 +221,7 @@ static int exchange(int fd, struct admin_transfer *tr)
 	int r = send_all(fd, tr);
 
 	while (r == 0) {
-		r = receive(fd, tr->request, &tr->reply);
+		r = receive(fd, tr);
 		r = r == 0 ? gather(tr, &tr->reply) : r;
 		if (r == 0 && tr->reply.kind == ADMIN_REPLY_DONE) {
 			return 0;

@@ -21,6 +21,7 @@ struct admin_transfer {
 	struct admin_request *request;
 	const uint8_t *data; /* to send, in place of request->data; NULL: none */
 	size_t data_len;
+	int can_cancel; /* when stop_requested() (base/stop.h) */
 	/** Called for each report: reply.done of reply.total. NULL: none is shown. */
 	void (*progress)(const struct admin_transfer *tr);
 	struct admin_reply reply; /* the last message */

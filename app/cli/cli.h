@@ -60,6 +60,8 @@ enum exit_code verb_crc(struct cli *cli, int argc, char **argv);
 enum exit_code verb_doctor(struct cli *cli, int argc, char **argv);
 enum exit_code verb_eoe(struct cli *cli, int argc, char **argv);
 enum exit_code verb_events(struct cli *cli, int argc, char **argv);
+enum exit_code verb_firmware(struct cli *cli, int argc, char **argv);
+enum exit_code verb_foe(struct cli *cli, int argc, char **argv);
 enum exit_code verb_histogram(struct cli *cli, int argc, char **argv);
 enum exit_code verb_oneshot(struct cli *cli, int argc, char **argv);
 enum exit_code verb_reg(struct cli *cli, int argc, char **argv);

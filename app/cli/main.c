@@ -143,6 +143,18 @@ static const struct verb verbs[] = {
 	  "next\n"
 	  "power-on. The slave must be in INIT or PRE-OP.\n",
 	  verb_sii },
+	{ "foe", "read|write SLAVE NAME|FILE", "Read a file from a slave, or write one (FoE).",
+	  "ecdaq foe read drive config.bin --output config.bin\n"
+	  "ecdaq foe write drive config.bin --name CONFIG --password 4711\n\n"
+	  "Without --name the slave gets the file under its name here, without the folders.\n",
+	  verb_foe },
+	{ "firmware", "SLAVE FILE", "Write a new firmware to a slave (FoE in BOOT).",
+	  "ecdaq state PREOP all\n"
+	  "ecdaq firmware piccolo0 firmware.bin\n\n"
+	  "The slave goes to INIT and BOOT, gets the file, and goes back. After a failure, or "
+	  "Ctrl-C, it\n"
+	  "stays where it is, and the command may be repeated.\n",
+	  verb_firmware },
 	{ "crc", "[SLAVE...]", "Error counters in the registers of the slaves, port by port.",
 	  "Each stops at 255. Their sums since the start of ecdaqd: ecdaq slaves -v.\n", verb_crc },
 	{ "events", "", "What happened, oldest first.", NULL, verb_events },

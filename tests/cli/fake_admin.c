@@ -270,6 +270,8 @@ static void answer(struct fake *f, const struct admin_request *rq, struct admin_
 	*reply = (struct admin_reply){ .magic = ADMIN_MAGIC, .id = rq->id };
 	switch ((enum admin_verb)rq->verb) {
 	case ADMIN_PING:
+	case ADMIN_FOE_READ: /* an empty file */
+	case ADMIN_FOE_WRITE:
 		break;
 	case ADMIN_SET:
 		answer_set(f, rq, reply);
@@ -319,8 +321,6 @@ static void answer(struct fake *f, const struct admin_request *rq, struct admin_
 	case ADMIN_SDO_ENTRY:
 		answer_entry(rq, reply);
 		break;
-	case ADMIN_FOE_READ:
-	case ADMIN_FOE_WRITE:
 	case ADMIN_SOE_READ:
 	case ADMIN_SOE_WRITE:
 	case ADMIN_EOE_IP_READ:

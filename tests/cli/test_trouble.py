@@ -61,6 +61,7 @@ COMMANDS = [
     ["reg", "write", "0", "0x0f80", "1"],
     ["sii", "read", "0"],
     ["sii", "alias", "0", "5"],
+    ["foe", "read", "0", "a.bin"],
     ["crc", "0"],
 ]
 

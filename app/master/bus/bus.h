@@ -77,9 +77,10 @@ int bus_slave_al_read(struct bus *bus, size_t pos, uint8_t ret_al[6], char *erro
 /**
  * Before a slave in INIT is asked for @state, AL_PREOP or AL_BOOT: its mailbox SyncManagers get the
  * boxes of that state from its SII; one frame. Until bus_slave_mailbox_follow() it has no mailbox.
- * -ENOTSUP: it has none in BOOT.
  */
 int bus_slave_mailbox_program(struct bus *bus, size_t pos, uint16_t state, char *error);
+/** 1 if its SII gives mailboxes for BOOT: it has that state. */
+int bus_slave_has_boot(const struct bus *bus, size_t pos);
 /** The slave is in @state, an enum al_state: requests to its mailbox are possible, or, in INIT, no
  * more. */
 void bus_slave_mailbox_follow(struct bus *bus, size_t pos, uint16_t state);

@@ -33,15 +33,16 @@ void bus_mailbox_set(struct bus *bus, size_t pos)
 	open_mailbox(bus, pos, &spec);
 }
 
+int bus_slave_has_boot(const struct bus *bus, size_t pos)
+{
+	return bus->slave[pos].boot.out_bytes > 0;
+}
+
 int bus_slave_mailbox_program(struct bus *bus, size_t pos, uint16_t state, char *error)
 {
 	int r;
 
 	bus->error = error;
-	if (state == AL_BOOT && bus->slave[pos].boot.out_bytes == 0) {
-		return bus_fail_slave(bus, pos, -ENOTSUP,
-				      "its SII gives no mailbox for BOOT: it has no such state");
-	}
 	mailbox_slave_set(bus->mailbox, (uint16_t)pos, NULL);
 	if (state != AL_BOOT && bus->soem_slave[soem_index(pos)].mbx_l == 0) {
 		return 0;

@@ -200,6 +200,7 @@ static void abandon(struct admin_pending *pending)
 static void change_one(const struct session *s, struct admin_pending *pending)
 {
 	uint16_t wanted = (uint16_t)pending->request.argument[0];
+	uint16_t pos = pending->request.slave_pos;
 
 	if (target_of(wanted) < 0 && wanted != AL_BOOT) {
 		admin_pending_refuse(pending, -EINVAL, "%u is not an AL state", wanted);
@@ -209,6 +210,16 @@ static void change_one(const struct session *s, struct admin_pending *pending)
 		admin_pending_refuse(pending, -EPERM,
 				     "the bus is in operation, and its supervision would lead the "
 				     "slave back: ecdaq state PREOP all first");
+		return;
+	}
+	if (wanted == AL_BOOT && !bus_slave_has_boot(s->bus, pos)) {
+		size_t count;
+		const struct slave_info *slaves = bus_slaves(s->bus, &count);
+
+		admin_pending_refuse(pending, -ENOTSUP,
+				     "slave %u (%s): its SII gives no mailbox for BOOT: it has no "
+				     "such state",
+				     pos, slaves[pos].name);
 		return;
 	}
 	pending->sequence = CHANGE_LOOK;

@@ -6,7 +6,7 @@
 #include <unistd.h>
 
 #include "base/bytes.h"
-#include "daemon/session_internal.h"
+#include "devices/catalogue.h"
 #include "firmware/fb1111_piccolo/image.h"
 #include "harness/test.h"
 #include "sim/harness/virtual_master.h"
@@ -149,6 +149,47 @@ TEST(firmware_update, boot_is_reached_from_every_state_and_left_to_init)
 	CHECK_EQ(al_state(0), AL_SAFEOP);
 	lead(AL_INIT);
 	CHECK(read_version(BOARD).result < 0);
+	close_bench();
+}
+
+/* A drive whose boxes in BOOT are other ones. */
+static int make_drive(int position, struct segment_slave_spec *ret_spec)
+{
+	static struct slave_model model;
+
+	CHECK_EQ(catalogue_find("akd", &model), 0);
+	model.sii.boot_out_start = 0x1a00;
+	model.sii.boot_out_len = 256;
+	model.sii.boot_in_start = 0x1b00;
+	model.sii.boot_in_len = 200;
+	return catalogue_slave(&model, position, ret_spec);
+}
+
+static void check_boxes(uint16_t out_start, uint16_t out_len, uint16_t in_start, uint16_t in_len)
+{
+	const uint8_t *sm = segment_esc(b.segment, BOARD)->reg + ESC_REG_SM;
+
+	CHECK_EQ(get_le16(sm), out_start);
+	CHECK_EQ(get_le16(sm + 2), out_len);
+	CHECK_EQ(get_le16(sm + ESC_SM_BYTES), in_start);
+	CHECK_EQ(get_le16(sm + ESC_SM_BYTES + 2), in_len);
+}
+
+TEST(firmware_update, boot_has_the_boxes_of_its_sii_and_preop_gets_its_own_again)
+{
+	static const char *const settings[] = { "bus.target=preop", NULL };
+
+	virtual_bench_init(&b,
+			   &(struct virtual_spec){ .slaves = 2, .make = make_drive, .seed = 32 });
+	virtual_master_init_waiting(&vm, &b, settings);
+	CHECK_EQ(virtual_master_bring_up(&vm), 0);
+	make_image("7.6");
+	lead(AL_BOOT);
+	check_boxes(0x1a00, 256, 0x1b00, 200);
+	CHECK_STR(write_file().text, "");
+	lead(AL_PREOP);
+	check_boxes(0x1800, 1024, 0x1c00, 1024);
+	CHECK_EQ(read_version(BOARD).slave_code, 0x06020000); /* CoE answers: no such object */
 	close_bench();
 }
 

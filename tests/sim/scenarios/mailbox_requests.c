@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include "base/bytes.h"
-#include "daemon/session_internal.h"
 #include "devices/catalogue.h"
 #include "devices/fb1111_piccolo.h"
 #include "harness/test.h"

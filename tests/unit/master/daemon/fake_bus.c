@@ -228,6 +228,13 @@ int bus_slave_al_read(struct bus *bus, size_t pos, uint8_t ret_al[6], char *erro
 	return 0;
 }
 
+int bus_slave_has_boot(const struct bus *bus, size_t pos)
+{
+	(void)bus;
+	(void)pos;
+	return 1;
+}
+
 int bus_slave_mailbox_program(struct bus *bus, size_t pos, uint16_t state, char *error)
 {
 	(void)bus;
