@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import socket
+from pathlib import Path
 from typing import Any
 
 from segment import Segment, wait_for
@@ -12,6 +13,18 @@ from segment import Segment, wait_for
 # Until something is noticed or repaired, on a loaded machine.
 SECONDS = 60
 CYCLES = 500
+
+
+def tell(control: Path, line: str) -> str:
+    """One line to the control socket of the segment; its answer."""
+    answer = control.with_name("answer")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sock:
+        sock.bind(str(answer))
+        sock.settimeout(30)
+        sock.sendto(line.encode(), str(control))
+        said = sock.recv(4096).decode().strip()
+    answer.unlink()
+    return said
 
 
 class Bus:
@@ -36,13 +49,7 @@ class Bus:
         return [e for e in self.all_events()[self.seen :] if e["event"] == name]
 
     def fault(self, line: str) -> None:
-        answer = self.segment.folder / "answer"
-        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sock:
-            sock.bind(str(answer))
-            sock.settimeout(30)
-            sock.sendto(line.encode(), str(self.control))
-            assert sock.recv(256).decode().strip() == "ok"
-        answer.unlink()
+        assert tell(self.control, line) == "ok"
 
     def wait_for_event(self, name: str, *words: str) -> dict[str, Any]:
         def there() -> dict[str, Any] | None:

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import json
 import signal
-import socket
 import struct
 import subprocess
 import zlib
 from collections.abc import Callable
 from pathlib import Path
 
+from bus import tell
 from segment import BIN, Segment, wait_for
 
 REFUSED = 17
@@ -39,16 +39,6 @@ class Held:
         self.segment.start_waiting_daemon()
         wait_for("PREOP", lambda: self.segment.status().get("state") == "PREOP", 60)
         self.file = self.segment.folder / "firmware.bin"
-
-    def tell(self, line: str) -> str:
-        answer = self.segment.folder / "answer"
-        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sock:
-            sock.bind(str(answer))
-            sock.settimeout(30)
-            sock.sendto(line.encode(), str(self.control))
-            said = sock.recv(4096).decode().strip()
-        answer.unlink()
-        return said
 
     def state(self, slave: str) -> int:
         """AL status, from the register."""
@@ -136,12 +126,12 @@ def test_a_power_cut_in_the_middle_is_reported_and_the_update_can_be_repeated(
     bus = Held(make_segment)
     bus.file.write_bytes(image("7.5", LONG))
     process = bus.start_update()
-    assert bus.tell("at=0s power-off slave=1") == "ok"
+    assert tell(bus.control, "at=0s power-off slave=1") == "ok"
     _, said = process.communicate(timeout=120)
     assert process.returncode == REFUSED
     assert "FoE write of firmware.bin" in said
     assert "slave 1 (piccolo1) does not answer" in said
-    assert bus.tell("at=0s power-on slave=1") == "ok"
+    assert tell(bus.control, "at=0s power-on slave=1") == "ok"
     there = ["reg", "read", "piccolo1", "0x0130"]
     wait_for("slave", lambda: bus.segment.ecdaq(*there, check=False).returncode == 0, 60)
     shown = json.loads(bus.update("--json").stdout)
@@ -152,7 +142,7 @@ def test_a_file_needs_its_password_and_comes_back(
     make_segment: Callable[..., Segment], tmp_path: Path
 ) -> None:
     bus = Held(make_segment, slaves="akd,ek1914")
-    bus.tell("io slave=0 foe.password=4711")
+    tell(bus.control, "io slave=0 foe.password=4711")
     bus.file.write_bytes(bytes(range(256)) * 20)
     got = bus.segment.ecdaq("foe", "write", "0", str(bus.file), "--name", "a.cfg", check=False)
     assert got.returncode == REFUSED
