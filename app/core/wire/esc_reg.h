@@ -15,7 +15,8 @@ enum esc_reg {
 	ESC_REG_SM_COUNT = 0x0005,
 	ESC_REG_RAM_SIZE = 0x0006,        /* KiB */
 	ESC_REG_PORT_DESCRIPTOR = 0x0007, /* 2 bits a port */
-	ESC_REG_FEATURES = 0x0008,        /* 2; bit 2 DC, bit 3 DC 64 bit, bit 9 no LRW */
+	ESC_REG_FEATURES = 0x0008, /* 2; bit 0 FMMUs map bytes only, bit 2 DC, bit 3 DC 64 bit, bit
+				      9 no LRW */
 	ESC_REG_STATION_ADDRESS = 0x0010, /* 2 */
 	ESC_REG_STATION_ALIAS = 0x0012,   /* 2 */
 	ESC_REG_WRITE_ENABLE = 0x0020,
@@ -87,6 +88,7 @@ enum esc_size { ESC_FMMU_BYTES = 16, ESC_SM_BYTES = 8, ESC_PORTS = 4 };
 
 /* Bits of ESC_REG_FEATURES. */
 enum esc_feature {
+	ESC_FEATURE_FMMU_BYTES = 0x0001, /* FMMUs map bytes only */
 	ESC_FEATURE_DC = 0x0004,
 	ESC_FEATURE_DC_64BIT = 0x0008,
 	ESC_FEATURE_NO_LRW = 0x0200, /* LRW is not supported */

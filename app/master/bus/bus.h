@@ -157,10 +157,11 @@ const struct schedule *bus_schedule(const struct bus *bus);
 struct mailbox_engine *bus_mailbox(struct bus *bus);
 /**
  * One pass of what goes on between the polls: the mailboxes, and one frame for all EEPROMs that are
- * being read to identify returned slaves and new devices. In OP once a cycle or so while the
- * mailboxes are busy, else a few times a second.
+ * being read to identify returned slaves and new devices. @ex: the exchange that runs, which shows
+ * which mailboxes are full; NULL: none, they are polled. In OP once a cycle or so while the bus is
+ * busy, else a few times a second.
  */
-void bus_step(struct bus *bus);
+void bus_step(struct bus *bus, const struct exchange *ex);
 int bus_is_busy(const struct bus *bus);
 
 /**

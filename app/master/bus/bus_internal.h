@@ -84,6 +84,7 @@ struct bus_slave {
 	size_t pdo_first;         /* its entries in bus->pdo */
 	size_t pdo_count;
 	int is_mapped_by_coe; /* 0: by its SII */
+	int mailbox_bit;      /* of the mailbox states in the cyclic frames; -1: it has none */
 	enum config_mode mode;
 	struct sync_limits output_sync;
 	struct sync_limits input_sync;
@@ -311,6 +312,14 @@ int bus_startup_poll(struct bus *bus, size_t pos);
 void bus_startup_cancel(struct bus *bus, size_t pos);
 /** Those of all slaves at the same time; blocking. */
 int bus_startup_all(struct bus *bus);
+
+/* --- mailbox_state.c --- */
+
+/** FMMUs of the mailbox states, from @logical_start on: @ret_count bits. 0, or -errno without a
+ * line. */
+int bus_mailbox_state_map(struct bus *bus, uint32_t logical_start, unsigned *ret_count);
+/** The states of the newest frames of @ex, NULL: there are none, go to the mailboxes. */
+void bus_mailbox_state_follow(struct bus *bus, const struct exchange *ex);
 
 /* --- map_sm.c --- */
 

@@ -45,8 +45,10 @@ struct exchange {
 	uint64_t missing;          /* bit per frame of this exchange that is not back */
 	uint64_t history[HISTORY]; /* by sequence: bit per frame that came back */
 	struct dc_track dc;
-	_Atomic int is_reference_doubted;   /* [cycle] */
-	_Atomic int is_reference_confirmed; /* [service] sets, [cycle] takes */
+	_Atomic int is_reference_doubted;                 /* [cycle] */
+	_Atomic int is_reference_confirmed;               /* [service] sets, [cycle] takes */
+	_Atomic uint64_t mailbox_word[LIMIT_SLAVES / 64]; /* [cycle] */
+	_Atomic int64_t mailbox_sent_ns;                  /* [cycle] after the words; 0: none yet */
 	struct path_time path;
 	int64_t wire_ns;               /* of its frames */
 	struct exchange_result result; /* result being built; keeps the counts of a ride for the
@@ -211,6 +213,34 @@ static void keep_monitor(struct exchange *ex, const struct exchange_frame *ef)
 	}
 }
 
+/* Only whole: a slave whose FMMU was lost would seem to have no mail. */
+static void keep_mailboxes(struct exchange *ex, const struct exchange_frame *ef)
+{
+	const uint8_t *data = exchange_data(ex->received, ef->mailboxes);
+	uint32_t bytes = exchange_mailbox_bytes(&ex->plan);
+
+	if (exchange_wkc(ex->received, ef->mailboxes) != ex->plan.mailbox_bits) {
+		return;
+	}
+	for (uint32_t at = 0; at < bytes; at += 8) {
+		uint8_t word[8] = { 0 };
+
+		memcpy(word, data + at, bytes - at < 8 ? bytes - at : 8);
+		atomic_store_explicit(&ex->mailbox_word[at / 8], get_le64(word),
+				      memory_order_relaxed);
+	}
+	atomic_store_explicit(&ex->mailbox_sent_ns, ex->result.sent.ns, memory_order_release);
+}
+
+int exchange_mailboxes(const struct exchange *ex, struct exchange_mailboxes *ret)
+{
+	ret->sent.ns = atomic_load_explicit(&ex->mailbox_sent_ns, memory_order_acquire);
+	for (size_t i = 0; i < LIMIT_SLAVES / 64; i++) {
+		ret->word[i] = atomic_load_explicit(&ex->mailbox_word[i], memory_order_relaxed);
+	}
+	return ret->sent.ns != 0;
+}
+
 int exchange_doubts_reference(const struct exchange *ex)
 {
 	return atomic_load_explicit(&ex->is_reference_doubted, memory_order_acquire);
@@ -246,6 +276,9 @@ static void keep_frame(struct exchange *ex, unsigned number)
 	}
 	if (ef->al != 0) {
 		keep_monitor(ex, ef);
+	}
+	if (ef->mailboxes != 0) {
+		keep_mailboxes(ex, ef);
 	}
 }
 

@@ -3,11 +3,12 @@
  * The cyclic exchange: our own frames, made once, sent every cycle. The first frame carries LRW (or
  * LWR and LRD, for slaves that forbid LRW, of
  * the first part of the process image), FRMW of 0x0910, and, if configured, BRD of 0x0130 and of
- * 0x092C; further frames carry the rest of the image. A SyncManager's buffer is never split (T41).
- * Every datagram's echo is checked (command, index, address, length, and that a slave marked the
- * source address); its index bytes carry a 16-bit exchange sequence, so that a late or doubled
- * frame is recognised, counted and dropped (T05, T06). The reference clock is read with FPRD
- * instead of FRMW in the first cycle and while it does not answer (T17, bus/exchange_dc.h).
+ * 0x092C, and LRD of the mailbox states (bus/mailbox_state.c); further frames carry the rest of the
+ * image. A SyncManager's buffer is never split (T41). Every datagram's echo is checked (command,
+ * index, address, length, and that a slave marked the source address); its index bytes carry a
+ * 16-bit exchange sequence, so that a late or doubled frame is recognised, counted and dropped
+ * (T05, T06). The reference clock is read with FPRD instead of FRMW in the first cycle and while it
+ * does not answer (T17, bus/exchange_dc.h).
  */
 #ifndef BUS_EXCHANGE_H
 #define BUS_EXCHANGE_H
@@ -54,6 +55,16 @@ struct exchange;
 int exchange_doubts_reference(const struct exchange *ex);
 /** The reference has been identified: the next time it gives is right. Context: service thread. */
 void exchange_confirm_reference(struct exchange *ex);
+
+/* Mailbox states, bus/mailbox_state.c. */
+struct exchange_mailboxes {
+	uint64_t word[LIMIT_SLAVES / 64]; /* a bit each: it is full */
+	mono_t sent;                      /* when the frame was, or an older one */
+};
+
+/** The states of the newest frame to which all slaves with a bit answered. 1; 0: there was none.
+ * Context: service thread. */
+int exchange_mailboxes(const struct exchange *ex, struct exchange_mailboxes *ret);
 
 /** Everything is allocated here. Free with exchange_destroy(). */
 int exchange_create(const struct exchange_plan *plan, struct line *line,

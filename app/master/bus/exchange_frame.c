@@ -31,10 +31,15 @@ static int has_dc(const struct exchange_plan *plan, unsigned number)
 	return number == 0 && plan->dc_reference != 0;
 }
 
+static int has_mailboxes(const struct exchange_plan *plan, unsigned number)
+{
+	return number == 0 && plan->mailbox_bits > 0;
+}
+
 /* Two index bytes are needed for the sequence: a lone datagram gets a NOP as companion. */
 static int needs_nop(const struct exchange_plan *plan, unsigned number)
 {
-	return !has_dc(plan, number) && !has_monitor(plan, number);
+	return !has_dc(plan, number) && !has_monitor(plan, number) && !has_mailboxes(plan, number);
 }
 
 uint32_t exchange_frame_capacity(const struct exchange_plan *plan, unsigned number)
@@ -46,6 +51,9 @@ uint32_t exchange_frame_capacity(const struct exchange_plan *plan, unsigned numb
 	}
 	if (has_monitor(plan, number)) {
 		taken += OVERHEAD + EXCHANGE_AL_BYTES + OVERHEAD + EXCHANGE_DIFF_BYTES;
+	}
+	if (has_mailboxes(plan, number)) {
+		taken += OVERHEAD + exchange_mailbox_bytes(plan);
 	}
 	if (needs_nop(plan, number)) {
 		taken += OVERHEAD + EXCHANGE_NOP_BYTES;
@@ -157,6 +165,11 @@ int exchange_frame_build(const struct exchange_plan *plan, unsigned number,
 		ret->diff =
 			add(ret, &fb, ECAT_CMD_BRD,
 			    register_address(0, ESC_REG_DC_SYSTEM_TIME_DIFF), EXCHANGE_DIFF_BYTES);
+	}
+	if (has_mailboxes(plan, number)) {
+		ret->mailboxes =
+			add(ret, &fb, ECAT_CMD_LRD, plan->logical_start + plan->image_bytes,
+			    (uint16_t)exchange_mailbox_bytes(plan));
 	}
 	while (ret->datagram_count < 2) {
 		add(ret, &fb, ECAT_CMD_NOP, 0, EXCHANGE_NOP_BYTES);

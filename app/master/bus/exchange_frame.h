@@ -41,9 +41,10 @@ struct exchange_frame {
 	unsigned datagram_count;
 	struct exchange_part part[EXCHANGE_PARTS];
 	unsigned part_count;
-	size_t dc;   /* FRMW or FPRD of 0x0910 */
-	size_t al;   /* BRD of 0x0130 */
-	size_t diff; /* BRD of 0x092C */
+	size_t dc;        /* FRMW or FPRD of 0x0910 */
+	size_t al;        /* BRD of 0x0130 */
+	size_t diff;      /* BRD of 0x092C */
+	size_t mailboxes; /* LRD of their states */
 };
 
 /** How many process data bytes fit into frame @number of @plan, in one datagram; each further one

@@ -26,12 +26,19 @@ struct exchange_plan {
 	uint8_t chunk_frame[LIMIT_CHUNKS];           /* which frame carries it, ascending */
 	struct slave_set chunk_slaves[LIMIT_CHUNKS]; /* whose data it has */
 	uint16_t wkc_expected;                       /* sum, with every slave in SAFE-OP or OP */
+	uint16_t mailbox_bits;                       /* mailbox states behind the image; 0: none */
 	uint16_t dc_reference; /* station address of the reference clock; 0: no DC */
 	uint16_t slave_count;
 	int is_split; /* 1: a chunk a slave; those with a good WKC are taken though others have not
 		       */
 	int monitor;  /* 1: BRD of AL status and DC difference */
 };
+
+/** Bytes of the mailbox states. */
+static inline uint32_t exchange_mailbox_bytes(const struct exchange_plan *plan)
+{
+	return (plan->mailbox_bits + 7u) / 8;
+}
 
 /** How many frames an exchange has. */
 static inline unsigned exchange_frame_count(const struct exchange_plan *plan)

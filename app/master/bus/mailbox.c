@@ -71,8 +71,9 @@ struct mailbox_engine *bus_mailbox(struct bus *bus)
 	return bus->mailbox;
 }
 
-void bus_step(struct bus *bus)
+void bus_step(struct bus *bus, const struct exchange *ex)
 {
+	bus_mailbox_state_follow(bus, ex);
 	mailbox_step(bus->mailbox);
 	bus_guests_step(bus);
 }

@@ -176,12 +176,19 @@ static int build_channels(struct bus *bus, struct layout *lay)
 
 static int build_plan(struct bus *bus, const struct plan_area *area, size_t area_count)
 {
+	const ec_groupt *group = &bus->group[0];
+	unsigned mailbox_bits = 0;
 	int blocked = -1;
 
+	if (bus_mailbox_state_map(bus, group->logstartaddr + group->Obytes + group->Ibytes,
+				  &mailbox_bits) < 0) {
+		return bus_fail(bus, -EIO, "FMMUs of the mailbox states: frames are lost");
+	}
 	bus->plan = (struct exchange_plan){
-		.image_bytes = bus->group[0].Obytes + bus->group[0].Ibytes,
-		.output_bytes = bus->group[0].Obytes,
-		.logical_start = bus->group[0].logstartaddr,
+		.image_bytes = group->Obytes + group->Ibytes,
+		.output_bytes = group->Obytes,
+		.logical_start = group->logstartaddr,
+		.mailbox_bits = (uint16_t)mailbox_bits,
 		.slave_count = (uint16_t)bus->slave_count,
 		.is_split = bus->cfg->bus_datagrams == CONFIG_DATAGRAMS_PER_SLAVE,
 		.monitor = (int)bus->cfg->bus_monitor,

@@ -369,7 +369,7 @@ int session_service(struct session *session, struct failure *failure)
 		session_listen(s);
 	}
 	if (s->bus != NULL) {
-		bus_step(s->bus);
+		bus_step(s->bus, s->is_riding ? s->exchange : NULL);
 	}
 	s->is_wkc_alarming = is_wkc_alarming(s);
 	if (now.ns >= s->next_watch.ns || s->is_wkc_alarming ||

@@ -30,6 +30,9 @@ enum {
 #define IDLE_LAST_NS (100 * NS_PER_MS)
 #define REFUSED_LAST_NS (2 * NS_PER_MS)
 #define REPEAT_NS NS_PER_S
+/* No newer state in cyclic frames for so long: polled again; sooner while an answer is awaited. */
+#define HINT_NS (20 * NS_PER_MS)
+#define HINT_AWAIT_NS (4 * NS_PER_MS)
 
 static uint16_t sm_register(unsigned sm, unsigned offset)
 {
@@ -44,8 +47,7 @@ void box_reset(struct mailbox_engine *mb, struct box_slave *sl, mono_t now)
 	/* The counter goes on: a slave that still knows the last mail must not take the next for
 	 * it. */
 	sl->writer = (struct box_writer){ .counter = counter, .serial = ++mb->serial };
-	sl->reader = (struct box_reader){ .is_hinted = rd->is_hinted,
-					  .is_full_hint = rd->is_full_hint,
+	sl->reader = (struct box_reader){ .hint_sent = rd->hint_sent,
 					  .is_counting = 1,
 					  .poll_at = now,
 					  .idle = { IDLE_FIRST_NS },
@@ -88,9 +90,16 @@ static uint16_t stroke(const struct mailbox_engine *mb, size_t left)
 
 /* --- reader --- */
 
+static int is_hinted(const struct box_slave *sl, mono_t now)
+{
+	int64_t limit_ns = sl->awaited > 0 ? HINT_AWAIT_NS : HINT_NS;
+
+	return sl->reader.hint_sent.ns != 0 && mono_sub(now, sl->reader.hint_sent).ns < limit_ns;
+}
+
 static int is_poll_due(const struct box_slave *sl, mono_t now)
 {
-	if (sl->reader.is_hinted && sl->drain == 0) {
+	if (is_hinted(sl, now) && sl->drain == 0) {
 		return 0;
 	}
 	return now.ns >= sl->reader.poll_at.ns;
@@ -98,6 +107,7 @@ static int is_poll_due(const struct box_slave *sl, mono_t now)
 
 static void begin_read(struct box_reader *rd)
 {
+	rd->is_full_hint = 0;
 	rd->step = READER_READ;
 	rd->pos = 0;
 	rd->is_taken = 0;
@@ -135,8 +145,7 @@ static int add_reader(struct mailbox_engine *mb, uint16_t pos, mono_t now)
 	uint8_t *data;
 	size_t at = 0;
 
-	if (rd->step == READER_IDLE && rd->is_hinted && rd->is_full_hint && sl->drain == 0) {
-		rd->is_full_hint = 0;
+	if (rd->step == READER_IDLE && rd->is_full_hint && sl->drain == 0) {
 		begin_read(rd);
 	}
 	switch (rd->step) {
@@ -145,7 +154,11 @@ static int add_reader(struct mailbox_engine *mb, uint16_t pos, mono_t now)
 			return 0;
 		}
 		fl.kind = FLIGHT_POLL;
-		return add(mb, &fl, ECAT_CMD_FPRD, station, sm_register(1, SM_STATUS)) == NULL;
+		if (add(mb, &fl, ECAT_CMD_FPRD, station, sm_register(1, SM_STATUS)) == NULL) {
+			return 1;
+		}
+		sl->counters.polls++;
+		return 0;
 	case READER_READ:
 		fl.kind = FLIGHT_READ;
 		fl.len = next_read(mb, sl, &at);
@@ -253,6 +266,7 @@ static void read_done(struct mailbox_engine *mb, uint16_t pos, const struct flig
 
 	if (rd->is_taken) { /* the last byte of the box: it is free */
 		rd->step = READER_IDLE;
+		rd->emptied_at = now;
 		return;
 	}
 	memcpy(rd->mail + rd->pos, data, fl->len);
@@ -266,6 +280,7 @@ static void read_done(struct mailbox_engine *mb, uint16_t pos, const struct flig
 	}
 	if (is_end && rd->serial == serial) {
 		rd->step = READER_IDLE;
+		rd->emptied_at = now;
 	}
 }
 

@@ -538,13 +538,13 @@ int mailbox_wait_all(struct mailbox_engine *mb)
 	return 0;
 }
 
-void mailbox_status_hint(struct mailbox_engine *mb, uint16_t slave_pos, int is_full)
+void mailbox_status_hint(struct mailbox_engine *mb, uint16_t slave_pos, int is_full, mono_t sent)
 {
 	struct box_slave *sl = slave_at(mb, slave_pos);
 
 	if (sl != NULL) {
-		sl->reader.is_hinted = 1;
-		sl->reader.is_full_hint = (uint8_t)is_full;
+		sl->reader.hint_sent = sent;
+		sl->reader.is_full_hint = is_full && sent.ns > sl->reader.emptied_at.ns;
 	}
 }
 

@@ -179,8 +179,9 @@ int mailbox_wait(struct mailbox_engine *mb, struct mailbox_request *rq);
 /** The same until no request runs: 0 or -ECANCELED. */
 int mailbox_wait_all(struct mailbox_engine *mb);
 
-/** SM1's state, seen in a cyclic frame (FMMU onto 0x080D): this slave is not polled any more. */
-void mailbox_status_hint(struct mailbox_engine *mb, uint16_t slave_pos, int is_full);
+/** SM1's state, seen in a cyclic frame sent at @sent (FMMU onto 0x080D): this slave is not polled
+ * until no newer one has come for long. */
+void mailbox_status_hint(struct mailbox_engine *mb, uint16_t slave_pos, int is_full, mono_t sent);
 
 /** Mails of @type that no request takes: emergencies, EoE frames, notifications. NULL: dropped. */
 void mailbox_sink_set(struct mailbox_engine *mb, enum mailbox_type type,
@@ -197,6 +198,7 @@ struct mailbox_counters {
 	uint64_t recovered; /* read again by a repeat request */
 	uint64_t lost;      /* gone: the slave had put the next one in before it was asked again */
 	uint64_t timeouts;  /* requests that ended with -ETIMEDOUT */
+	uint64_t polls;     /* datagrams that only looked whether there is mail */
 };
 
 const struct mailbox_counters *mailbox_counters_of(const struct mailbox_engine *mb,

@@ -54,9 +54,10 @@ struct box_reader {
 	mono_t repeat_until;
 	mono_t poll_at;
 	span_t idle;
-	uint8_t is_hinted;
+	mono_t hint_sent; /* frame of the newest hint */
 	uint8_t is_full_hint;
-	uint8_t counter; /* of the mail before */
+	mono_t emptied_at; /* hints of frames before say nothing */
+	uint8_t counter;   /* of the mail before */
 	uint8_t has_mail;
 	uint8_t is_counting;
 	uint64_t hash; /* of the mail before */

@@ -146,7 +146,7 @@ static void watch(struct hostile *h, struct line *line, struct bus *bus)
 		bus_watch(bus, &page, ignore_event, NULL, &report);
 		must(memchr(report.trouble, '\0', sizeof(report.trouble)) != NULL);
 		must(bus_map_check(bus, who, sizeof(who)) == (who[0] != '\0'));
-		bus_step(bus);
+		bus_step(bus, NULL);
 		line_sleep(line, (span_t){ LOOK_NS });
 	}
 }

@@ -350,7 +350,7 @@ void bench_run(struct bus_bench *b, unsigned count)
 {
 	for (unsigned i = 0; i < count; i++) {
 		one_cycle(b);
-		bus_step(b->bus);
+		bus_step(b->bus, b->ex);
 	}
 }
 

@@ -6,7 +6,9 @@
 #include "harness/test.h"
 #include "mailbox/mailbox.h"
 #include "sim/bus/bus_bench.h"
+#include "wire/datagram.h"
 #include "wire/esc_reg.h"
+#include "wire/sii.h"
 
 enum {
 	SM_IN = ESC_REG_SM + ESC_SM_BYTES,
@@ -366,6 +368,104 @@ TEST(mailbox, sdo_transfers_to_64_slaves_at_once_are_20_times_as_many_as_one_at_
 	printf("SDO transfers/s: %.0f one at a time, %.0f to 64 slaves at once: %.1f times\n",
 	       single, all, all / single);
 	CHECK(all >= 20 * single);
+}
+
+/* --- the states of the mailboxes in the cyclic frames --- */
+
+/* A byte of the slave's registers, behind the master's back. */
+static void write_register(struct bus_bench *b, size_t slave, uint16_t reg, uint8_t value)
+{
+	static const uint8_t source[6] = { 0x10 };
+	uint8_t frame[ECAT_FRAME_MAX_BYTES];
+	struct ecat_frame_builder fb;
+	int64_t back_ns;
+	size_t count;
+	uint8_t *data;
+
+	ecat_frame_begin(&fb, frame, source);
+	data = ecat_frame_add(&fb, ECAT_CMD_FPWR, 0, bus_slaves(b->bus, &count)[slave].station_addr,
+			      reg, 1);
+	CHECK(data != NULL);
+	*data = value;
+	CHECK_EQ(segment_frame(b->segment, bench_now_ns(b), frame, ecat_frame_end(&fb), &back_ns),
+		 0);
+}
+
+static uint64_t count_polls(struct bus_bench *b, unsigned slaves)
+{
+	uint64_t polls = 0;
+
+	for (uint16_t i = 0; i < slaves; i++) {
+		polls += mailbox_counters_of(bus_mailbox(b->bus), i)->polls;
+	}
+	return polls;
+}
+
+static uint64_t polls_in(struct bus_bench *b, unsigned slaves, unsigned cycles)
+{
+	uint64_t before = count_polls(b, slaves);
+
+	bench_run(b, cycles);
+	return count_polls(b, slaves) - before;
+}
+
+/* A slave whose FMMU is off would seem to have no mail for ever: all are polled then. */
+TEST(mailbox, states_of_64_mailboxes_come_in_the_cyclic_frame_and_no_slave_is_polled)
+{
+	enum { CYCLES = 1000, SLAVE = 17, FMMU_ON = ESC_REG_FMMU + 2 * ESC_FMMU_BYTES + 12 };
+	struct bus_bench *b = start(STORM_SLAVES, 121);
+	uint64_t hinted;
+	uint64_t polled;
+
+	CHECK_EQ(bus_plan(b->bus)->mailbox_bits, STORM_SLAVES);
+	CHECK_EQ(segment_esc(b->segment, SLAVE)->reg[FMMU_ON], 1);
+	hinted = polls_in(b, STORM_SLAVES, CYCLES);
+	CHECK_EQ(bus_plan(b->bus)->wkc_expected, b->last.wkc);
+	write_register(b, SLAVE, FMMU_ON, 0);
+	bench_run(b, 30);
+	polled = polls_in(b, STORM_SLAVES, CYCLES);
+	printf("%u slaves in OP, %u cycles: %u datagrams that poll mailboxes, %u without their "
+	       "states in the frame\n",
+	       STORM_SLAVES, CYCLES, (unsigned)hinted, (unsigned)polled);
+	CHECK_EQ(hinted, 0);
+	CHECK(polled >= STORM_SLAVES * CYCLES / 110);
+	CHECK_EQ(b->wkc_low, 0); /* it is no process data */
+	segment_power_off(b->segment, SLAVE, bench_now_ns(b));
+	for (unsigned i = 0; i < 5; i++) {
+		bench_run(b, 50);
+		bench_watch(b);
+	}
+	segment_power_on(b->segment, SLAVE, bench_now_ns(b));
+	bench_recover(b, 6000);
+	bench_run(b, 30);
+	CHECK_EQ(polls_in(b, STORM_SLAVES, CYCLES), 0);
+	bench_destroy(b);
+}
+
+TEST(mailbox, a_slave_that_cannot_map_its_mailbox_state_is_polled)
+{
+	enum { SLAVES = 4, UNDECLARED = 1, BYTES_ONLY = 2, MAILBOX_STATE = 3, UNUSED = 0xff };
+	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = SLAVES, .seed = 123 });
+	struct esc *esc = segment_esc(b->segment, UNDECLARED);
+	size_t offset;
+	size_t bytes;
+
+	CHECK_EQ(sii_find_category(esc->sii, esc->sii_bytes, SII_CATEGORY_FMMU, &offset, &bytes),
+		 0);
+	CHECK_EQ(esc->sii[offset + 2], MAILBOX_STATE);
+	esc->sii[offset + 2] = UNUSED;
+	segment_esc(b->segment, BYTES_ONLY)->reg[ESC_REG_FEATURES] |= ESC_FEATURE_FMMU_BYTES;
+	bench_bring_up(b);
+	bench_run(b, 300);
+	CHECK_EQ(bus_plan(b->bus)->mailbox_bits, SLAVES - 2);
+	for (uint16_t i = 0; i < SLAVES; i++) {
+		uint64_t before = mailbox_counters_of(bus_mailbox(b->bus), i)->polls;
+
+		bench_run(b, 300);
+		CHECK_EQ(mailbox_counters_of(bus_mailbox(b->bus), i)->polls > before,
+			 i == UNDECLARED || i == BYTES_ONLY);
+	}
+	bench_destroy(b);
 }
 
 /* D2 */

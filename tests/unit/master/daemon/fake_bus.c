@@ -349,11 +349,12 @@ int bus_is_busy(const struct bus *bus)
 	return sdo != NULL;
 }
 
-void bus_step(struct bus *bus)
+void bus_step(struct bus *bus, const struct exchange *ex)
 {
 	struct mailbox_request *rq = sdo;
 
 	(void)bus;
+	(void)ex;
 	if (rq == NULL) {
 		return;
 	}
