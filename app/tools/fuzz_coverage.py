@@ -38,7 +38,6 @@ PARSERS: dict[str, tuple[str, ...]] = {
         "core/wire/eoe.c",
     ),
     "sii": ("core/wire/sii.c",),
-    "pcapng": ("core/wire/pcapng.c",),
     "catalogue": ("sim/devices/slave_model_parse.c", "sim/devices/model_text.c"),
     "mcap": tuple(
         f"services/record/{name}.c"

@@ -5,10 +5,10 @@
 #include <sys/stat.h>
 
 #include "base/bytes.h"
+#include "harness/pcapng.h"
 #include "harness/test.h"
 #include "wire/datagram.h"
 #include "wire/esc_reg.h"
-#include "wire/pcapng.h"
 #include "wire/sii.h"
 
 enum { EEPROM_BYTES = 2048, PATH_BYTES = 1024 };

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "wire/pcapng.h"
+#include "harness/pcapng.h"
 
 struct capture {
 	struct platform platform;

@@ -4,8 +4,8 @@
 #include <errno.h>
 
 #include "capture.h"
+#include "harness/pcapng.h"
 #include "harness/test.h"
-#include "wire/pcapng.h"
 #include "wire/sii.h"
 
 static struct sii sii;

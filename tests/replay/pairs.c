@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 #include "base/bytes.h"
 #include "capture.h"
+#include "harness/pcapng.h"
 #include "harness/test.h"
 #include "wire/datagram.h"
 #include "wire/esc_reg.h"
-#include "wire/pcapng.h"
 
 enum { OPEN_MAX = 64 };
 

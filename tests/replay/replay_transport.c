@@ -8,9 +8,9 @@
 
 #include "base/bytes.h"
 #include "base/limits.h"
+#include "harness/pcapng.h"
 #include "wire/datagram.h"
 #include "wire/echo.h"
-#include "wire/pcapng.h"
 
 enum { SOURCE = 6, SOURCE_BYTES = 6, PASSED_A_SLAVE = 0x02, QUEUE = 16, TROUBLE_BYTES = 160 };
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "wire/pcapng.h"
+#include "harness/pcapng.h"
 
 #include <errno.h>
 #include <string.h>

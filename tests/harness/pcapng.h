@@ -4,8 +4,8 @@
  * byte order, any time resolution; block types that are not needed are passed over. Bytes may be
  * anything: every length is checked against the buffer. Context: any; nothing allocates.
  */
-#ifndef WIRE_PCAPNG_H
-#define WIRE_PCAPNG_H
+#ifndef HARNESS_PCAPNG_H
+#define HARNESS_PCAPNG_H
 
 #include <stddef.h>
 #include <stdint.h>
