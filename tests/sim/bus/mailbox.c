@@ -442,6 +442,31 @@ TEST(mailbox, states_of_64_mailboxes_come_in_the_cyclic_frame_and_no_slave_is_po
 	bench_destroy(b);
 }
 
+TEST(mailbox, mail_is_noticed_within_two_cycles)
+{
+	enum { MAILS = 50 };
+	struct bus_bench *b = start(STORM_SLAVES, 122);
+
+	bench_run(b, 300);
+	for (unsigned i = 0; i < MAILS; i++) {
+		uint16_t slave = (uint16_t)(i * 7 % STORM_SLAVES);
+		uint64_t before = mailbox_counters_of(bus_mailbox(b->bus), slave)->received;
+		uint64_t from = b->cycles;
+
+		put_emergency(b, slave);
+		while (mailbox_counters_of(bus_mailbox(b->bus), slave)->received == before) {
+			CHECK(b->cycles - from < 4);
+			bench_run(b, 1);
+		}
+		/* The frame that shows it, the one that reads it, and its answer. */
+		CHECK(b->cycles - from <= 3);
+		bench_run(b, i % 5);
+	}
+	CHECK_EQ(heard.count[EVENT_EMERGENCY], MAILS);
+	CHECK_EQ(polls_in(b, STORM_SLAVES, 10), 0);
+	bench_destroy(b);
+}
+
 TEST(mailbox, a_slave_that_cannot_map_its_mailbox_state_is_polled)
 {
 	enum { SLAVES = 4, UNDECLARED = 1, BYTES_ONLY = 2, MAILBOX_STATE = 3, UNUSED = 0xff };
