@@ -37,6 +37,10 @@ PARSERS: dict[str, tuple[str, ...]] = {
         *(f"master/mailbox/{name}_client.c" for name in ("foe", "soe", "eoe", "aoe", "voe")),
         "core/wire/eoe.c",
     ),
+    "gateway": (
+        "master/network/gateway_frame.c",
+        *(f"master/mailbox/{name}.c" for name in ("raw_client", "raw_match")),
+    ),
     "sii": ("core/wire/sii.c",),
     "catalogue": ("sim/devices/slave_model_parse.c", "sim/devices/model_text.c"),
     "mcap": tuple(

@@ -39,10 +39,11 @@ MODULES: dict[str, dict[str, set[str]]] = {
         "link": {"base", "wire", "image"},
         "mailbox": {"base", "wire"},
         "bus": {"base", "wire", "config", "image", "link", "mailbox"},
+        "network": {"base", "wire", "mailbox"},
         "cycle": {"base", "wire", "config", "image", "link", "bus", "control"},
         "admin": {"base", "wire", "config", "image", "cycle"},
         "daemon": {"base", "wire", "config", "image", "link", "bus", "control", "cycle", "admin"}
-        | {"mailbox", "program"},
+        | {"mailbox", "network", "program"},
     },
     "services": {
         "record": READERS,

@@ -48,6 +48,8 @@ static const struct {
 	[EVENT_SLAVE_UNREADABLE] = { "slave_unreadable", EVENT_ERROR },
 	[EVENT_SLAVE_ABSENT] = { "slave_absent", EVENT_WARNING },
 	[EVENT_SM_LENGTH] = { "sm_length", EVENT_NOTICE },
+	[EVENT_GATEWAY_LOST] = { "gateway_lost", EVENT_NOTICE },
+	[EVENT_EOE_LOST] = { "eoe_lost", EVENT_NOTICE },
 	[EVENT_SLAVE_ALARM] = { "slave_alarm", EVENT_ERROR },
 	[EVENT_DC_DIFF_HIGH] = { "dc_diff_high", EVENT_WARNING },
 	[EVENT_OP_LOST] = { "op_lost", EVENT_WARNING },
@@ -356,6 +358,18 @@ static int format_alarm(const struct event *ev, char *buf, size_t buf_len)
 }
 
 /* NOLINTNEXTLINE(readability-function-size): a table, one text an event */
+static int format_eoe(const struct event *ev, char *buf, size_t buf_len)
+{
+	char of[32] = "";
+
+	if (ev->slave_pos != EVENT_NO_SLAVE) {
+		snprintf(of, sizeof(of), ", the newest of slave %u", ev->slave_pos);
+	}
+	return snprintf(buf, buf_len,
+			"EoE: %" PRId32 " frames lost, %" PRId32 " fragments or frames rejected%s",
+			ev->arg[0], ev->arg[1], of);
+}
+
 int event_format(const struct event *ev, char *buf, size_t buf_len)
 {
 	const int32_t *a = ev->arg;
@@ -477,6 +491,14 @@ int event_format(const struct event *ev, char *buf, size_t buf_len)
 				"slave %u: %" PRId32 " bytes are mapped to SM%" PRId32
 				" by CoE, %" PRId64 " by its SII: CoE is used",
 				slave, a[1], a[0], ev->value);
+	case EVENT_GATEWAY_LOST:
+		return snprintf(buf, buf_len,
+				"mailbox gateway: %" PRId32
+				" mails not answered by the slave, %" PRId32
+				" mails dropped, %" PRId64 " connections closed",
+				a[0], a[1], ev->value);
+	case EVENT_EOE_LOST:
+		return format_eoe(ev, buf, buf_len);
 	case EVENT_SLAVE_ALARM:
 		return format_alarm(ev, buf, buf_len);
 	case EVENT_SDO_ABORT:

@@ -72,6 +72,9 @@ enum event_id {
 	EVENT_SLAVE_ABSENT, /* arg: item of slaves[], optional, that was not found */
 	EVENT_DC_DIFF_HIGH, /* value: cycle; arg: |0x092C| of all slaves ORed ns, limit ns */
 	EVENT_SM_LENGTH,    /* slave; arg: SyncManager, bytes mapped by CoE; value: bytes by SII */
+	EVENT_GATEWAY_LOST, /* arg: mails without an answer, dropped; value: connections closed */
+	EVENT_EOE_LOST, /* slave of the newest one rejected, or none; arg: frames lost, fragments
+			   and frames of slaves rejected */
 	EVENT_COUNT,
 };
 

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "config/gateway.h"
 #include "config/option.h"
 #include "config/sdo_value.h"
 
@@ -29,6 +30,8 @@ static int line_of(const struct option_lines *lines, const char *name)
 static int check_relations(const struct config *cfg, const struct option_lines *lines,
 			   const char **ret_key, int *ret_line, char *reason)
 {
+	struct sockaddr_in6 address;
+	socklen_t address_bytes;
 	const struct relation relations[] = {
 		{ "bus.watchdog", "cycle.period",
 		  cfg->bus_watchdog_ns == 0 || cfg->bus_watchdog_ns >= 3 * cfg->cycle_period_ns,
@@ -69,6 +72,12 @@ static int check_relations(const struct config *cfg, const struct option_lines *
 		  "must be 0B or at least record.rotate_size" },
 		{ "record.dir", "record.enable", !cfg->record_enable || cfg->record_dir[0] != '\0',
 		  "is required while record.enable is on" },
+		{ "gateway.listen", "gateway.listen",
+		  config_gateway_address(cfg, &address, &address_bytes) >= 0,
+		  "expected off, loopback, or an IPv4 or IPv6 address" },
+		{ "eoe.interface", "bus.interface",
+		  cfg->eoe_interface[0] == '\0' || strcmp(cfg->eoe_interface, cfg->interface) != 0,
+		  "is bus.interface, which is for EtherCAT alone" },
 	};
 
 	for (size_t i = 0; i < sizeof(relations) / sizeof(relations[0]); i++) {

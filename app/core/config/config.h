@@ -131,6 +131,11 @@ struct config {
 	int64_t control_budget_ns;
 	enum config_overrun control_overrun;
 	int64_t control_stuck_ns; /* timeout of one call: the process ends */
+	/* gateway */
+	char gateway_listen[64]; /* off, loopback or an address */
+	uint32_t gateway_port;
+	/* eoe */
+	char eoe_interface[32]; /* TAP device; "" = none */
 	/* ring */
 	int64_t ring_depth_ns;
 	uint32_t event_depth;

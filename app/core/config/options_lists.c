@@ -8,6 +8,8 @@ const struct option_section option_sections[] = {
 	{ "cycle", "The real-time loop." },
 	{ "dc", "Distributed clocks: how the master follows the reference clock." },
 	{ "control", "Your own program in the cycle (control.md)." },
+	{ "gateway", "Mailboxes of slaves over UDP and TCP (ETG.8200)." },
+	{ "eoe", "Ethernet over EtherCAT." },
 	{ "ring", "Shared memory between ecdaqd and its readers." },
 	{ "record", "Recording to local storage (ecdaq-record)." },
 	{ "dds", "Data and commands over DDS (ecdaq-dds)." },

@@ -324,6 +324,31 @@ static const struct option rows[] = {
 	  .unit = "ms",
 	  .prose = "Timeout of a call that does not return: ecdaqd ends at once, and the "
 		   "slaves' watchdogs keep the outputs safe." },
+	/* gateway */
+	{ .name = "gateway.listen",
+	  .type = OPTION_TEXT,
+	  FIELD(gateway_listen),
+	  .default_value = "off",
+	  .prose =
+		  "Mailbox gateway for configuration tools. off: none. loopback: on 127.0.0.1, for "
+		  "every program of this machine. An IPv4 or IPv6 address of this machine: for "
+		  "everyone who reaches it; there is no password." },
+	{ .name = "gateway.port",
+	  .type = OPTION_UINT,
+	  FIELD(gateway_port),
+	  .default_value = "34980",
+	  .min = "1",
+	  .max = "65535",
+	  .prose = "UDP and TCP port of the mailbox gateway. 34980 (0x88A4) is the one that tools "
+		   "expect." },
+	/* eoe */
+	{ .name = "eoe.interface",
+	  .type = OPTION_NAME,
+	  FIELD(eoe_interface),
+	  .default_value = "",
+	  .prose = "TAP device of this machine that is switched to all slaves with EoE. One that "
+		   "does not exist is created if ecdaqd may do so (CAP_NET_ADMIN). Empty: EoE "
+		   "frames of slaves are dropped." },
 	/* ring */
 	{ .name = "ring.depth",
 	  .type = OPTION_DURATION,

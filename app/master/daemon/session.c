@@ -5,6 +5,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/epoll.h>
+#include <unistd.h>
 
 #include "daemon/session_internal.h"
 
@@ -260,12 +262,13 @@ span_t session_unattended(const struct session *session)
 
 int session_fd(const struct session *session)
 {
-	return admin_server_fd(session->admin);
+	return session->poller;
 }
 
 int session_is_pressed(const struct session *session)
 {
-	return session->replies_waiting > 0 || (session->is_riding && bus_is_busy(session->bus));
+	return session->replies_waiting > 0 || networks_are_busy(session->networks) ||
+	       (session->is_riding && bus_is_busy(session->bus));
 }
 
 /* --- life --- */
@@ -287,6 +290,29 @@ static int open_sockets(struct session *s, char *error, size_t error_bytes)
 						error, error_bytes);
 }
 
+static int watch_sockets(struct session *s, struct failure *failure)
+{
+	const int fds[] = { admin_server_fd(s->admin), networks_fd(s->networks) };
+
+	s->poller = epoll_create1(EPOLL_CLOEXEC);
+	for (size_t i = 0; i < sizeof(fds) / sizeof(fds[0]); i++) {
+		struct epoll_event interest = { .events = EPOLLIN };
+
+		if (s->poller < 0 || epoll_ctl(s->poller, EPOLL_CTL_ADD, fds[i], &interest) < 0) {
+			return failure_set(failure, EXIT_CODE_RESOURCES, -errno, "epoll: %s",
+					   strerror(errno));
+		}
+	}
+	return 0;
+}
+
+static int open_networks(struct session *s, struct failure *failure)
+{
+	int r = networks_open(s->spec.cfg, &s->networks, failure);
+
+	return r < 0 ? r : watch_sockets(s, failure);
+}
+
 int session_create(const struct session_spec *spec, struct session **ret_session,
 		   struct failure *failure)
 {
@@ -299,6 +325,7 @@ int session_create(const struct session_spec *spec, struct session **ret_session
 	}
 	memset(s, 0, sizeof(*s));
 	s->spec = *spec;
+	s->poller = -1;
 	r = run_dir_open(&s->run, spec->cfg, &spec->platform, spec->segment, failure);
 	if (r < 0) {
 		session_destroy(s);
@@ -312,6 +339,11 @@ int session_create(const struct session_spec *spec, struct session **ret_session
 				   r == -EACCES || r == -EPERM ? EXIT_CODE_PERMISSION
 							       : EXIT_CODE_CONFIG,
 				   r, "%s", error);
+	}
+	r = open_networks(s, failure);
+	if (r < 0) {
+		session_destroy(s);
+		return r;
 	}
 	*ret_session = s;
 	return 0;
@@ -350,7 +382,11 @@ void session_destroy(struct session *session)
 		return;
 	}
 	session_drop(session);
+	networks_close(session->networks);
 	admin_server_destroy(session->admin);
+	if (session->poller >= 0) {
+		close(session->poller);
+	}
 	run_dir_close(&session->run);
 	free(session);
 }

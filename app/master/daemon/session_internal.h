@@ -11,6 +11,7 @@
 #include "bus/exchange.h"
 #include "control/program.h"
 #include "daemon/event_queue.h"
+#include "daemon/networks.h"
 #include "daemon/run_dir.h"
 #include "daemon/session.h"
 #include "link/line.h"
@@ -22,6 +23,8 @@ struct session {
 	struct session_spec spec;
 	struct run_dir run;
 	struct admin_server *admin;
+	struct networks *networks;
+	int poller;             /* of both */
 	_Atomic int stop_asked; /* [any] */
 	mono_t stop_by; /* 0: not stopping; else nothing on the wire is waited for any longer */
 	_Atomic int clear_asked; /* [service] set; [cycle] reset */

@@ -53,6 +53,7 @@ int session_stop(struct session *session, struct failure *failure)
 	}
 	s->stop_by = mono_add(session_now(s), (span_t){ STOP_NS });
 	admin_server_cancel_all(s->admin);
+	networks_detach(s->networks);
 	if (s->is_riding) {
 		make_outputs_safe(s);
 		r = bus_stop_outputs(s->bus, error);
@@ -93,6 +94,7 @@ void session_drop(struct session *session)
 		s->samples = NULL;
 	}
 	session_sii_end(s);
+	networks_detach(s->networks);
 	bus_destroy(s->bus);
 	s->bus = NULL;
 	if (s->line != NULL) {

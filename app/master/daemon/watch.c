@@ -352,6 +352,16 @@ static enum session_result watch(struct session *s)
 	return session_watch(s);
 }
 
+static void serve_networks(struct session *s, mono_t now)
+{
+	struct event ev;
+
+	networks_service(s->networks, s->bus, now);
+	while (networks_report(s->networks, now, &ev)) {
+		session_emit(s, &ev);
+	}
+}
+
 int session_service(struct session *session, struct failure *failure)
 {
 	struct session *s = session;
@@ -368,6 +378,7 @@ int session_service(struct session *session, struct failure *failure)
 	if (s->is_riding) {
 		session_listen(s);
 	}
+	serve_networks(s, now);
 	if (s->bus != NULL) {
 		bus_step(s->bus, s->is_riding ? s->exchange : NULL);
 	}

@@ -37,3 +37,17 @@ TEST(event, a_shot_has_its_distance_or_a_bound_if_unresolved)
 	CHECK_STR(text, "slave 3, line 2: one-shot for DC time 845 came; distance below 50 ns "
 			"(unresolved)");
 }
+
+TEST(event, losses_of_eoe_name_the_slave_if_one_sent_what_was_rejected)
+{
+	struct event ev = { .id = EVENT_EOE_LOST, .slave_pos = 4, .arg = { 3, 2 } };
+	char text[128];
+
+	event_format(&ev, text, sizeof(text));
+	CHECK_STR(text,
+		  "EoE: 3 frames lost, 2 fragments or frames rejected, the newest of slave 4");
+	ev.slave_pos = EVENT_NO_SLAVE;
+	ev.arg[1] = 0;
+	event_format(&ev, text, sizeof(text));
+	CHECK_STR(text, "EoE: 3 frames lost, 0 fragments or frames rejected");
+}

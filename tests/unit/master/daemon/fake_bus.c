@@ -343,6 +343,12 @@ void bus_mailbox_cancel(struct bus *bus, struct mailbox_request *rq)
 	rq->done(rq->ctx, rq);
 }
 
+struct mailbox_engine *bus_mailbox(struct bus *bus)
+{
+	(void)bus;
+	return NULL;
+}
+
 int bus_is_busy(const struct bus *bus)
 {
 	(void)bus;

@@ -1,0 +1,31 @@
+/* SPDX-License-Identifier: MIT */
+#include "config/gateway.h"
+
+#include <arpa/inet.h>
+#include <errno.h>
+#include <string.h>
+
+int config_gateway_address(const struct config *cfg, struct sockaddr_in6 *ret, socklen_t *ret_bytes)
+{
+	int is_loopback = strcmp(cfg->gateway_listen, "loopback") == 0;
+	const char *address = is_loopback ? "127.0.0.1" : cfg->gateway_listen;
+	uint16_t port = htons((uint16_t)cfg->gateway_port);
+	struct sockaddr_in ip4 = { .sin_family = AF_INET, .sin_port = port };
+	struct sockaddr_in6 ip6 = { .sin6_family = AF_INET6, .sin6_port = port };
+
+	if (strcmp(cfg->gateway_listen, "off") == 0) {
+		return 0;
+	}
+	if (inet_pton(AF_INET, address, &ip4.sin_addr) == 1) {
+		memset(ret, 0, sizeof(*ret));
+		memcpy(ret, &ip4, sizeof(ip4));
+		*ret_bytes = sizeof(ip4);
+		return 1;
+	}
+	if (inet_pton(AF_INET6, address, &ip6.sin6_addr) == 1) {
+		*ret = ip6;
+		*ret_bytes = sizeof(ip6);
+		return 1;
+	}
+	return -EINVAL;
+}

@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: MIT */
+/* Where the mailbox gateway listens, from gateway.listen and gateway.port. Context: any. */
+#ifndef CONFIG_GATEWAY_H
+#define CONFIG_GATEWAY_H
+
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include "config/config.h"
+
+/**
+ * 1 with the address in @ret (a struct sockaddr_in in it for IPv4) and its length; 0: off; -EINVAL:
+ * gateway.listen is neither off, loopback nor an address.
+ */
+int config_gateway_address(const struct config *cfg, struct sockaddr_in6 *ret,
+			   socklen_t *ret_bytes);
+
+#endif
