@@ -357,7 +357,6 @@ static int format_alarm(const struct event *ev, char *buf, size_t buf_len)
 			ev->arg[1], (uint64_t)ev->value & 0xffff);
 }
 
-/* NOLINTNEXTLINE(readability-function-size): a table, one text an event */
 static int format_eoe(const struct event *ev, char *buf, size_t buf_len)
 {
 	char of[32] = "";
@@ -370,6 +369,7 @@ static int format_eoe(const struct event *ev, char *buf, size_t buf_len)
 			ev->arg[0], ev->arg[1], of);
 }
 
+/* NOLINTNEXTLINE(readability-function-size): a table, one text an event */
 int event_format(const struct event *ev, char *buf, size_t buf_len)
 {
 	const int32_t *a = ev->arg;

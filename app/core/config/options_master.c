@@ -99,11 +99,12 @@ static const struct option rows[] = {
 	  .type = OPTION_SWITCH,
 	  FIELD(bus_monitor),
 	  .default_value = "on",
-	  .prose =
-		  "Read the AL status of all slaves and the largest system time difference "
-		  "(0x092C) in every cycle, with two broadcast datagrams in the cyclic frame. Off: "
-		  "a slave that leaves OP is noticed by the service thread, up to 100 ms later "
-		  "instead of in one cycle, and outputs stay live until then." },
+	  .prose = "Read the AL status of all slaves and the largest system time difference "
+		   "(0x092C) in every cycle, with two broadcast datagrams in the cyclic frame, and "
+		   "with one more which mailboxes are full. Off: "
+		   "a slave that leaves OP is noticed by the service thread, up to 100 ms later "
+		   "instead of in one cycle, and outputs stay live until then; mailboxes are "
+		   "polled." },
 	{ .name = "bus.presence",
 	  .type = OPTION_WORD,
 	  FIELD(bus_presence),

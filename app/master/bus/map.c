@@ -180,7 +180,8 @@ static int build_plan(struct bus *bus, const struct plan_area *area, size_t area
 	unsigned mailbox_bits = 0;
 	int blocked = -1;
 
-	if (bus_mailbox_state_map(bus, group->logstartaddr + group->Obytes + group->Ibytes,
+	if (bus->cfg->bus_monitor &&
+	    bus_mailbox_state_map(bus, group->logstartaddr + group->Obytes + group->Ibytes,
 				  &mailbox_bits) < 0) {
 		return bus_fail(bus, -EIO, "FMMUs of the mailbox states: frames are lost");
 	}

@@ -164,8 +164,7 @@ static int64_t base_of(const struct window *w, const struct window_line *wl,
 
 static void against_frames(const struct window *w, const struct window_line *wl,
 			   const struct statistics_fit *edges, const struct measure_spec *spec,
-			   int64_t base_ns, const struct measure_scratch *scratch,
-			   struct sync0_result *ret)
+			   const struct measure_scratch *scratch, struct sync0_result *ret)
 {
 	double frame_ppb = PPB / (double)spec->period_ns;
 	double edge_ppb = PPB / (double)spec->row->period_ns;
@@ -176,7 +175,7 @@ static void against_frames(const struct window *w, const struct window_line *wl,
 	struct statistics_fit frames;
 	int64_t latency_ns;
 
-	if (fit_frames(w, base_ns, scratch, &frames, &latency_ns) < 0) {
+	if (fit_frames(w, base_of(w, wl, spec->row), scratch, &frames, &latency_ns) < 0) {
 		return;
 	}
 	ret->has |= SYNC0_HAS_RATE | SYNC0_HAS_PHASE;
@@ -281,7 +280,7 @@ void measure_window(const struct window *w, size_t number, const struct measure_
 	ret->has |= SYNC0_HAS_DRIFT;
 	ret->drift_ppb = -edges.slope * PPB / (double)spec->row->period_ns;
 	ret->drift_error_ppb = edges.slope_error * PPB / (double)spec->row->period_ns;
-	against_frames(w, wl, &edges, spec, base_ns, scratch, ret);
+	against_frames(w, wl, &edges, spec, scratch, ret);
 	frame_distance(w, wl, spec, scratch, ret);
 	if (number > 0) {
 		skew(w, number, spec, noise, scratch, ret);

@@ -7,7 +7,6 @@
 
 #include <errno.h>
 
-#include "base/bytes.h"
 #include "harness/test.h"
 #include "sim/protocols/bench.h"
 

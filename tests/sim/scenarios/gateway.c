@@ -1,15 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* A client of the mailbox gateway and a busy EoE switch beside the cycle: no cycle is disturbed. */
-#include <arpa/inet.h>
 #include <errno.h>
+#include <netinet/in.h>
 #include <unistd.h>
 
-#include "base/bytes.h"
 #include "daemon/session_internal.h"
 #include "devices/catalogue.h"
 #include "devices/fb1111_piccolo.h"
 #include "harness/test.h"
-#include "mailbox/mailbox.h"
 #include "network/eoe_switch.h"
 #include "network/gateway_frame.h"
 #include "sim/harness/virtual_master.h"

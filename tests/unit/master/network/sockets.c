@@ -3,7 +3,6 @@
  * (address 0) answers. */
 #include "network/gateway_sockets.h"
 
-#include <arpa/inet.h>
 #include <errno.h>
 #include <poll.h>
 #include <unistd.h>
