@@ -88,6 +88,7 @@ static const struct verb verbs[] = {
 	  verb_oneshot },
 	{ "state", "[STATE [SLAVE...|all]]", "AL states: show them, or lead slaves to one.",
 	  "ecdaq state                  the bus, its target, each slave\n"
+	  "ecdaq state --wait 10s       the same, when the bus has reached its target\n"
 	  "ecdaq state PREOP            the whole bus, which stays there\n"
 	  "ecdaq state BOOT piccolo1    one slave, while the bus is not in operation\n\n"
 	  "STATE is INIT, PREOP, BOOT (of single slaves), SAFEOP or OP.\n",
@@ -201,7 +202,7 @@ static void help(void)
 	     "  --version       print the version\n"
 	     "\n"
 	     "Every verb that reads has --json: one JSON value per line.\n");
-	exit_code_help(stdout, EXIT_CODE_COMMON | EXIT_CODE_BIT(CONFIG) |
+	exit_code_help(stdout, EXIT_CODE_COMMON | EXIT_CODE_BIT(CONFIG) | EXIT_CODE_BIT(STATE) |
 				       EXIT_CODE_BIT(PERMISSION) | EXIT_CODE_BIT(NO_DAEMON) |
 				       EXIT_CODE_BIT(REFUSED));
 }

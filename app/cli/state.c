@@ -5,10 +5,14 @@
 #include <strings.h>
 
 #include "base/args.h"
+#include "base/clock.h"
 #include "cli/admin_client.h"
 #include "cli/cli.h"
 #include "cli/report.h"
+#include "cli/running.h"
+#include "cli/screen.h"
 #include "cli/source.h"
+#include "program/args_duration.h"
 #include "program/json.h"
 #include "wire/al.h"
 
@@ -18,7 +22,8 @@ struct wish {
 	struct cli *cli;
 	const struct status_page *page;
 	int is_json;
-	int state; /* enum al_state; 0: only show */
+	int64_t wait_ns; /* for the bus to reach its target; 0: show it as it is */
+	int state;       /* enum al_state; 0: only show */
 };
 
 static int state_of(const char *word)
@@ -97,6 +102,36 @@ static void show_json(const struct status_page *page)
 	json_end_line(&js);
 }
 
+static int is_at_target(struct cli *cli)
+{
+	const struct status_page *page;
+	int is_there;
+
+	if (source_try_status(cli, &page) < 0) {
+		return 0;
+	}
+	is_there = running_is_alive(page->pid) && GET(page->bus_state) == GET(page->bus_target);
+	source_status_close(page);
+	return is_there;
+}
+
+/* ecdaqd may be starting, or be in its next try. */
+static int wait_for_target(const struct wish *wish)
+{
+	const int64_t step_ns = 50 * NS_PER_MS;
+	int64_t waited_ns = 0;
+
+	screen_catch_signals();
+	while (!is_at_target(wish->cli)) {
+		if (waited_ns >= wish->wait_ns || screen_is_over()) {
+			return 0;
+		}
+		screen_wait(step_ns);
+		waited_ns += step_ns;
+	}
+	return 1;
+}
+
 static enum exit_code show(const struct wish *wish)
 {
 	const struct status_page *page;
@@ -149,7 +184,14 @@ static enum exit_code run(struct wish *wish, const struct args *args)
 	enum exit_code result;
 
 	if (args->operand_count == 0) {
-		return show(wish);
+		int is_late = wish->wait_ns > 0 && !wait_for_target(wish);
+
+		result = show(wish);
+		return is_late && result == EXIT_CODE_OK ? EXIT_CODE_STATE : result;
+	}
+	if (wish->wait_ns > 0) {
+		return cli_fail(wish->cli, EXIT_CODE_USAGE,
+				"--wait is for showing; a request of a state waits by itself");
 	}
 	wish->state = state_of(args->operands[0]);
 	if (wish->state == 0) {
@@ -173,9 +215,11 @@ enum exit_code verb_state(struct cli *cli, int argc, char **argv)
 {
 	struct wish wish = { .cli = cli };
 	const struct args_option options[] = {
+		{ "wait", 0, args_duration, &wish.wait_ns, "T",
+		  "first wait up to T until the bus is in its target state" },
 		{ "json", 0, args_flag, &wish.is_json, NULL, "the states as a JSON object" },
 	};
-	struct args args = { .options = options, .option_count = 1, .operands_max = 4096 };
+	struct args args = { .options = options, .option_count = 2, .operands_max = 4096 };
 	enum exit_code result;
 
 	if (!cli_parse(cli, &args, argc, argv, &result)) {

@@ -227,6 +227,15 @@ def test_state_shows_and_requests(daemon: Fake) -> None:
     fails(daemon("state", "OP", "nobody"), FAILED, "nobody")
 
 
+def test_state_waits_for_the_target(daemon: Fake) -> None:
+    assert works(daemon("state", "--wait", "10s")).splitlines()[0] == "bus OP, target OP"
+    fails(daemon("state", "--wait", "10s", "OP"), USAGE, "--wait is for showing")
+    works(daemon("stop"))
+    late = daemon("state", "--wait", "100ms")
+    assert late.returncode == 12
+    assert late.stdout.splitlines()[0] == "bus STOPPED, target OP"
+
+
 def test_rescan_stops_a_bus_in_operation_only_by_force(daemon: Fake) -> None:
     fails(daemon("rescan"), REFUSED, "--force")
     assert works(daemon("rescan", "--force")) == ""
