@@ -80,13 +80,23 @@ void session_restart_done(struct session *s, const struct failure *failure)
  * programmed in INIT, as those of PRE-OP are on the way back.
  */
 enum change_step {
-	CHANGE_LOOK, /* where it is */
+	CHANGE_LOOK,        /* where it is */
+	CHANGE_ACKNOWLEDGE, /* an error of before, which would look like a refusal */
+	CHANGE_WAIT_CLEAR,
 	CHANGE_ASK_INIT,
 	CHANGE_WAIT_INIT,
 	CHANGE_PROGRAM, /* its mailboxes */
 	CHANGE_ASK,
 	CHANGE_WAIT,
 };
+
+static const char *slave_name(const struct session *s, uint16_t pos)
+{
+	size_t count;
+	const struct slave_info *slaves = bus_slaves(s->bus, &count);
+
+	return pos < count ? slaves[pos].name : "";
+}
 
 static enum change_step next_from(uint16_t from, uint16_t wanted)
 {
@@ -135,8 +145,10 @@ static int look(const struct session *s, struct admin_pending *pending, enum cha
 	status = get_le16(al) & (AL_STATE_MASK | AL_ERROR);
 	pending->reply.data[0] = (uint8_t)status;
 	pending->reply.data_len = 1;
-	if (step == CHANGE_LOOK) {
-		return (int)next_from(status & AL_STATE_MASK, wanted);
+	if (step == CHANGE_LOOK || step == CHANGE_WAIT_CLEAR) {
+		int next = step == CHANGE_LOOK ? CHANGE_ACKNOWLEDGE : CHANGE_WAIT_CLEAR;
+
+		return status & AL_ERROR ? next : (int)next_from(status, wanted);
 	}
 	if (status == asked) {
 		return reached(s, pending, asked);
@@ -145,9 +157,9 @@ static int look(const struct session *s, struct admin_pending *pending, enum cha
 		return (int)step;
 	}
 	snprintf(error, BUS_ERROR_BYTES,
-		 "slave %u: refuses %s and is in %s: AL status code 0x%04x, %s", pos,
-		 al_state_to_str(asked), al_state_to_str(status), get_le16(al + 4),
-		 al_status_code_to_str(get_le16(al + 4)));
+		 "slave %u (%s): refuses %s and is in %s: AL status code 0x%04x, %s", pos,
+		 slave_name(s, pos), al_state_to_str(asked), al_state_to_str(status),
+		 get_le16(al + 4), al_status_code_to_str(get_le16(al + 4)));
 	return -EIO;
 }
 
@@ -159,6 +171,10 @@ static int change(const struct session *s, struct admin_pending *pending, char *
 	int r;
 
 	switch (step) {
+	case CHANGE_ACKNOWLEDGE: /* look() has put it there */
+		r = bus_slave_al_request(s->bus, pending->request.slave_pos,
+					 pending->reply.data[0] & AL_STATE_MASK, error);
+		return r < 0 ? r : CHANGE_WAIT_CLEAR;
 	case CHANGE_ASK_INIT:
 		return ask_for(s, pending, AL_INIT, error);
 	case CHANGE_PROGRAM:
@@ -167,6 +183,7 @@ static int change(const struct session *s, struct admin_pending *pending, char *
 	case CHANGE_ASK:
 		return ask_for(s, pending, wanted, error);
 	case CHANGE_LOOK:
+	case CHANGE_WAIT_CLEAR:
 	case CHANGE_WAIT_INIT:
 	case CHANGE_WAIT:
 		break;
@@ -213,13 +230,10 @@ static void change_one(const struct session *s, struct admin_pending *pending)
 		return;
 	}
 	if (wanted == AL_BOOT && !bus_slave_has_boot(s->bus, pos)) {
-		size_t count;
-		const struct slave_info *slaves = bus_slaves(s->bus, &count);
-
 		admin_pending_refuse(pending, -ENOTSUP,
 				     "slave %u (%s): its SII gives no mailbox for BOOT: it has no "
 				     "such state",
-				     pos, slaves[pos].name);
+				     pos, slave_name(s, pos));
 		return;
 	}
 	pending->sequence = CHANGE_LOOK;

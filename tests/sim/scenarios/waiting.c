@@ -179,13 +179,26 @@ TEST(waiting, one_slave_changes_its_state_unless_the_bus_is_in_operation)
 	CHECK_EQ(ask_state(1, AL_PREOP).result, 0);
 	reply = ask_state(1, AL_OP); /* INIT or PRE-OP to OP is no transition */
 	CHECK_EQ(reply.result, -EIO);
-	CHECK(strstr(reply.text, "slave 1: refuses OP and is in PRE-OP") != NULL);
+	CHECK(strstr(reply.text, "slave 1 (b): refuses OP and is in PRE-OP") != NULL);
 	CHECK_EQ(ask_state(7, AL_PREOP).result, -ENODEV);
 	CHECK_EQ(ask_state(ADMIN_ALL_SLAVES, AL_OP).result, 0);
 	reply = ask_state(1, AL_PREOP);
 	CHECK_EQ(reply.result, -EPERM);
 	CHECK_EQ(rescan().result, -EPERM);
 	CHECK_EQ(virtual_bench_al_status(&b, 1), AL_OP);
+	virtual_master_close(&vm);
+}
+
+TEST(waiting, an_error_of_before_is_not_taken_for_a_refusal_of_a_slow_slave)
+{
+	virtual_master_init_pair(&vm, &b, "bus.target=preop", 1);
+	CHECK_EQ(virtual_master_bring_up(&vm), 0);
+	CHECK_EQ(ask_state(1, AL_INIT).result, 0);
+	CHECK_EQ(ask_state(1, AL_SAFEOP).result, -EIO);
+	CHECK_EQ(virtual_bench_al_status(&b, 1), AL_INIT | AL_ERROR);
+	virtual_bench_fault(&b, "at=0s slow slave=1 state=preop by=20ms");
+	CHECK_EQ(ask_state(1, AL_PREOP).result, 0);
+	CHECK_EQ(virtual_bench_al_status(&b, 1), AL_PREOP);
 	virtual_master_close(&vm);
 }
 
