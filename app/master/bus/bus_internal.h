@@ -173,8 +173,9 @@ struct bus {
 	struct bus_emit listener;              /* of mailbox events */
 	struct line *line;
 	struct mailbox_engine *mailbox;
-	char *error;      /* of the public call that runs */
-	uint8_t sequence; /* index byte of our own frames */
+	struct read_ahead *ahead; /* bus/read_ahead.c; NULL: not now */
+	char *error;              /* of the public call that runs */
+	uint8_t sequence;         /* index byte of our own frames */
 	/* In bus_watch(), bus_map_check() or bus_lead_back(): what is lost is polled again soon, so
 	 * fewer tries. */
 	int is_looking;
@@ -281,13 +282,31 @@ int bus_mailbox_program(struct bus *bus, size_t pos, uint16_t state);
 /** What bus_slaves() shows becomes what is known now. */
 void bus_publish_slaves(struct bus *bus);
 
+/* --- read_ahead.c --- */
+
+/**
+ * Ask all slaves at the same time for the SDOs that @read reads of one slave with bus_sdo_value()
+ * and bus_sdo_entry(). These give -EAGAIN where there is no answer yet, which @read passes on; what
+ * else it does must bear being repeated, and nothing can be written meanwhile (-ECANCELED).
+ * Afterwards both take their answers from there. 0; -errno with a line.
+ */
+int bus_read_ahead(struct bus *bus, int (*read)(struct bus *bus, size_t pos));
+void bus_read_ahead_end(struct bus *bus);
+/** For bus/mailbox.c: the answer to @rq; -EAGAIN: it is being asked for; -ENOENT: it was not. */
+int bus_read_ahead_take(struct bus *bus, struct mailbox_request *rq);
+/** 1 while nothing may be written. */
+int bus_read_ahead_forbids(const struct bus *bus);
+/** The slave was written to: what it answered before does not count. */
+void bus_read_ahead_forget(struct bus *bus, size_t pos);
+
 /* --- coe_map.c --- */
 
 /** Read SM types, PDO assignment and mapping by CoE. Entries found, 0 if there are no such objects,
- * -errno with a line. */
+ * -EAGAIN (bus_read_ahead()), other -errno with a line. */
 int bus_coe_entries(struct bus *bus, size_t pos, struct pdo_entry *ret, size_t capacity);
-/** Complete entries without name or type from the object dictionary (SDO information). */
-void bus_coe_names(struct bus *bus, size_t pos, struct pdo_entry *entry, size_t count);
+/** Complete entries without name or type from the object dictionary (SDO information).
+ * 0; -EAGAIN (bus_read_ahead()). */
+int bus_coe_names(struct bus *bus, size_t pos, struct pdo_entry *entry, size_t count);
 
 /* --- mailbox.c --- */
 

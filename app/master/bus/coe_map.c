@@ -27,7 +27,8 @@ struct coe_walk {
 	size_t count;
 };
 
-/* 1 and the value; 0 when the slave aborts (no such object); -errno with a line. */
+/* 1 and the value; 0 when the slave aborts (no such object); -EAGAIN (bus_read_ahead()); other
+ * -errno with a line. */
 static int read_value(struct coe_walk *w, uint16_t index, uint8_t subindex, uint64_t *ret_value)
 {
 	uint32_t abort;
@@ -36,12 +37,12 @@ static int read_value(struct coe_walk *w, uint16_t index, uint8_t subindex, uint
 	if (r == -EREMOTEIO) {
 		return 0;
 	}
-	if (r < 0) {
+	if (r < 0 && r != -EAGAIN) {
 		return bus_fail_slave(
 			w->bus, w->pos, -EIO, "SDO 0x%04x:%02x of its mapping: %s", index, subindex,
 			r == -ETIMEDOUT ? "no answer from its mailbox" : strerror(-r));
 	}
-	return 1;
+	return r < 0 ? r : 1;
 }
 
 static int add_entry(struct coe_walk *w, const struct pdo_entry *common, uint64_t word)
@@ -63,15 +64,21 @@ static int add_entry(struct coe_walk *w, const struct pdo_entry *common, uint64_
 static int walk_pdo(struct coe_walk *w, const struct pdo_entry *common)
 {
 	uint64_t count;
+	int is_asked = 0;
 	int r = read_value(w, common->pdo, 0, &count);
 
 	for (uint64_t i = 1; r > 0 && i <= (count & 0xff); i++) {
 		uint64_t word;
+		int one = read_value(w, common->pdo, (uint8_t)i, &word);
 
-		r = read_value(w, common->pdo, (uint8_t)i, &word);
-		if (r > 0) {
-			r = add_entry(w, common, word);
+		if (one == -EAGAIN) {
+			is_asked = 1; /* and all the others at once */
+		} else {
+			r = one > 0 ? add_entry(w, common, word) : one;
 		}
+	}
+	if (is_asked && r > 0) {
+		return -EAGAIN;
 	}
 	if (r == 0) {
 		return bus_fail_slave(
@@ -143,17 +150,24 @@ int bus_coe_entries(struct bus *bus, size_t pos, struct pdo_entry *ret, size_t c
 	return (int)w.count;
 }
 
-void bus_coe_names(struct bus *bus, size_t pos, struct pdo_entry *entry, size_t count)
+int bus_coe_names(struct bus *bus, size_t pos, struct pdo_entry *entry, size_t count)
 {
+	int result = 0;
+
 	if ((bus->soem_slave[soem_index(pos)].CoEdetails & ECT_COEDET_SDOINFO) == 0) {
-		return;
+		return 0;
 	}
 	for (size_t i = 0; i < count; i++) {
 		struct pdo_entry *e = &entry[i];
 		struct coe_entry found;
+		int r;
 
-		if (e->index == 0 || (e->name[0] != '\0' && e->data_type != 0) ||
-		    bus_sdo_entry(bus, pos, e->index, e->subindex, &found) < 0) {
+		if (e->index == 0 || (e->name[0] != '\0' && e->data_type != 0)) {
+			continue;
+		}
+		r = bus_sdo_entry(bus, pos, e->index, e->subindex, &found);
+		if (r < 0) {
+			result = r == -EAGAIN ? r : result;
 			continue;
 		}
 		if (e->data_type == 0) {
@@ -163,4 +177,5 @@ void bus_coe_names(struct bus *bus, size_t pos, struct pdo_entry *entry, size_t 
 			snprintf(e->name, sizeof(e->name), "%.*s", PDO_NAME_BYTES - 1, found.name);
 		}
 	}
+	return result;
 }

@@ -123,9 +123,15 @@ void bus_mailbox_cancel(struct bus *bus, struct mailbox_request *rq)
 
 static int run(struct bus *bus, struct mailbox_request *rq)
 {
-	int r;
+	int r = -ENOENT;
 
 	rq->protocol = &coe_protocol;
+	if (bus->ahead != NULL && rq->with.coe.operation != COE_DOWNLOAD) {
+		r = bus_read_ahead_take(bus, rq);
+	}
+	if (r != -ENOENT) {
+		return r;
+	}
 	r = bus_mailbox_submit(bus, rq);
 	return r < 0 ? r : mailbox_wait(bus->mailbox, rq);
 }
@@ -171,8 +177,15 @@ int bus_sdo_write(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t s
 		.buffer = (uint8_t *)(uintptr_t)data, /* a download only reads it */
 		.capacity = len,
 	};
-	int r = run(bus, &rq);
+	int r;
 
+	if (bus->ahead != NULL) {
+		if (bus_read_ahead_forbids(bus)) {
+			return -ECANCELED;
+		}
+		bus_read_ahead_forget(bus, slave_pos);
+	}
+	r = run(bus, &rq);
 	*ret_abort = rq.is_mailbox_error ? 0 : rq.detail;
 	if (r == -EREMOTEIO) {
 		tell_abort(bus, slave_pos, object_of(index, subindex), *ret_abort);

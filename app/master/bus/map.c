@@ -70,7 +70,9 @@ static int read_entries(struct bus *bus, size_t pos)
 	}
 	if (coe > 0) {
 		borrow_names(entry, (size_t)coe, entry + coe, sii > 0 ? (size_t)sii : 0);
-		bus_coe_names(bus, pos, entry, (size_t)coe);
+		if (bus_coe_names(bus, pos, entry, (size_t)coe) < 0) {
+			return -EAGAIN;
+		}
 	}
 	sl->pdo_first = bus->pdo_count;
 	sl->pdo_count = (size_t)(coe > 0 ? coe : sii);
@@ -265,24 +267,49 @@ int bus_restore_mapping(struct bus *bus, size_t pos)
 	return r < 0 ? r : set_watchdog(bus, pos);
 }
 
-static int read_all(struct bus *bus)
+static int ask_entries(struct bus *bus, size_t pos)
 {
-	uint32_t total_bytes = 0;
-	int r;
+	int r = read_entries(bus, pos);
 
 	bus->pdo_count = 0;
-	bus->channel_count = 0;
-	r = bus_startup_all(bus);
+	return r;
+}
+
+static int read_mapping(struct bus *bus)
+{
+	uint32_t total_bytes = 0;
+	int r = bus_read_ahead(bus, ask_entries);
+
 	for (size_t i = 0; i < bus->slave_count && r >= 0; i++) {
 		r = read_entries(bus, i);
 		if (r >= 0) {
 			r = bus_map_sm(bus, i, &total_bytes);
 		}
-		if (r >= 0) {
-			r = bus_sync_limits(bus, i);
-		}
 	}
+	bus_read_ahead_end(bus);
 	return r;
+}
+
+static int read_limits(struct bus *bus)
+{
+	int r = bus_read_ahead(bus, bus_sync_limits);
+
+	for (size_t i = 0; i < bus->slave_count && r >= 0; i++) {
+		r = bus_sync_limits(bus, i);
+	}
+	bus_read_ahead_end(bus);
+	return r;
+}
+
+static int read_all(struct bus *bus)
+{
+	int r;
+
+	bus->pdo_count = 0;
+	bus->channel_count = 0;
+	r = bus_startup_all(bus);
+	r = r < 0 ? r : read_mapping(bus);
+	return r < 0 ? r : read_limits(bus);
 }
 
 /* At their limits while their sizes are not known. */

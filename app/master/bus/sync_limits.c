@@ -22,7 +22,8 @@ enum {
 	TYPE_OUTPUT_EVENT = 0x22, /* of inputs: with the event of the outputs' SM */
 };
 
-/* A value, or 0 where the slave has no such object. 0 or -errno with a line. */
+/* A value, or 0 where the slave has no such object. 0; -EAGAIN (bus_read_ahead()); other -errno
+ * with a line. */
 static int read_object(struct bus *bus, size_t pos, uint16_t index, uint8_t subindex,
 		       uint64_t *ret_value, int *ret_has)
 {
@@ -33,6 +34,9 @@ static int read_object(struct bus *bus, size_t pos, uint16_t index, uint8_t subi
 	if (r == -EREMOTEIO || r == -EMSGSIZE) {
 		*ret_value = 0;
 		return 0;
+	}
+	if (r == -EAGAIN) {
+		return r;
 	}
 	if (r < 0) {
 		return bus_fail_slave(bus, pos, r, "no answer for 0x%04x:%02x", index, subindex);

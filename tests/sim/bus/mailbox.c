@@ -370,6 +370,31 @@ TEST(mailbox, sdo_transfers_to_64_slaves_at_once_are_20_times_as_many_as_one_at_
 	CHECK(all >= 20 * single);
 }
 
+/* Bus time until the process data of so many boards are mapped. */
+static double mapping_ms(unsigned slaves)
+{
+	struct bus_bench *b = bench_create(&(struct bench_spec){ .piccolos = slaves, .seed = 118 });
+	int64_t from_ns;
+	double ms;
+
+	CHECK_EQ(bench_find(b), 0);
+	from_ns = bench_now_ns(b);
+	CHECK_EQ(bus_map(b->bus, b->error), 0);
+	ms = (double)(bench_now_ns(b) - from_ns) / NS_PER_MS;
+	bench_destroy(b);
+	return ms;
+}
+
+TEST(mailbox, the_mapping_of_64_slaves_takes_less_than_five_times_that_of_one)
+{
+	double one_ms = mapping_ms(1);
+	double all_ms = mapping_ms(STORM_SLAVES);
+
+	printf("mapping: %.1f ms with one slave, %.1f ms with %u\n", one_ms, all_ms, STORM_SLAVES);
+	CHECK(one_ms > 1);
+	CHECK(all_ms < 5 * one_ms);
+}
+
 /* --- the states of the mailboxes in the cyclic frames --- */
 
 /* A byte of the slave's registers, behind the master's back. */
