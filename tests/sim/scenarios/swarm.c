@@ -2,9 +2,9 @@
 /*
  * Many seeds, each a bus and a mixture of faults of its own: 2 to 4 slaves, either kind of
  * datagrams; frames lost, late, held, doubled, damaged, cables, power, resets, AL errors, missing
- * SYNC0 pulses, processors that hang, dead mailboxes, clocks that drift, a master held up. In every
- * cycle nothing may be invented: a good sample has the value of its SYNC0 edge. When the faults
- * end, all is well again.
+ * SYNC0 pulses, processors that hang, dead mailboxes, clocks that drift, a wall clock that steps, a
+ * master held up for up to 0.9 s. In every cycle nothing may be invented: a good sample has the
+ * value of its SYNC0 edge. When the faults end, all is well again.
  */
 #include "base/prng.h"
 #include "devices/fb1111_piccolo.h"
@@ -44,6 +44,8 @@ enum trouble {
 	TROUBLE_HANG,
 	TROUBLE_MAILBOX,
 	TROUBLE_DRIFT,
+	TROUBLE_CLOCK_STEP,
+	TROUBLE_LONG_STALL,
 	TROUBLES,
 };
 
@@ -134,6 +136,13 @@ static void make_trouble(struct swarm *sw, enum trouble trouble)
 		break;
 	case TROUBLE_STALL:
 		in_process_stall(sw->b.host, (int64_t)prng_below(&sw->prng, 20 * NS_PER_MS));
+		break;
+	case TROUBLE_LONG_STALL:
+		in_process_stall(sw->b.host, (int64_t)prng_below(&sw->prng, 900 * NS_PER_MS));
+		break;
+	case TROUBLE_CLOCK_STEP:
+		in_process_step_tai(sw->b.host, (int64_t)prng_below(&sw->prng, 7200 * NS_PER_S) -
+							3600 * NS_PER_S);
 		break;
 	case TROUBLE_HOLD:
 		virtual_bench_fault(&sw->b, "at=0s hold");
