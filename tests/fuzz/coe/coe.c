@@ -282,7 +282,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 	s.left = size - CHOICE_BYTES;
 	s.refuses = data[3] >> 1 & 1;
 	if (data[3] & 4) {
-		mailbox_status_hint(mb, 0, data[3] >> 3 & 1);
+		mailbox_status_hint(mb, 0, data[3] >> 3 & 1, (mono_t){ s.now_ns });
 	}
 	/* Twice: what is late for the first meets the second. */
 	for (int i = 0; i < 2; i++) {
