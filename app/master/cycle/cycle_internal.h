@@ -144,8 +144,9 @@ void cycle_report_skipped(struct cycle *cy);
 
 void cycle_push_sample(struct cycle *cy);
 struct cycle_place {
-	/* 1: the frame passed in its edge's window. 0: while the slaves were still updating their
-	 * inputs, or it carries no plausible DC time. */
+	/* 1: the frames passed in their edge's window. 0: while the slaves were still updating
+	 * their inputs, or not all of them before the next edge, or there is no plausible DC time.
+	 */
 	int is_in_window;
 	/* Edges between the sample's own and the one that the inputs belong to: its number is to
 	 * go on by them. */

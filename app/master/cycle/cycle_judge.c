@@ -44,6 +44,20 @@ static uint64_t passed_before_sending(const struct cycle *cy, const struct excha
 	return passed > late ? passed - late : 0;
 }
 
+/*
+ * The time is that of the first frame. The others passed the slaves later, at the latest when the
+ * last one was back: after the next edge their inputs may be those of that edge.
+ */
+static int is_torn(const struct cycle *cy, const struct exchange_result *res)
+{
+	int64_t since_edge_ns =
+		mod_floor(res->dc_time_ns - numbering_dc_time(&cy->numbering, cy->sample.cycle),
+			  cy->period.ns);
+
+	return exchange_frame_count(cy->spec.plan) > 1 &&
+	       since_edge_ns + res->round_trip.ns >= cy->period.ns;
+}
+
 struct cycle_place cycle_place(struct cycle *cy, const struct exchange_result *res)
 {
 	struct cycle_place ret = { .is_in_window = 1 };
@@ -67,7 +81,7 @@ struct cycle_place cycle_place(struct cycle *cy, const struct exchange_result *r
 		ret.passed_edges = place.passed_edges;
 		ret.late_periods = place.passed_edges > behind ? place.passed_edges - behind : 0;
 	}
-	ret.is_in_window = place.is_in_window;
+	ret.is_in_window = place.is_in_window && !is_torn(cy, res);
 	return ret;
 }
 

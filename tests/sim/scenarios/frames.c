@@ -145,6 +145,29 @@ TEST(sim_frames, a_cycle_delayed_by_five_periods_leaves_no_gap_in_the_numbers)
 	run_close(&r);
 }
 
+/* The DC time is in the first frame; the inputs of the others may be those of the next edge. */
+TEST(sim_frames, a_second_frame_behind_the_next_edge_makes_the_cycle_late_and_nothing_unexplained)
+{
+	static const char *const settings[] = { "cycle.period=2ms", NULL };
+	static struct run r;
+
+	virtual_bench_init(&r.b, &(struct virtual_spec){ .slaves = 96, .seed = 12 });
+	virtual_master_init(&r.vm, &r.b, settings);
+	CHECK_EQ(virtual_master_bring_up(&r.vm), 0);
+	virtual_master_run(&r.vm, 100);
+	r.stats = (struct cycle_stats *)&session_page(r.vm.session)->cycle;
+	CHECK_EQ(atomic_load(&r.stats->frames_sent), 2 * atomic_load(&r.stats->cycles));
+	virtual_master_forget(&r.vm);
+	virtual_bench_fault(&r.b, "p=1 jitter by=500us");
+	for (int i = 0; i < 200; i++) {
+		in_process_stall(r.b.host, 600 * NS_PER_US);
+		CHECK_EQ(virtual_master_run(&r.vm, 5), SESSION_GOES_ON);
+	}
+	CHECK(r.vm.result.late > 0);
+	CHECK_EQ(r.vm.result.bad_unexplained, 0);
+	run_close(&r);
+}
+
 TEST(sim_frames, a_segment_that_becomes_a_loop_is_named_and_recovered_from)
 {
 	static struct run r;
