@@ -118,6 +118,11 @@ static void latch_receive_times(struct esc *esc, const struct esc_frame *frame)
 	put_le64(esc->reg + ESC_REG_DC_RECEIVE_TIME_PU, esc_local_time(esc, frame->pu_ns));
 }
 
+static int is_emulating(const struct esc *esc)
+{
+	return (esc->reg[ESC_REG_ESC_CONFIG] & CONFIG_DEVICE_EMULATION) != 0;
+}
+
 static void al_control_written(struct esc *esc)
 {
 	uint8_t *status = &esc->reg[ESC_REG_AL_STATUS];
@@ -129,7 +134,7 @@ static void al_control_written(struct esc *esc)
 		put_le16(esc->reg + ESC_REG_AL_STATUS_CODE, esc->identification);
 		return;
 	}
-	if (!(esc->reg[ESC_REG_ESC_CONFIG] & CONFIG_DEVICE_EMULATION)) {
+	if (!is_emulating(esc)) {
 		esc->al_event |= ESC_AL_EVENT_CONTROL;
 		return;
 	}
@@ -297,8 +302,9 @@ static int is_locked(const struct esc *esc, unsigned at)
 		return 1;
 	}
 	if (at == ESC_REG_AL_CONTROL || at == ESC_REG_AL_CONTROL + 1) {
-		/* A mailbox of one: the PDI must read it before it can be written again. */
-		return (esc->al_event & ESC_AL_EVENT_CONTROL) != 0;
+		/* A mailbox of one: the PDI must read it before it can be written again. With
+		 * device emulation nobody reads it, also what came before the EEPROM was loaded. */
+		return (esc->al_event & ESC_AL_EVENT_CONTROL) != 0 && !is_emulating(esc);
 	}
 	if (at >= ESC_REG_EEPROM_CONTROL && at < ESC_REG_MII_CONTROL) {
 		return !esc_eeprom_is_free(esc, ESC_ECAT);

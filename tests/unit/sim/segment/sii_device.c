@@ -137,6 +137,32 @@ TEST(sii_device, with_device_emulation_the_chip_does_the_states_alone)
 	bench_destroy(b);
 }
 
+/* A master may write to it while its EEPROM is still being loaded. */
+TEST(sii_device, with_device_emulation_a_request_before_the_eeprom_is_loaded_locks_nothing)
+{
+	uint8_t sii[TERMINAL_SII_BYTES];
+	size_t bytes = terminal_sii(sii, "");
+	struct bench_slave slave = { .pdi = 4, .config = 1 };
+	uint8_t init[2] = { AL_INIT };
+	uint8_t preop[2] = { AL_PREOP };
+	uint8_t status[2];
+	struct bench *b;
+
+	slave.device = sii_device_create(sii, bytes);
+	b = bench_create(&slave, 1);
+	bench_write8(b, STATION, ESC_REG_RESET_ECAT, 'R');
+	bench_write8(b, STATION, ESC_REG_RESET_ECAT, 'E');
+	bench_write8(b, STATION, ESC_REG_RESET_ECAT, 'S');
+	CHECK_EQ(bench_send(b, ECAT_CMD_APWR, 0, ESC_REG_AL_CONTROL, init, sizeof(init)), 1);
+	CHECK_EQ(esc_eeprom_loaded(segment_esc(b->segment, 0)), 0);
+	bench_wait(b, 5 * MS);
+	CHECK_EQ(esc_eeprom_loaded(segment_esc(b->segment, 0)), 1);
+	CHECK_EQ(bench_send(b, ECAT_CMD_APWR, 0, ESC_REG_AL_CONTROL, preop, sizeof(preop)), 1);
+	CHECK_EQ(bench_send(b, ECAT_CMD_APRD, 0, ESC_REG_AL_STATUS, status, sizeof(status)), 1);
+	CHECK_EQ(status[0], AL_PREOP);
+	bench_destroy(b);
+}
+
 TEST(sii_device, images_without_sense_are_slaves_too)
 {
 	uint8_t sii[TERMINAL_SII_BYTES];
