@@ -102,6 +102,7 @@ static void show_json(const struct status_page *page)
 	json_end_line(&js);
 }
 
+/* Down is no target: ecdaqd has not begun. */
 static int is_at_target(struct cli *cli)
 {
 	const struct status_page *page;
@@ -110,7 +111,8 @@ static int is_at_target(struct cli *cli)
 	if (source_try_status(cli, &page) < 0) {
 		return 0;
 	}
-	is_there = running_is_alive(page->pid) && GET(page->bus_state) == GET(page->bus_target);
+	is_there = running_is_alive(page->pid) && GET(page->bus_target) != BUS_DOWN &&
+		   GET(page->bus_state) == GET(page->bus_target);
 	source_status_close(page);
 	return is_there;
 }
