@@ -14,6 +14,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from machine import AHEAD, IMAGE, NAME, Machine, Space
 
+SSH_S = 600
 KEEP = Path(__file__).resolve().parents[2] / "build" / "test-logs"
 
 
@@ -38,7 +39,7 @@ def key(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def machine(
     request: pytest.FixtureRequest, image: Path, key: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Machine]:
-    """The machine of a file, set up by its BOOT_FILES, up to its login prompt."""
+    """The machine of a file, set up by its BOOT_FILES, up to its login."""
     module = request.module
     space = Space() if getattr(module, "OUTSIDE", False) else None
     vm = Machine(
@@ -55,6 +56,9 @@ def machine(
         else:
             vm.start(**getattr(module, "START", {}))
         vm.wait_for_login()
+        if getattr(module, "WITH_KEY", True):
+            # Its key is made at the first boot, which may take longer than the login prompt.
+            vm.wait_until("SSH answers", "true", SSH_S)
         yield vm
     finally:
         vm.stop()

@@ -19,6 +19,7 @@ def test_the_clock_of_a_machine_without_a_clock_chip_continues(machine: Machine)
     machine.cut_power()
     machine.start(**START)
     machine.wait_for_login()
+    machine.wait_until("SSH answers", "true", 600)
     assert machine.run("date -u +%Y-%m-%d").strip() == LAST_RUN
     first = machine.run("sudo journalctl --boot --output=short-iso --no-pager | head -n 1")
     assert first.startswith(LAST_RUN), "the journal of this boot begins at another time"
