@@ -31,9 +31,9 @@ static void put_request(const struct mailbox_request *rq, uint8_t command, uint8
 {
 	memset(data, 0, SDO_BYTES);
 	put_le16(data, COE_SDO_REQUEST << COE_SERVICE_SHIFT);
-	data[COMMAND_AT] = command;
-	put_le16(data + INDEX_AT, rq->with.coe.index);
-	data[SUBINDEX_AT] = rq->with.coe.subindex;
+	data[SDO_COMMAND_AT] = command;
+	put_le16(data + SDO_INDEX_AT, rq->with.coe.index);
+	data[SDO_SUBINDEX_AT] = rq->with.coe.subindex;
 }
 
 static uint8_t access_bit(const struct mailbox_request *rq)
@@ -46,19 +46,19 @@ static int compose_download(struct mailbox_request *rq, uint8_t *data, size_t ca
 	size_t room = capacity - SDO_BYTES;
 	uint8_t access = access_bit(rq);
 
-	if (rq->total <= EXPEDITED_BYTES && access == 0) {
-		size_t unused = EXPEDITED_BYTES - rq->total;
+	if (rq->total <= SDO_EXPEDITED_BYTES && access == 0) {
+		size_t unused = SDO_EXPEDITED_BYTES - rq->total;
 
 		put_request(rq,
 			    (uint8_t)(SDO_DOWNLOAD | SDO_EXPEDITED | SDO_SIZE_INDICATED |
 				      unused << SDO_EXPEDITED_SHIFT),
 			    data);
-		memcpy(data + DATA_AT, rq->buffer, rq->total);
+		memcpy(data + SDO_DATA_AT, rq->buffer, rq->total);
 		rq->state.coe.in_mail = rq->total;
 		return SDO_BYTES;
 	}
 	put_request(rq, (uint8_t)(SDO_DOWNLOAD | SDO_SIZE_INDICATED | access), data);
-	put_le32(data + DATA_AT, (uint32_t)rq->total);
+	put_le32(data + SDO_DATA_AT, (uint32_t)rq->total);
 	rq->state.coe.in_mail = rq->total < room ? rq->total : room;
 	memcpy(data + SDO_BYTES, rq->buffer, rq->state.coe.in_mail);
 	return (int)(SDO_BYTES + rq->state.coe.in_mail);
@@ -66,19 +66,19 @@ static int compose_download(struct mailbox_request *rq, uint8_t *data, size_t ca
 
 static int compose_download_segment(struct mailbox_request *rq, uint8_t *data, size_t capacity)
 {
-	size_t room = capacity - SEGMENT_AT;
+	size_t room = capacity - SDO_SEGMENT_AT;
 	size_t left = rq->total - rq->len;
 	size_t now = left < room ? left : room;
-	size_t filled = now < SEGMENT_MIN ? SEGMENT_MIN : now;
+	size_t filled = now < SDO_SEGMENT_MIN ? SDO_SEGMENT_MIN : now;
 
-	memset(data, 0, SEGMENT_AT + SEGMENT_MIN);
+	memset(data, 0, SDO_SEGMENT_AT + SDO_SEGMENT_MIN);
 	put_le16(data, COE_SDO_REQUEST << COE_SERVICE_SHIFT);
-	data[COMMAND_AT] = (uint8_t)(SDO_DOWNLOAD_SEGMENT | rq->state.coe.toggle |
-				     (filled - now) << SDO_UNUSED_SHIFT |
-				     (now == left ? SDO_LAST_SEGMENT : 0));
-	memcpy(data + SEGMENT_AT, rq->buffer + rq->len, now);
+	data[SDO_COMMAND_AT] = (uint8_t)(SDO_DOWNLOAD_SEGMENT | rq->state.coe.toggle |
+					 (filled - now) << SDO_UNUSED_SHIFT |
+					 (now == left ? SDO_LAST_SEGMENT : 0));
+	memcpy(data + SDO_SEGMENT_AT, rq->buffer + rq->len, now);
 	rq->state.coe.in_mail = now;
-	return (int)(SEGMENT_AT + filled);
+	return (int)(SDO_SEGMENT_AT + filled);
 }
 
 static int compose(struct mailbox_request *rq, uint8_t *data, size_t capacity)
@@ -94,7 +94,7 @@ static int compose(struct mailbox_request *rq, uint8_t *data, size_t capacity)
 						       : SDO_UPLOAD | access_bit(rq)),
 			    data);
 		if (st->is_segmented) {
-			memset(data + INDEX_AT, 0, SDO_BYTES - INDEX_AT);
+			memset(data + SDO_INDEX_AT, 0, SDO_BYTES - SDO_INDEX_AT);
 		}
 		st->is_begun = 1;
 		return SDO_BYTES;
@@ -115,19 +115,20 @@ static int reject(struct mailbox_request *rq, uint32_t abort)
 
 static int uploaded(struct mailbox_request *rq, const uint8_t *data, size_t len)
 {
-	uint8_t command = data[COMMAND_AT];
+	uint8_t command = data[SDO_COMMAND_AT];
 	const uint8_t *bytes = data + SDO_BYTES;
 	size_t now = len - SDO_BYTES;
 
 	if (command & SDO_EXPEDITED) {
-		bytes = data + DATA_AT;
+		bytes = data + SDO_DATA_AT;
 		now = command & SDO_SIZE_INDICATED
-			      ? EXPEDITED_BYTES - (size_t)(command >> SDO_EXPEDITED_SHIFT & 3u)
-			      : EXPEDITED_BYTES;
+			      ? SDO_EXPEDITED_BYTES - (size_t)(command >> SDO_EXPEDITED_SHIFT &
+							       SDO_EXPEDITED_MASK)
+			      : SDO_EXPEDITED_BYTES;
 		rq->total = now;
 		rq->state.coe.is_begun = 0;
 	} else {
-		rq->total = get_le32(data + DATA_AT);
+		rq->total = get_le32(data + SDO_DATA_AT);
 		now = now < rq->total ? now : rq->total;
 	}
 	if (rq->total > rq->capacity) {
@@ -144,21 +145,21 @@ static int uploaded(struct mailbox_request *rq, const uint8_t *data, size_t len)
 
 static int segment_uploaded(struct mailbox_request *rq, const uint8_t *data, size_t len)
 {
-	uint8_t command = data[COMMAND_AT];
+	uint8_t command = data[SDO_COMMAND_AT];
 	int is_last = command & SDO_LAST_SEGMENT;
-	size_t now = len - SEGMENT_AT;
+	size_t now = len - SDO_SEGMENT_AT;
 
 	if ((command & SDO_TOGGLE) != rq->state.coe.toggle) {
 		return reject(rq, COE_ABORT_TOGGLE);
 	}
-	if (now == SEGMENT_MIN) {
+	if (now == SDO_SEGMENT_MIN) {
 		now -= command >> SDO_UNUSED_SHIFT & SDO_UNUSED_MASK;
 	}
 	if (now > rq->total - rq->len || (now == 0 && !is_last) ||
 	    (is_last != 0) != (now == rq->total - rq->len)) {
 		return reject(rq, COE_ABORT_LENGTH);
 	}
-	memcpy(rq->buffer + rq->len, data + SEGMENT_AT, now);
+	memcpy(rq->buffer + rq->len, data + SDO_SEGMENT_AT, now);
 	rq->len += now;
 	rq->state.coe.toggle ^= SDO_TOGGLE;
 	return is_last ? MAILBOX_DONE : MAILBOX_SEND;
@@ -183,8 +184,8 @@ static int segment_downloaded(struct mailbox_request *rq, uint8_t command)
 
 static int is_of_object(const struct mailbox_request *rq, const uint8_t *data)
 {
-	return get_le16(data + INDEX_AT) == rq->with.coe.index &&
-	       data[SUBINDEX_AT] == rq->with.coe.subindex;
+	return get_le16(data + SDO_INDEX_AT) == rq->with.coe.index &&
+	       data[SDO_SUBINDEX_AT] == rq->with.coe.subindex;
 }
 
 /* Answers to other objects, or of the other direction, are late ones to an earlier request. */
@@ -192,20 +193,21 @@ static int received_sdo(struct mailbox_request *rq, const uint8_t *data, size_t 
 {
 	const struct coe_state *st = &rq->state.coe;
 	int is_upload = rq->with.coe.operation == COE_UPLOAD;
-	uint8_t command = data[COMMAND_AT];
+	uint8_t command = data[SDO_COMMAND_AT];
 	uint8_t expected = is_upload ? SDO_UPLOADED : SDO_DOWNLOADED;
 
 	if ((command & SDO_SPECIFIER) == SDO_ABORT) {
 		if (len < SDO_BYTES || !is_of_object(rq, data)) {
 			return MAILBOX_IGNORE;
 		}
-		rq->detail = get_le32(data + DATA_AT);
+		rq->detail = get_le32(data + SDO_DATA_AT);
 		rq->state.coe.is_begun = 0;
 		return -EREMOTEIO;
 	}
 	if (st->is_segmented) {
 		expected = is_upload ? SDO_SEGMENT_UPLOADED : SDO_SEGMENT_DOWNLOADED;
-		if ((command & SDO_SPECIFIER) != expected || len < SEGMENT_AT + SEGMENT_MIN) {
+		if ((command & SDO_SPECIFIER) != expected ||
+		    len < SDO_SEGMENT_AT + SDO_SEGMENT_MIN) {
 			return reject(rq, COE_ABORT_COMMAND);
 		}
 		return is_upload ? segment_uploaded(rq, data, len)
@@ -229,7 +231,7 @@ static int received(struct mailbox_request *rq, const uint8_t *data, size_t len)
 {
 	unsigned service;
 
-	if (len <= COMMAND_AT) {
+	if (len <= SDO_COMMAND_AT) {
 		return reject(rq, COE_ABORT_COMMAND);
 	}
 	service = get_le16(data) >> COE_SERVICE_SHIFT;
@@ -239,7 +241,7 @@ static int received(struct mailbox_request *rq, const uint8_t *data, size_t len)
 	}
 	/* An abort may come as a request. */
 	if (service == COE_SDO_RESPONSE ||
-	    (service == COE_SDO_REQUEST && (data[COMMAND_AT] & SDO_SPECIFIER) == SDO_ABORT)) {
+	    (service == COE_SDO_REQUEST && (data[SDO_COMMAND_AT] & SDO_SPECIFIER) == SDO_ABORT)) {
 		return received_sdo(rq, data, len);
 	}
 	return MAILBOX_IGNORE;
@@ -256,7 +258,7 @@ static int give_up(struct mailbox_request *rq, int error, uint8_t *data, size_t 
 		abort = error == -ETIMEDOUT ? COE_ABORT_TIMEOUT : COE_ABORT_GENERAL;
 	}
 	put_request(rq, SDO_ABORT, data);
-	put_le32(data + DATA_AT, abort);
+	put_le32(data + SDO_DATA_AT, abort);
 	return SDO_BYTES;
 }
 

@@ -6,57 +6,42 @@
 #include "mailbox/coe.h"
 #include "mailbox/coe_internal.h"
 
-enum opcode {
-	GET_LIST = 1,
-	LIST = 2,
-	GET_OBJECT = 3,
-	OBJECT = 4,
-	GET_ENTRY = 5,
-	ENTRY = 6,
-};
-
-enum layout {
-	INDEX_BYTES = 2,
-	ENTRY_REQUEST_BYTES = INFORMATION_BODY_AT + 4,
-	OBJECT_BYTES = 6,
-	ENTRY_BYTES = 10,
-	/* access rights, category, mapping: the name follows at once */
-	VALUE_INFO = 0x07,
-};
+/* The optional values of an entry that are asked for: none, so that its name follows at once. */
+enum { VALUE_INFO = 0x07 };
 
 static uint8_t opcode_of(const struct mailbox_request *rq)
 {
 	switch (rq->with.coe.operation) {
 	case COE_OBJECT:
-		return GET_OBJECT;
+		return SDO_GET_OBJECT;
 	case COE_ENTRY:
-		return GET_ENTRY;
+		return SDO_GET_ENTRY;
 	case COE_LIST:
 	case COE_UPLOAD:
 	case COE_DOWNLOAD:
 		break;
 	}
-	return GET_LIST;
+	return SDO_GET_LIST;
 }
 
 int coe_information_compose(struct mailbox_request *rq, uint8_t *data, size_t capacity)
 {
 	const struct coe_parameters *with = &rq->with.coe;
 
-	if (capacity < ENTRY_REQUEST_BYTES) {
+	if (capacity < SDO_INFORMATION_BODY_AT + SDO_GET_ENTRY_BYTES) {
 		return -EMSGSIZE;
 	}
-	memset(data, 0, ENTRY_REQUEST_BYTES);
+	memset(data, 0, SDO_INFORMATION_BODY_AT + SDO_GET_ENTRY_BYTES);
 	put_le16(data, (uint16_t)(COE_SDO_INFORMATION << COE_SERVICE_SHIFT));
-	data[INFORMATION_OPCODE_AT] = opcode_of(rq);
-	put_le16(data + INFORMATION_BODY_AT,
+	data[SDO_INFORMATION_OPCODE_AT] = opcode_of(rq);
+	put_le16(data + SDO_INFORMATION_BODY_AT,
 		 with->operation == COE_LIST ? (uint16_t)with->list_type : with->index);
 	if (with->operation != COE_ENTRY) {
-		return INFORMATION_BODY_AT + INDEX_BYTES;
+		return SDO_INFORMATION_BODY_AT + SDO_GET_OBJECT_BYTES;
 	}
-	data[INFORMATION_BODY_AT + 2] = with->subindex;
-	data[INFORMATION_BODY_AT + 3] = VALUE_INFO;
-	return ENTRY_REQUEST_BYTES;
+	data[SDO_INFORMATION_BODY_AT + 2] = with->subindex;
+	data[SDO_INFORMATION_BODY_AT + 3] = VALUE_INFO;
+	return SDO_INFORMATION_BODY_AT + SDO_GET_ENTRY_BYTES;
 }
 
 /* Does the first fragment answer this request, or an earlier one? */
@@ -89,22 +74,22 @@ static int take_fragment(struct mailbox_request *rq, const uint8_t *body, size_t
 int coe_information_received(struct mailbox_request *rq, const uint8_t *data, size_t len)
 {
 	struct coe_state *st = &rq->state.coe;
-	const uint8_t *body = data + INFORMATION_BODY_AT;
-	size_t body_len = len - INFORMATION_BODY_AT;
-	uint8_t opcode = data[INFORMATION_OPCODE_AT] & INFORMATION_OPCODE_MASK;
+	const uint8_t *body = data + SDO_INFORMATION_BODY_AT;
+	size_t body_len = len - SDO_INFORMATION_BODY_AT;
+	uint8_t opcode = data[SDO_INFORMATION_OPCODE_AT] & SDO_INFORMATION_OPCODE_MASK;
 	uint16_t left;
 
-	if (len < INFORMATION_BODY_AT + INDEX_BYTES) {
+	if (len < SDO_INFORMATION_BODY_AT + SDO_GET_OBJECT_BYTES) {
 		return -EPROTO;
 	}
-	if (opcode == INFORMATION_ERROR) {
+	if (opcode == SDO_INFORMATION_ERROR) {
 		rq->detail = body_len >= 4 ? get_le32(body) : 0;
 		return -EREMOTEIO;
 	}
 	if (opcode != opcode_of(rq) + 1) {
 		return MAILBOX_IGNORE;
 	}
-	left = get_le16(data + INFORMATION_FRAGMENTS_AT);
+	left = get_le16(data + SDO_INFORMATION_FRAGMENTS_AT);
 	if (st->has_fragment) {
 		/* One lost in between would make a list with a hole. */
 		return left + 1 == st->fragments_left ? take_fragment(rq, body, body_len, left)
@@ -114,8 +99,8 @@ int coe_information_received(struct mailbox_request *rq, const uint8_t *data, si
 		return MAILBOX_IGNORE;
 	}
 	if (rq->with.coe.operation == COE_LIST) {
-		body += INDEX_BYTES; /* the list's type, in the first fragment only */
-		body_len -= INDEX_BYTES;
+		body += SDO_GET_OBJECT_BYTES; /* the list's type, in the first fragment only */
+		body_len -= SDO_GET_OBJECT_BYTES;
 	}
 	return take_fragment(rq, body, body_len, left);
 }
@@ -130,20 +115,20 @@ static void get_name(const uint8_t *text, size_t len, char *ret_name)
 
 int coe_object_get(const uint8_t *buffer, size_t len, struct coe_object *ret)
 {
-	if (len < OBJECT_BYTES) {
+	if (len < SDO_OBJECT_BYTES) {
 		return -EPROTO;
 	}
 	*ret = (struct coe_object){ .index = get_le16(buffer),
 				    .data_type = get_le16(buffer + 2),
 				    .subindex_max = buffer[4],
 				    .object_code = buffer[5] };
-	get_name(buffer + OBJECT_BYTES, len - OBJECT_BYTES, ret->name);
+	get_name(buffer + SDO_OBJECT_BYTES, len - SDO_OBJECT_BYTES, ret->name);
 	return 0;
 }
 
 int coe_entry_get(const uint8_t *buffer, size_t len, struct coe_entry *ret)
 {
-	if (len < ENTRY_BYTES) {
+	if (len < SDO_ENTRY_BYTES) {
 		return -EPROTO;
 	}
 	*ret = (struct coe_entry){ .index = get_le16(buffer),
@@ -151,6 +136,6 @@ int coe_entry_get(const uint8_t *buffer, size_t len, struct coe_entry *ret)
 				   .data_type = get_le16(buffer + 4),
 				   .bit_len = get_le16(buffer + 6),
 				   .access = get_le16(buffer + 8) };
-	get_name(buffer + ENTRY_BYTES, len - ENTRY_BYTES, ret->name);
+	get_name(buffer + SDO_ENTRY_BYTES, len - SDO_ENTRY_BYTES, ret->name);
 	return 0;
 }

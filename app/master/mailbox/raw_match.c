@@ -3,19 +3,19 @@
 #include <errno.h>
 #include <string.h>
 
-#include "mailbox/coe_internal.h"
 #include "mailbox/raw_internal.h"
+#include "wire/coe.h"
 #include "wire/foe.h"
 #include "wire/voe.h"
 
 static unsigned coe_service(const uint8_t *data, size_t len)
 {
-	return len > COMMAND_AT ? get_le16(data) >> COE_SERVICE_SHIFT : 0;
+	return len > SDO_COMMAND_AT ? get_le16(data) >> COE_SERVICE_SHIFT : 0;
 }
 
 static uint8_t sdo_specifier(const uint8_t *data)
 {
-	return data[COMMAND_AT] & SDO_SPECIFIER;
+	return data[SDO_COMMAND_AT] & SDO_SPECIFIER;
 }
 
 /* A request that names its object; segments do not. */
@@ -45,7 +45,7 @@ static int is_sdo_answer(const struct mailbox_request *rq, const uint8_t *data, 
 		return 0;
 	}
 	if (is_sdo_initiate(rq->buffer, rq->capacity) &&
-	    (len < SDO_BYTES || memcmp(data + INDEX_AT, rq->buffer + INDEX_AT, 3) != 0)) {
+	    (len < SDO_BYTES || memcmp(data + SDO_INDEX_AT, rq->buffer + SDO_INDEX_AT, 3) != 0)) {
 		return 0; /* of another object: a late one to an earlier request */
 	}
 	return is_abort || sdo_specifier(rq->buffer) > SDO_UPLOAD_SEGMENT ||
@@ -162,9 +162,10 @@ uint16_t raw_fragments_left(const struct mailbox_request *rq, const uint8_t *dat
 
 	if (rq->protocol->type == MAILBOX_TYPE_COE &&
 	    coe_service(data, len) == COE_SDO_INFORMATION) {
-		return len >= INFORMATION_BODY_AT && (data[INFORMATION_OPCODE_AT] &
-						      INFORMATION_OPCODE_MASK) != INFORMATION_ERROR
-			       ? get_le16(data + INFORMATION_FRAGMENTS_AT)
+		return len >= SDO_INFORMATION_BODY_AT &&
+				       (data[SDO_INFORMATION_OPCODE_AT] &
+					SDO_INFORMATION_OPCODE_MASK) != SDO_INFORMATION_ERROR
+			       ? get_le16(data + SDO_INFORMATION_FRAGMENTS_AT)
 			       : 0;
 	}
 	if (rq->protocol->type == MAILBOX_TYPE_SOE && soe_parse(data, len, &m) == 0) {
@@ -177,11 +178,11 @@ static void put_abort(const uint8_t *request, size_t len, uint32_t code, uint8_t
 {
 	memset(data, 0, SDO_BYTES);
 	put_le16(data, COE_SDO_REQUEST << COE_SERVICE_SHIFT);
-	data[COMMAND_AT] = SDO_ABORT;
+	data[SDO_COMMAND_AT] = SDO_ABORT;
 	if (is_sdo_initiate(request, len)) {
-		memcpy(data + INDEX_AT, request + INDEX_AT, 3);
+		memcpy(data + SDO_INDEX_AT, request + SDO_INDEX_AT, 3);
 	}
-	put_le32(data + DATA_AT, code);
+	put_le32(data + SDO_DATA_AT, code);
 }
 
 int raw_abort(const struct mailbox_request *rq, uint8_t *data, size_t capacity)
@@ -210,8 +211,8 @@ int raw_refuse_sdo(const uint8_t *data, size_t len, uint8_t *ret_answer)
 /* Does an initiated transfer of the size in @data leave something for segments? */
 static int has_segments(const uint8_t *data, size_t len)
 {
-	return len >= SDO_BYTES && !(data[COMMAND_AT] & SDO_EXPEDITED) &&
-	       get_le32(data + DATA_AT) > len - SDO_BYTES;
+	return len >= SDO_BYTES && !(data[SDO_COMMAND_AT] & SDO_EXPEDITED) &&
+	       get_le32(data + SDO_DATA_AT) > len - SDO_BYTES;
 }
 
 static enum raw_transfer after_sdo(const struct mailbox_request *rq, const uint8_t *answer,
@@ -229,13 +230,13 @@ static enum raw_transfer after_sdo(const struct mailbox_request *rq, const uint8
 		goes_on = has_segments(answer, answer_len);
 		break;
 	case SDO_UPLOAD_SEGMENT:
-		goes_on = !(answer[COMMAND_AT] & SDO_LAST_SEGMENT);
+		goes_on = !(answer[SDO_COMMAND_AT] & SDO_LAST_SEGMENT);
 		break;
 	case SDO_DOWNLOAD:
 		goes_on = has_segments(rq->buffer, rq->capacity);
 		break;
 	case SDO_DOWNLOAD_SEGMENT:
-		goes_on = !(rq->buffer[COMMAND_AT] & SDO_LAST_SEGMENT);
+		goes_on = !(rq->buffer[SDO_COMMAND_AT] & SDO_LAST_SEGMENT);
 		break;
 	default:
 		break;

@@ -7,34 +7,7 @@
 
 #include "base/bytes.h"
 #include "devices/coe_information.h"
-
-enum coe_service { COE_SDO_REQUEST = 2, COE_SDO_RESPONSE = 3, COE_SDO_INFORMATION = 8 };
-
-enum sdo_command {
-	SDO_SPECIFIER = 0xe0, /* the three bits that say which command it is */
-	SDO_DOWNLOAD = 0x20,
-	SDO_DOWNLOADED = 0x60,
-	SDO_DOWNLOAD_SEGMENT = 0x00,
-	SDO_SEGMENT_DOWNLOADED = 0x20,
-	SDO_UPLOAD = 0x40,
-	SDO_UPLOAD_SEGMENT = 0x60,
-	SDO_ABORT = 0x80,
-	SDO_COMPLETE_ACCESS = 0x10,
-	SDO_TOGGLE = 0x10,
-	SDO_EXPEDITED = 0x02,
-	SDO_SIZE_INDICATED = 0x01,
-	SDO_LAST_SEGMENT = 0x01,
-};
-
-enum layout {
-	COMMAND_AT = 2, /* behind the CoE header */
-	INDEX_AT = 3,
-	SUBINDEX_AT = 5,
-	DATA_AT = 6,
-	SDO_BYTES = 10,
-	SEGMENT_AT = 3,
-	SEGMENT_MIN = 7,
-};
+#include "wire/coe.h"
 
 /* One SDO request, taken apart. */
 struct sdo {
@@ -48,18 +21,18 @@ struct sdo {
 static void put_header(uint8_t *answer, uint8_t command, const struct sdo *sdo)
 {
 	memset(answer, 0, SDO_BYTES);
-	put_le16(answer, COE_SDO_RESPONSE << 12);
-	answer[COMMAND_AT] = command;
-	put_le16(answer + INDEX_AT, sdo->index);
-	answer[SUBINDEX_AT] = sdo->subindex;
+	put_le16(answer, COE_SDO_RESPONSE << COE_SERVICE_SHIFT);
+	answer[SDO_COMMAND_AT] = command;
+	put_le16(answer + SDO_INDEX_AT, sdo->index);
+	answer[SDO_SUBINDEX_AT] = sdo->subindex;
 }
 
 static size_t answer_abort(uint8_t *answer, const struct sdo *sdo, enum coe_abort code)
 {
 	put_header(answer, SDO_ABORT, sdo);
 	/* Captures: an abort comes as service 2, SDO request. */
-	put_le16(answer, COE_SDO_REQUEST << 12);
-	put_le32(answer + DATA_AT, (uint32_t)code);
+	put_le16(answer, COE_SDO_REQUEST << COE_SERVICE_SHIFT);
+	put_le32(answer + SDO_DATA_AT, (uint32_t)code);
 	return SDO_BYTES;
 }
 
@@ -142,14 +115,15 @@ static size_t upload(struct coe_server *server, const struct sdo *sdo, uint8_t *
 	if (server->upload_len > 0 && server->upload_len <= 4) {
 		put_header(answer,
 			   (uint8_t)(SDO_UPLOAD | access | SDO_EXPEDITED | SDO_SIZE_INDICATED |
-				     (4 - server->upload_len) << 2),
+				     (SDO_EXPEDITED_BYTES - server->upload_len)
+					     << SDO_EXPEDITED_SHIFT),
 			   sdo);
-		memcpy(answer + DATA_AT, server->source, server->upload_len);
+		memcpy(answer + SDO_DATA_AT, server->source, server->upload_len);
 		server->upload_pos = server->upload_len;
 		return SDO_BYTES;
 	}
 	put_header(answer, (uint8_t)(SDO_UPLOAD | access | SDO_SIZE_INDICATED), sdo);
-	put_le32(answer + DATA_AT, (uint32_t)server->upload_len);
+	put_le32(answer + SDO_DATA_AT, (uint32_t)server->upload_len);
 	now = server->upload_len < capacity - SDO_BYTES ? server->upload_len : capacity - SDO_BYTES;
 	memcpy(answer + SDO_BYTES, server->source, now);
 	server->upload_pos = now;
@@ -160,7 +134,7 @@ static size_t upload_segment(struct coe_server *server, const struct sdo *sdo, u
 			     size_t capacity)
 {
 	size_t left = server->upload_len - server->upload_pos;
-	size_t now = left < capacity - SEGMENT_AT ? left : capacity - SEGMENT_AT;
+	size_t now = left < capacity - SDO_SEGMENT_AT ? left : capacity - SDO_SEGMENT_AT;
 	uint8_t command = sdo->command & SDO_TOGGLE;
 
 	if (left == 0) {
@@ -170,15 +144,16 @@ static size_t upload_segment(struct coe_server *server, const struct sdo *sdo, u
 		return answer_abort(answer, sdo, COE_ABORT_TOGGLE);
 	}
 	server->toggle ^= SDO_TOGGLE;
-	memset(answer, 0, SEGMENT_AT + SEGMENT_MIN);
-	put_le16(answer, COE_SDO_RESPONSE << 12);
-	memcpy(answer + SEGMENT_AT, server->source + server->upload_pos, now);
+	memset(answer, 0, SDO_SEGMENT_AT + SDO_SEGMENT_MIN);
+	put_le16(answer, COE_SDO_RESPONSE << COE_SERVICE_SHIFT);
+	memcpy(answer + SDO_SEGMENT_AT, server->source + server->upload_pos, now);
 	server->upload_pos += now;
 	command |= server->upload_pos == server->upload_len ? SDO_LAST_SEGMENT : 0;
 	/* A short segment is filled up, and says by how much. */
-	command |= (uint8_t)(now < SEGMENT_MIN ? (SEGMENT_MIN - now) << 1 : 0);
-	answer[COMMAND_AT] = command;
-	return SEGMENT_AT + (now < SEGMENT_MIN ? SEGMENT_MIN : now);
+	command |=
+		(uint8_t)(now < SDO_SEGMENT_MIN ? (SDO_SEGMENT_MIN - now) << SDO_UNUSED_SHIFT : 0);
+	answer[SDO_COMMAND_AT] = command;
+	return SDO_SEGMENT_AT + (now < SDO_SEGMENT_MIN ? SDO_SEGMENT_MIN : now);
 }
 
 /* --- download --- */
@@ -247,13 +222,13 @@ static size_t download_segment(struct coe_server *server, const uint8_t *request
 	struct sdo sdo = { .command = server->download_command,
 			   .index = server->index,
 			   .subindex = server->subindex };
-	uint8_t command = request[COMMAND_AT];
+	uint8_t command = request[SDO_COMMAND_AT];
 	size_t left = server->download_len - server->download_pos;
-	size_t now = request_len - SEGMENT_AT;
+	size_t now = request_len - SDO_SEGMENT_AT;
 	enum coe_abort code;
 
-	if (now == SEGMENT_MIN) {
-		now -= command >> 1 & 7u;
+	if (now == SDO_SEGMENT_MIN) {
+		now -= command >> SDO_UNUSED_SHIFT & SDO_UNUSED_MASK;
 	}
 	if (server->target == NULL) {
 		return answer_abort(answer, &sdo, COE_ABORT_COMMAND);
@@ -265,7 +240,7 @@ static size_t download_segment(struct coe_server *server, const uint8_t *request
 				    (command & SDO_TOGGLE) != server->toggle ? COE_ABORT_TOGGLE
 									     : COE_ABORT_LENGTH);
 	}
-	memcpy(server->target + server->download_pos, request + SEGMENT_AT, now);
+	memcpy(server->target + server->download_pos, request + SDO_SEGMENT_AT, now);
 	server->download_pos += now;
 	server->toggle ^= SDO_TOGGLE;
 	if (now == left) {
@@ -276,8 +251,8 @@ static size_t download_segment(struct coe_server *server, const uint8_t *request
 		}
 	}
 	memset(answer, 0, SDO_BYTES);
-	put_le16(answer, COE_SDO_RESPONSE << 12);
-	answer[COMMAND_AT] = (uint8_t)(SDO_SEGMENT_DOWNLOADED | (command & SDO_TOGGLE));
+	put_le16(answer, COE_SDO_RESPONSE << COE_SERVICE_SHIFT);
+	answer[SDO_COMMAND_AT] = (uint8_t)(SDO_SEGMENT_DOWNLOADED | (command & SDO_TOGGLE));
 	return SDO_BYTES;
 }
 
@@ -288,7 +263,9 @@ static size_t download(struct coe_server *server, const struct sdo *sdo, uint8_t
 	enum coe_abort code;
 
 	if (sdo->command & SDO_EXPEDITED) {
-		len = sdo->command & SDO_SIZE_INDICATED ? 4u - (sdo->command >> 2 & 3u) : 4;
+		len = sdo->command & SDO_SIZE_INDICATED
+			      ? 4u - (sdo->command >> SDO_EXPEDITED_SHIFT & SDO_EXPEDITED_MASK)
+			      : 4;
 	} else {
 		len = get_le32(bytes);
 		bytes += 4;
@@ -357,7 +334,7 @@ size_t coe_server_answer(struct coe_server *server, const uint8_t *request, size
 	if (request_len < 2 || capacity < SDO_BYTES) {
 		return 0;
 	}
-	service = get_le16(request) >> 12;
+	service = get_le16(request) >> COE_SERVICE_SHIFT;
 	if (service == COE_SDO_INFORMATION) {
 		return coe_information_answer(&server->dictionary, request, request_len, answer,
 					      capacity);
@@ -365,11 +342,11 @@ size_t coe_server_answer(struct coe_server *server, const uint8_t *request, size
 	if (service != COE_SDO_REQUEST || request_len < SDO_BYTES) {
 		return 0;
 	}
-	sdo.command = request[COMMAND_AT];
-	sdo.index = get_le16(request + INDEX_AT);
-	sdo.subindex = request[SUBINDEX_AT];
-	sdo.data = request + DATA_AT;
-	sdo.data_len = request_len - DATA_AT;
+	sdo.command = request[SDO_COMMAND_AT];
+	sdo.index = get_le16(request + SDO_INDEX_AT);
+	sdo.subindex = request[SDO_SUBINDEX_AT];
+	sdo.data = request + SDO_DATA_AT;
+	sdo.data_len = request_len - SDO_DATA_AT;
 	switch (sdo.command & SDO_SPECIFIER) {
 	case SDO_DOWNLOAD_SEGMENT:
 		return download_segment(server, request, request_len, answer);
