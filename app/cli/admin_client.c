@@ -10,51 +10,17 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "base/clock.h"
 #include "base/stop.h"
 
-/* ecdaqd ends each request by a time-out of its own; these are a little longer. */
-enum { REPLY_TIMEOUT_S = 25, LONG_TIMEOUT_S = 605 };
-/* From one look whether the user wants the end to the next. */
-enum { LOOK_MS = 200 };
+/* ecdaqd ends each request by a time-out; the answer to that must come within this. */
+enum { REPLY_MARGIN_S = 5 };
+/* Interval at which a request to stop is checked. */
+enum { STOP_CHECK_MS = 200 };
 
 static int timeout_s(const struct admin_request *request)
 {
-	switch ((enum admin_verb)request->verb) {
-	case ADMIN_RESCAN:
-	case ADMIN_SII_READ:
-	case ADMIN_SII_WRITE:
-	case ADMIN_FOE_READ: /* progress comes before, but while a slave erases its flash */
-	case ADMIN_FOE_WRITE:
-		return LONG_TIMEOUT_S;
-	case ADMIN_STATE:
-		return request->slave_pos == ADMIN_ALL_SLAVES ? LONG_TIMEOUT_S : REPLY_TIMEOUT_S;
-	case ADMIN_PING:
-	case ADMIN_SET:
-	case ADMIN_ONESHOT:
-	case ADMIN_SDO_READ:
-	case ADMIN_SDO_WRITE:
-	case ADMIN_STOP:
-	case ADMIN_CLEAR:
-	case ADMIN_CANCEL:
-	case ADMIN_DATA:
-	case ADMIN_REGISTER_READ:
-	case ADMIN_REGISTER_WRITE:
-	case ADMIN_SII_ALIAS:
-	case ADMIN_DIAGNOSIS:
-	case ADMIN_ERRORS_RESET:
-	case ADMIN_SDO_LIST:
-	case ADMIN_SDO_OBJECT:
-	case ADMIN_SDO_ENTRY:
-	case ADMIN_SOE_READ:
-	case ADMIN_SOE_WRITE:
-	case ADMIN_EOE_IP_READ:
-	case ADMIN_EOE_IP_WRITE:
-	case ADMIN_AOE_READ:
-	case ADMIN_AOE_WRITE:
-	case ADMIN_VOE:
-		break;
-	}
-	return REPLY_TIMEOUT_S;
+	return (int)(admin_timeout_ns(request) / NS_PER_S) + REPLY_MARGIN_S;
 }
 
 static enum exit_code fail_connect(const struct cli *cli, const char *path, int err)
@@ -137,7 +103,7 @@ static int send_all(int fd, const struct admin_transfer *tr)
 	return r;
 }
 
-/* The user wants the end of it: said once, and its answer waited for. 0 or -errno. */
+/* Ctrl-C: cancel the request once, then wait for its answer. 0 or -errno. */
 static int cancel(int fd, struct admin_transfer *tr)
 {
 	struct admin_request message = { .magic = ADMIN_MAGIC,
@@ -156,9 +122,9 @@ static int wait_message(int fd, struct admin_transfer *tr)
 {
 	struct pollfd pfd = { .fd = fd, .events = POLLIN };
 
-	for (int left_ms = timeout_s(tr->request) * 1000; left_ms > 0; left_ms -= LOOK_MS) {
+	for (int left_ms = timeout_s(tr->request) * 1000; left_ms > 0; left_ms -= STOP_CHECK_MS) {
 		int r = cancel(fd, tr);
-		int n = r < 0 ? r : poll(&pfd, 1, LOOK_MS);
+		int n = r < 0 ? r : poll(&pfd, 1, STOP_CHECK_MS);
 
 		if (r < 0 || n > 0 || (n < 0 && errno != EINTR)) {
 			return r < 0 ? r : n > 0 ? 0 : -errno;

@@ -83,6 +83,8 @@ enum {
 	ADMIN_REGISTER_BYTES = 256,      /* in one access */
 	ADMIN_TRANSFER_BYTES = 16 << 20, /* in one request or answer: a firmware image */
 	ADMIN_TIMEOUT_MS_MAX = 3600 * 1000,
+	ADMIN_TIMEOUT_S = 20,           /* of most verbs, see admin_timeout_ns() */
+	ADMIN_BRING_UP_TIMEOUT_S = 600, /* its own time-outs together may be longer */
 };
 
 struct admin_item {
@@ -94,7 +96,7 @@ struct admin_request {
 	uint32_t magic;
 	uint32_t verb;       /* enum admin_verb */
 	uint32_t id;         /* chosen by the client, different among its open requests */
-	uint32_t timeout_ms; /* 0: the verb's own */
+	uint32_t timeout_ms; /* 0: the verb's own, admin_timeout_ns() */
 	uint32_t count;      /* of item[] */
 	uint16_t slave_pos;
 	uint16_t index;
@@ -190,5 +192,11 @@ static_assert(sizeof(struct admin_sdo_object) == 70, "both ends agree");
 static_assert(sizeof(struct admin_sdo_entry) == 74, "both ends agree");
 static_assert(sizeof(struct admin_request) == 136 + 64 * 72 + 1024, "both ends agree");
 static_assert(sizeof(struct admin_reply) == 56 + 256 + 1024, "both ends agree");
+
+/**
+ * Time after which ecdaqd ends @request with -ETIMEDOUT. A client waits some seconds longer for
+ * each message of the answer. Context: any.
+ */
+int64_t admin_timeout_ns(const struct admin_request *request);
 
 #endif

@@ -19,17 +19,8 @@
 
 /* A one-shot time must be this many periods ahead: the next frames carry the value first. */
 enum { ADMIN_ONESHOT_MARGIN_CYCLES = 5 };
-/* Timeout of the cycle's answer to a set of outputs; of any other request that names none. */
-#define ADMIN_CYCLE_TIMEOUT_NS (1 * NS_PER_S)
-#define ADMIN_TIMEOUT_NS (20 * NS_PER_S)
 /* From one message with data of a request to the next. */
 #define ADMIN_DATA_TIMEOUT_NS (2 * NS_PER_S)
-/* A whole EEPROM, word by word. */
-#define ADMIN_SII_TIMEOUT_NS (600 * NS_PER_S)
-/* A whole file: a slave that does not go on ends it earlier. */
-#define ADMIN_FOE_TIMEOUT_NS (3600 * NS_PER_S)
-/* All timeouts of a bring-up together may be longer; the client then gets a timeout error. */
-#define ADMIN_BRING_UP_TIMEOUT_NS (600 * NS_PER_S)
 /* Latest time of a one-shot from now: a later one is probably a typing error. */
 #define ADMIN_ONESHOT_AHEAD_NS (3600 * NS_PER_S)
 
@@ -80,8 +71,5 @@ void admin_command_report(const struct admin_target *target, struct admin_pendin
 
 /** 1 if each step of a request of @verb waits for a frame of its own: one of them in a pass. */
 int admin_command_takes_frame(enum admin_verb verb);
-
-/** How long a request of @verb may stay open if it does not say. */
-int64_t admin_command_timeout_ns(const struct admin_request *request);
 
 #endif

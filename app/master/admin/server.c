@@ -302,7 +302,7 @@ static void start(const struct pass *pass, struct admin_pending *pending)
 static void execute(const struct pass *pass, struct admin_pending *pending)
 {
 	int64_t limit_ns = pending->state == ADMIN_PENDING_OPEN
-				   ? admin_command_timeout_ns(&pending->request)
+				   ? admin_timeout_ns(&pending->request)
 				   : ADMIN_DATA_TIMEOUT_NS;
 
 	pending->give_up = mono_add(pass->now, (span_t){ limit_ns });
