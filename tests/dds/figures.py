@@ -16,10 +16,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bench import BUILD, DDS_SETTINGS, Bench, live, rows, wait_for
+from flags import LOST
 
 DOMAIN = DDS_SETTINGS["dds.domain"]
 LED = "piccolo0.led"
-SKIPPED, LOST = 1 << 5, 1 << 0  # base/sample.h
 COMMANDER = {
     "outputs[0].channel": LED,
     "outputs[0].owner": "remote",

@@ -9,12 +9,12 @@ from collections.abc import Callable
 
 import pytest
 from bench import DDS_SETTINGS, Bench, live
+from flags import SKIPPED
 
 LED = "piccolo0.led"
 # Long enough for a lease of a second, the longest: a commander that a busy machine does not run for
 # a while is not to be taken for dead.
 TIMEOUT_MS = 2000
-SKIPPED = 1 << 5  # base/sample.h
 REMOTE_LED = {
     "outputs[0].channel": LED,
     "outputs[0].owner": "remote",

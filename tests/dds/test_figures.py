@@ -16,8 +16,6 @@ from pathlib import Path
 from bench import BUILD, Bench, live, wait_for
 from figures import (
     COMMANDER,
-    LOST,
-    SKIPPED,
     cycles_of,
     latencies,
     percentile,
@@ -29,6 +27,7 @@ from figures import (
     wait_for_ends,
     wait_for_ready,
 )
+from flags import LOST, SKIPPED
 from test_samples import finish, gaps_of, of_recording, of_subscriber
 from vendors import joined
 

@@ -11,7 +11,8 @@ import re
 from collections.abc import Callable
 
 from bench import BUILD, Bench, Commander, wait_for
-from figures import COMMANDER, DOMAIN, LED, LOST, cycles_of, start_c, start_python, wait_for_ready
+from figures import COMMANDER, DOMAIN, LED, cycles_of, start_c, start_python, wait_for_ready
+from flags import LOST
 from test_samples import finish, gaps_of, of_recording, of_subscriber
 from vendors import SECONDS, joined
 

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from bench import DDS_SETTINGS, ROOT, Bench, live, rows, wait_for
+from flags import WKC_LOW
 
 SLAVES = ("piccolo0", "piccolo1")
 LAST = 1
 ONLY_LAST_IS_BAD = tuple(slave != LAST for slave in range(len(SLAVES)))
-WKC_LOW = 4  # the flag of a cycle in which not all slaves answered
 FAULT_CYCLES = 500
 MIN_CYCLES = 200  # of the fault that all readers have, on a busy machine too
 
