@@ -51,6 +51,11 @@ PASSING_REASONS = (
 )
 
 
+def is_passing(answer: dict[str, Any]) -> bool:
+    """A refusal that says nothing of the command."""
+    return not answer["accepted"] and any(why in answer["reason"] for why in PASSING_REASONS)
+
+
 class Commander:
     """command_python.py, spoken to in JSON."""
 
@@ -70,14 +75,19 @@ class Commander:
         self.process.stdin.flush()
         return self._answer()
 
-    def accepted(self, values: dict[str, float]) -> int:
-        """The cycle of a command that has to pass; what only a busy machine refuses is repeated."""
+    def settled(self, values: dict[str, float], **more: Any) -> dict[str, Any]:
+        """The answer to a command; one that only a busy machine refuses is repeated."""
         for _ in range(20):
-            answer = self.command(values)
-            if answer["accepted"]:
-                return answer["cycle"]
-            assert any(why in answer["reason"] for why in PASSING_REASONS), answer
+            answer = self.command(values, **more)
+            if not is_passing(answer):
+                return answer
         raise AssertionError(answer)
+
+    def accepted(self, values: dict[str, float]) -> int:
+        """The cycle of a command that has to pass."""
+        answer = self.settled(values)
+        assert answer["accepted"], answer
+        return answer["cycle"]
 
     def kill(self) -> None:
         self.process.kill()
