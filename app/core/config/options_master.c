@@ -206,7 +206,9 @@ static const struct option rows[] = {
 	  .min = "100ns",
 	  .max = "1ms",
 	  .unit = "us",
-	  .prose = "Locked when the filtered phase error stays below this for dc.lock_cycles." },
+	  .prose = "Locked when the filtered phase error stays below this for dc.lock_cycles. "
+		   "A single frame with five times this error is left out, unless more than "
+		   "two of three are like that." },
 	{ .name = "dc.lock_cycles",
 	  .type = OPTION_UINT,
 	  FIELD(dc_lock_cycles),

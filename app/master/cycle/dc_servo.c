@@ -14,7 +14,9 @@ enum {
 	LOSS_CYCLES = 200, /* lock is lost after this long outside the window, far off or without a
 			      measurement */
 	LEAK_CYCLES = 2,   /* subtracted for one cycle in the wrong place */
-	CLAMP_LIMITS = 5,  /* one frame counts for at most this many lock limits */
+	CLAMP_LIMITS = 5,  /* a frame with an error of so many lock limits is an outlier; if it is
+			      used, it counts for so many */
+	STEP_CYCLES = 32,  /* so many outliers (leaky) are a step of the clock */
 };
 
 void dc_servo_init(struct dc_servo *servo, const struct dc_servo_spec *spec)
@@ -54,11 +56,28 @@ static struct dc_servo_result jump(struct dc_servo *servo, int64_t error_ns)
 	servo->is_phase_known = 1;
 	servo->filtered_ns = 0;
 	servo->far_off = 0;
+	servo->outliers = 0;
 	servo->in_window = 0;
 	return (struct dc_servo_result){
 		.error_ns = error_ns,
 		.correction_ns = mod_floor(-error_ns, servo->spec.period_ns),
 	};
+}
+
+/*
+ * 1: leave this frame out. A frame that reaches the reference late, since the host or a simulated
+ * segment is busy, shows an error that always has the same sign. Used, even clamped, it shifts the
+ * frequency (by 100 ppm, if it is one frame in ten) and keeps the smoothed error outside the
+ * window. If more than two of three frames are outliers, the clock itself is there: they are used.
+ */
+static int judge_outlier(struct dc_servo *servo, int is_clamped)
+{
+	servo->outliers = leak(servo->outliers, is_clamped);
+	if (servo->outliers < STEP_CYCLES) {
+		return is_clamped;
+	}
+	servo->outliers = STEP_CYCLES;
+	return 0;
 }
 
 /*
@@ -90,6 +109,7 @@ struct dc_servo_result dc_servo_update(struct dc_servo *servo, int64_t frame_dc_
 	int64_t error_ns =
 		fold_ns(frame_dc_ns - send_latency_ns - spec->set_point_ns, spec->period_ns);
 	double clamp_ns = (double)(CLAMP_LIMITS * spec->lock_limit_ns);
+	int is_clamped = fabs((double)error_ns) >= clamp_ns;
 	double used_ns = clamp((double)error_ns, clamp_ns);
 	double integral_limit_ns = INTEGRAL_LIMIT_PPM * 1e-6 * (double)spec->period_ns;
 	double correction_ns;
@@ -103,9 +123,13 @@ struct dc_servo_result dc_servo_update(struct dc_servo *servo, int64_t frame_dc_
 		servo->state = servo->state == DC_LOCKED ? DC_LOST : servo->state;
 		return jump(servo, error_ns);
 	}
-	servo->filtered_ns += FILTER_SHARE * (used_ns - servo->filtered_ns);
+	if (judge_outlier(servo, is_clamped)) {
+		used_ns = 0;
+	} else {
+		servo->filtered_ns += FILTER_SHARE * (used_ns - servo->filtered_ns);
+	}
 	/* A clamped error gives the direction, not the difference in rate. */
-	if (fabs((double)error_ns) < clamp_ns) {
+	if (!is_clamped) {
 		servo->integral_ns =
 			clamp(servo->integral_ns - spec->ki * used_ns, integral_limit_ns);
 	}

@@ -6,6 +6,7 @@
  *
  * One jump brings the phase near at the start, a PI controller holds it. The error is taken free
  * of the host's own send latency, which is known, so that a late wake does not look like drift.
+ * Frames held up after that are outliers and left out.
  * Gains are per cycle; Kp 0.02 and Ki 0.0001 are critically damped. Context: cycle thread, RT-safe.
  */
 #ifndef CYCLE_DC_SERVO_H
@@ -37,6 +38,7 @@ struct dc_servo {
 	uint32_t in_window;  /* leaky count towards lock */
 	uint32_t out_window; /* leaky count towards unlock */
 	uint32_t far_off;    /* leaky count towards another jump */
+	uint32_t outliers;   /* leaky count towards a step of the clock */
 	uint32_t coasted;    /* cycles without a measurement */
 };
 

@@ -27,13 +27,19 @@ struct plant {
 	double host_ns; /* deadline, on the reference's time axis */
 	double ppm;
 	int64_t latency_ns;
+	double held_share; /* of the frames: held up on the way to the reference */
+	int64_t held_ns;   /* by up to this */
 };
 
 static struct dc_servo_result turn(struct plant *p)
 {
 	int64_t late =
 		p->latency_ns > 0 ? (int64_t)prng_below(&p->prng, (uint64_t)p->latency_ns) : 0;
-	struct dc_servo_result r = dc_servo_update(&p->servo, (int64_t)p->host_ns + late, late);
+	int64_t held = p->held_share > 0 && prng_unit(&p->prng) < p->held_share
+			       ? (int64_t)prng_below(&p->prng, (uint64_t)p->held_ns)
+			       : 0;
+	struct dc_servo_result r =
+		dc_servo_update(&p->servo, (int64_t)p->host_ns + late + held, late);
 
 	p->host_ns += (double)(PERIOD_NS + r.correction_ns) * (1.0 + p->ppm * 1e-6);
 	return r;
@@ -82,6 +88,35 @@ TEST(dc_servo, a_late_wake_is_not_mistaken_for_drift)
 	p.latency_ns = 400000;
 	for (unsigned i = 0; i < 100; i++) {
 		CHECK(llabs(turn(&p).error_ns) <= 1);
+	}
+}
+
+/* Always late: if used, one frame in ten would be 100 ppm. */
+TEST(dc_servo, frames_held_up_on_their_way_delay_no_lock_and_shift_no_frequency)
+{
+	for (uint64_t seed = 0; seed < 100; seed++) {
+		struct prng prng = { seed };
+		double start = 1e9 + (double)prng_below(&prng, PERIOD_NS);
+		double ppm = (prng_unit(&prng) - 0.5) * 200.0;
+		struct plant p = make_plant(seed, start, ppm, 80000);
+		double off_ppm = 0;
+		unsigned cycles = 0;
+
+		p.held_share = 0.25;
+		p.held_ns = 300000;
+		while (p.servo.state != DC_LOCKED) {
+			turn(&p);
+			CHECK(++cycles < 2000);
+		}
+		for (unsigned i = 0; i < 1000; i++) {
+			turn(&p);
+		}
+		for (unsigned i = 0; i < 2000; i++) {
+			turn(&p);
+			off_ppm += p.servo.integral_ns * 1e6 / PERIOD_NS + ppm;
+		}
+		CHECK(fabs(off_ppm / 2000) < 5.0);
+		CHECK_EQ(p.servo.state, DC_LOCKED);
 	}
 }
 
@@ -167,6 +202,24 @@ TEST(dc_servo, a_step_of_the_reference_loses_the_lock_and_finds_it_again)
 		was_lost |= p.servo.state == DC_LOST;
 		CHECK(++cycles < 2000);
 	} while (!was_lost || p.servo.state != DC_LOCKED);
+}
+
+/* Beyond what one frame counts for, and too near for a jump. */
+TEST(dc_servo, a_step_of_80_microseconds_is_followed_without_losing_the_lock)
+{
+	for (int sign = -1; sign <= 1; sign += 2) {
+		struct plant p = make_plant(4, 1e9, 30.0, 20000);
+
+		for (unsigned i = 0; i < 3000; i++) {
+			turn(&p);
+		}
+		p.host_ns += sign * 80000;
+		for (unsigned i = 0; i < 1000; i++) {
+			turn(&p);
+			CHECK_EQ(p.servo.state, DC_LOCKED);
+		}
+		CHECK(llabs(turn(&p).error_ns) < 1000);
+	}
 }
 
 TEST(dc_servo, corrections_never_exceed_the_slew_after_the_first_jump)
