@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * subscriber DOMAIN INTERFACE SECONDS OUT [sample|block|lossy]: what comes on ecdaq/sample or
- * ecdaq/block, as CSV, for some seconds. On a plain Cyclone DDS reader, as a C user would write
- * one; "lossy" is ecdaq/sample BEST_EFFORT. Prints "ready" when the publisher is there.
+ * ecdaq/block, as CSV, for some seconds or until SIGTERM. On a plain Cyclone DDS reader, as a C
+ * user would write one; "lossy" is ecdaq/sample BEST_EFFORT. Prints "ready" when the publisher is
+ * there.
  */
 #include <inttypes.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,6 +16,14 @@
 #include "ecdaq.h"
 
 enum { AT_ONCE = 256, NS = 1000000000 };
+
+static volatile sig_atomic_t is_stopped;
+
+static void stop(int number)
+{
+	(void)number;
+	is_stopped = 1;
+}
 
 static int64_t now_ns(void)
 {
@@ -119,6 +129,7 @@ int main(int argc, char **argv)
 		      stderr);
 		return 2;
 	}
+	(void)signal(SIGTERM, stop);
 	fputs("slave,session,cycle,dc_time_ns,flags,is_good,adc,counter,sample_time_ns,raw,"
 	      "taken_ns\n",
 	      out);
@@ -129,7 +140,7 @@ int main(int argc, char **argv)
 	puts("ready");
 	fflush(stdout);
 	end = now_ns() + (int64_t)(strtod(argv[3], NULL) * NS);
-	while (now_ns() < end) {
+	while (!is_stopped && now_ns() < end) {
 		dds_waitset_wait(waitset, NULL, 0, DDS_MSECS(100));
 		take(reader, out, strcmp(what, "block") == 0);
 	}
