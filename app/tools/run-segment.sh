@@ -32,7 +32,7 @@ real-time priority and reports that once.
                   there is none if the start failed
 
 exit codes: 0 stopped as requested, 1 failed (the last line of standard error is the cause),
-2 wrong command line
+2 wrong command line, 130 and 143 ended by SIGINT and SIGTERM before the segment was started
 
 environment:
   ECDAQ_BIN_DIR  folder of the programs (default: build/stage/bin)
@@ -232,7 +232,7 @@ start()
 	local name=$1
 
 	shift
-	setpriv --pdeathsig TERM setsid "$@" <&3 2>&4 4>&- &
+	setpriv --pdeathsig TERM setsid "$@" <&3 2>&4 4>&- 5>&- &
 	pid[$name]=$!
 }
 
@@ -270,7 +270,7 @@ stop()
 # The live view stays in this process group: Ctrl-Z and fg reach it, too.
 start_view()
 {
-	setpriv --pdeathsig TERM "$bin/ecdaq" top --leave-text 'q: stop master, segment and recorder' <&3 4>&- &
+	setpriv --pdeathsig TERM "$bin/ecdaq" top --leave-text 'q: stop master, segment and recorder' <&3 4>&- 5>&- &
 	pid[view]=$!
 	trap suspend TSTP
 }
@@ -283,7 +283,7 @@ suspend()
 	for ((tries = 0; tries < 100; tries++)); do
 		state=$(awk '/^State:/ { print $2 }' "/proc/${pid[view]:-none}/status" 2> /dev/null) || break
 		[[ $state != [TZ] ]] || break
-		sleep 0.02
+		sleep 0.02 || true
 	done
 	trap - TSTP
 	kill -TSTP "$$"
@@ -299,9 +299,10 @@ has_sync0_source()
 		END { exit !found }' "$config"
 }
 
+# start_sync0 yes|no: is there a source in the configuration?
 start_sync0()
 {
-	local options=()
+	local has_source=$1 options=()
 
 	[ "$sync0" = yes ] || return 0
 	if [ ! -x "$bin/ecdaq-sync0" ]; then
@@ -309,7 +310,7 @@ start_sync0()
 		return 0
 	fi
 	[ -z "$config" ] || options=(--config "$config")
-	if has_sync0_source; then
+	if [ "$has_source" = yes ]; then
 		start sync0 "$bin/ecdaq-sync0" "${options[@]}"
 	else
 		# ecdaq-sim makes this file when it starts.
@@ -323,7 +324,7 @@ start_sync0()
 adopt_dds()
 {
 	[ -n "${run_dds_pid:-}" ] || return 0
-	setsid tail --pid="$run_dds_pid" -s 0.1 -f /dev/null 4>&- &
+	setsid tail --pid="$run_dds_pid" -s 0.1 -f /dev/null 4>&- 5>&- &
 	pid[dds]=$!
 }
 
@@ -370,8 +371,6 @@ wait_for_end()
 {
 	local name status
 
-	mkfifo "$run_work/idle"
-	exec 5<> "$run_work/idle"
 	while [ "$interrupted" = no ]; do
 		read -r -t 0.2 -u 5 || true
 		for name in "${!pid[@]}"; do
@@ -427,7 +426,11 @@ run_inside()
 	local set_options=(--set bus.interface=ecat0 --set "record.dir=$record")
 	local daemon_options=(--simulated)
 	local segment_options=(--interface ecsim0 --slaves "$slaves" --control "$ECDAQ_RUN_DIR/segment")
+	local has_source=no
 
+	trap clean_up EXIT
+	trap 'exit 130' INT
+	trap 'exit 143' TERM
 	[ "$sync0" = no ] || segment_options+=(--edges "$ECDAQ_RUN_DIR/edges" --edges-keep 8)
 
 	# As root the segment gets a real-time priority below the master's: it replaces hardware.
@@ -438,9 +441,14 @@ run_inside()
 	mkdir -p "$record"
 	exec 3<&0
 	open_messages
-	trap clean_up EXIT
-	trap 'interrupted=yes' INT TERM
 	make_wire
+	! has_sync0_source || has_source=yes
+	# Nothing is ever written into it: wait_for_end sleeps in a read with a time limit.
+	mkfifo "$run_work/idle"
+	exec 5<> "$run_work/idle"
+	# From here to end_in_order no command runs in the foreground: Ctrl-C would end it, and its failure
+	# this script, without a summary.
+	trap 'interrupted=yes' INT TERM
 	start segment "$bin/ecdaq-sim" "${segment_options[@]}"
 	start recorder "$bin/ecdaq-record" "${set_options[@]}"
 	if [ "$view" = yes ]; then
@@ -451,7 +459,7 @@ run_inside()
 	fi
 	daemon_pid=${pid[daemon]}
 	adopt_dds
-	start_sync0
+	start_sync0 "$has_source"
 	wait_for_end
 	end_in_order
 	close_messages

@@ -35,6 +35,13 @@ WHEN_ALL_BUT_ONE_RUN = WHEN_RUN.format(count=4)
 PROGRAMS = ("ecdaqd", "ecdaq-record", "ecdaq-dds", "ecdaq-sim", "ecdaq-sync0")
 END_ORDER = ["ecdaq-sync0", "ecdaqd", "ecdaq-record", "ecdaq-dds", "ecdaq-sim"]
 PAGE = '{"state":"STOPPED"}'
+# A command of the script that logs its start, then takes its time. Ctrl-C ends it.
+SLOW = """#!/bin/bash
+if {condition}; then echo "slow $(basename "$0") $*" >> "$LOG"; sleep {seconds}; fi
+exec {real} "$@"
+"""
+# Until something happens or ends, on a loaded machine.
+SECONDS = 60
 TOOL = """#!/bin/bash
 echo "tool $*" >> "$LOG"
 [ "$1" = status ] && echo '{page}'
@@ -50,6 +57,7 @@ class Bench:
         self.log_file.touch()
         self.bin = folder / "bin"
         self.bin.mkdir()
+        self.path = folder / "path"
         self.program("ecdaq", TOOL.replace("{page}", PAGE))
         for name in PROGRAMS:
             self.program(name, STAND_IN.replace("{body}", ""))
@@ -61,12 +69,22 @@ class Bench:
     def make_it(self, name: str, body: str) -> None:
         self.program(name, STAND_IN.replace("{body}", body))
 
+    def make_slow(self, name: str, seconds: int, condition: str = "true") -> None:
+        """Of the commands that the script itself runs."""
+        real = shutil.which(name)
+        assert real is not None
+        self.path.mkdir(exist_ok=True)
+        text = SLOW.format(condition=condition, seconds=seconds, real=real)
+        (self.path / name).write_text(text)
+        (self.path / name).chmod(0o755)
+
     @property
     def log(self) -> list[str]:
         return self.log_file.read_text().splitlines()
 
     def start(self, *options: str) -> subprocess.Popen[str]:
         places = {"ECDAQ_BIN_DIR": str(self.bin), "LOG": str(self.log_file)}
+        places["PATH"] = f"{self.path}:{os.environ['PATH']}"
         return subprocess.Popen(
             [SCRIPT, "--record", str(self.folder / "record"), *options],
             env=os.environ | places,
@@ -78,7 +96,7 @@ class Bench:
         )
 
     def wait_for_log(self, *beginnings: str) -> None:
-        end = time.monotonic() + 20
+        end = time.monotonic() + SECONDS
         while not all(any(line.startswith(b) for line in self.log) for b in beginnings):
             assert time.monotonic() < end, self.log
             time.sleep(0.01)
@@ -111,7 +129,7 @@ def test_an_interrupt_ends_all_in_order_with_a_summary(bench: Bench, number: int
     run = bench.start()
     bench.wait_until_all_run()
     os.killpg(run.pid, number)
-    out, err = run.communicate(timeout=20)
+    out, err = run.communicate(timeout=SECONDS)
     assert run.returncode == 0, err
     assert ends(bench) == [f"end {name}" for name in END_ORDER]
     assert bench.log[-1] == "tool status --summary"
@@ -119,10 +137,38 @@ def test_an_interrupt_ends_all_in_order_with_a_summary(bench: Bench, number: int
     assert not any(line.startswith("interrupted") for line in bench.log)
 
 
+def test_no_command_of_the_script_that_an_interrupt_could_end_runs_after_the_start(
+    bench: Bench,
+) -> None:
+    """Ctrl-C reaches the whole foreground group: its failure would end the script with 130."""
+    bench.make_slow("mkfifo", 2, "[[ $1 == */idle ]]")
+    run = bench.start()
+    bench.wait_until_all_run()
+    os.killpg(run.pid, signal.SIGINT)
+    _, err = run.communicate(timeout=SECONDS)
+    assert run.returncode == 0, err
+    assert any(line.startswith("slow mkfifo") for line in bench.log)
+    assert ends(bench) == [f"end {name}" for name in END_ORDER]
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_an_interrupt_before_the_start_starts_nothing_and_leaves_nothing_behind(
+    bench: Bench, number: int, code: int
+) -> None:
+    bench.make_slow("ip", 3)
+    run = bench.start("--no-dds")
+    bench.wait_for_log("slow ip")
+    os.killpg(run.pid, number)
+    _, err = run.communicate(timeout=SECONDS)
+    assert run.returncode == code, err
+    assert not any(line.startswith("start") for line in bench.log)
+    assert not Path(err.split()[err.split().index("--run-dir") + 1]).exists()
+
+
 def test_json_ends_with_the_summary_as_one_line(bench: Bench) -> None:
     bench.make_it("ecdaqd", WHEN_ALL_RUN + "exit 0")
     run = bench.start("--seconds", "1", "--json", "--slaves", "8")
-    out, err = run.communicate(timeout=20)
+    out, err = run.communicate(timeout=SECONDS)
     assert run.returncode == 0, err
     assert bench.log[-1] == "tool status --json --summary"
     assert out == '{"state":"STOPPED"}\n'
@@ -133,7 +179,7 @@ def test_json_ends_with_the_summary_as_one_line(bench: Bench) -> None:
 def test_a_master_that_fails_fails_the_run(bench: Bench) -> None:
     bench.make_it("ecdaqd", WHEN_ALL_RUN + "echo ecdaqd: no link >&2; exit 8")
     run = bench.start("--seconds", "1")
-    _, err = run.communicate(timeout=20)
+    _, err = run.communicate(timeout=SECONDS)
     assert run.returncode == 1
     assert err.splitlines()[-1] == "build.sh: run: ecdaqd ended with 8: no link"
     assert ends(bench) == [f"end {name}" for name in END_ORDER if name != "ecdaqd"]
@@ -142,7 +188,7 @@ def test_a_master_that_fails_fails_the_run(bench: Bench) -> None:
 def test_a_segment_that_ends_by_itself_fails_the_run(bench: Bench) -> None:
     bench.make_it("ecdaq-sim", "exit 3")
     run = bench.start()
-    _, err = run.communicate(timeout=20)
+    _, err = run.communicate(timeout=SECONDS)
     assert run.returncode == 1
     assert err.splitlines()[-1] == "build.sh: run: ecdaq-sim ended with 3"
 
@@ -151,13 +197,13 @@ def test_a_run_that_is_killed_leaves_nothing_behind(bench: Bench) -> None:
     run = bench.start()
     bench.wait_until_all_run()
     run.kill()
-    run.communicate(timeout=20)
+    run.communicate(timeout=SECONDS)
     bench.wait_for_log(*(f"end {name}" for name in PROGRAMS))
 
 
 def test_the_run_directory_is_removed_unless_it_is_given(bench: Bench, tmp_path: Path) -> None:
     bench.make_it("ecdaqd", 'echo "run dir $ECDAQ_RUN_DIR" >> "$LOG"; exit 0')
-    assert bench.start("--seconds", "1").wait(20) == 0
+    assert bench.start("--seconds", "1").wait(SECONDS) == 0
     (line,) = [entry for entry in bench.log if entry.startswith("run dir ")]
     # Others on this machine may make and remove theirs meanwhile.
     assert not Path(line.removeprefix("run dir ")).exists()
@@ -173,7 +219,7 @@ def test_the_directory_of_a_killed_run_is_removed_by_the_next_run(bench: Bench) 
     bench.make_it("ecdaqd", "exit 0")
     with (used / "run.lock").open() as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        bench.start("--seconds", "1").wait(20)
+        bench.start("--seconds", "1").wait(SECONDS)
         assert not abandoned.exists()
         assert used.exists()
     shutil.rmtree(used)
@@ -186,7 +232,7 @@ def test_a_failed_start_prints_its_cause_and_no_summary(bench: Bench, page: str)
     bench.make_it("ecdaqd", body)
     bench.program("ecdaq", f"""#!/bin/bash\necho '{page}' | sed "s/PID/$(cat "$LOG.pid")/"\n""")
     run = bench.start()
-    out, err = run.communicate(timeout=20)
+    out, err = run.communicate(timeout=SECONDS)
     assert (run.returncode, out) == (1, "")
     assert err.splitlines()[-1] == "build.sh: run: ecdaqd ended with 5: why"
 
@@ -197,7 +243,7 @@ def test_a_run_that_fails_after_it_was_in_op_prints_summary_and_cause(bench: Ben
     page = '{"pid":PID,"samples_good":7,"recording":"/x/a.mcap"}'
     bench.program("ecdaq", f"""#!/bin/bash\necho '{page}' | sed "s/PID/$(cat "$LOG.pid")/"\n""")
     run = bench.start()
-    out, err = run.communicate(timeout=20)
+    out, err = run.communicate(timeout=SECONDS)
     assert run.returncode == 1
     assert '"samples_good":7' in out
     assert "log list --dir" in err
@@ -212,13 +258,13 @@ def test_a_run_directory_is_used_by_one_run_at_a_time(
     first = bench.start()
     bench.wait_until_all_run()
     second = bench.start()
-    out, err = second.communicate(timeout=20)
+    out, err = second.communicate(timeout=SECONDS)
     assert (second.returncode, out) == (1, "")
     assert "another run uses this directory" in err
     assert err.count("\n") == 1
     assert first.poll() is None
     os.killpg(first.pid, signal.SIGINT)
-    assert first.wait(20) == 0
+    assert first.wait(SECONDS) == 0
 
 
 def dds_line(bench: Bench) -> str:
@@ -228,7 +274,7 @@ def dds_line(bench: Bench) -> str:
 def test_dds_is_published_on_loopback_in_a_domain_and_with_a_tag_of_ones_own(bench: Bench) -> None:
     bench.make_it("ecdaqd", WHEN_ALL_RUN + "exit 0")
     run = bench.start("--seconds", "1")
-    _, err = run.communicate(timeout=20)
+    _, err = run.communicate(timeout=SECONDS)
     assert run.returncode == 0, err
     tag = f"run-{run.pid}"
     for setting in ("enable=on", "interface=lo", "multicast=off", "domain=230", f"tag={tag}"):
@@ -240,14 +286,14 @@ def test_a_dds_section_of_the_configuration_is_used(bench: Bench) -> None:
     config = bench.folder / "mine.yaml"
     config.write_text("dds:\n  enable: on\n  interface: eth7\n")
     bench.make_it("ecdaqd", WHEN_ALL_RUN + "exit 0")
-    assert bench.start("--seconds", "1", "--config", str(config)).wait(20) == 0
+    assert bench.start("--seconds", "1", "--config", str(config)).wait(SECONDS) == 0
     assert dds_line(bench) == f"start ecdaq-dds --config {config}"
 
 
 def test_without_dds_there_is_none(bench: Bench) -> None:
     bench.make_it("ecdaqd", WHEN_ALL_BUT_ONE_RUN + "exit 0")
     run = bench.start("--seconds", "1", "--no-dds")
-    _, err = run.communicate(timeout=20)
+    _, err = run.communicate(timeout=SECONDS)
     assert run.returncode == 0
     assert "DDS" not in err
     assert not dds_line(bench)
@@ -269,7 +315,7 @@ def test_an_unavailable_dds_is_one_line_and_the_run_continues(
         bench.program("ecdaq-dds", program)
     bench.make_it("ecdaqd", WHEN_ALL_BUT_ONE_RUN + "exit 0")
     run = bench.start("--seconds", "1")
-    _, err = run.communicate(timeout=20)
+    _, err = run.communicate(timeout=SECONDS)
     assert run.returncode == 0
     assert reports(err)[0].startswith(f"-- no DDS: {reason}")
 
@@ -277,7 +323,7 @@ def test_an_unavailable_dds_is_one_line_and_the_run_continues(
 def test_a_publisher_that_ends_by_itself_fails_the_run(bench: Bench) -> None:
     bench.make_it("ecdaq-dds", WHEN_ALL_RUN + "exit 1")
     run = bench.start()
-    _, err = run.communicate(timeout=20)
+    _, err = run.communicate(timeout=SECONDS)
     assert run.returncode == 1
     assert "ecdaq-dds ended by itself" in err
 
@@ -293,7 +339,7 @@ def run_dir_of(bench: Bench) -> str:
 
 def test_the_simulated_pulses_are_checked(bench: Bench) -> None:
     bench.make_it("ecdaqd", WHEN_ALL_RUN + 'echo "run dir $ECDAQ_RUN_DIR" >> "$LOG"; exit 0')
-    assert bench.start("--seconds", "1").wait(20) == 0
+    assert bench.start("--seconds", "1").wait(SECONDS) == 0
     edges = f"{run_dir_of(bench)}/edges"
     assert sync0_line(bench) == f"start ecdaq-sync0 --edges {edges}"
     (segment,) = [line for line in bench.log if line.startswith("start ecdaq-sim")]
@@ -316,14 +362,14 @@ def test_a_sync0_section_of_the_configuration_is_used(
     config = bench.folder / "mine.yaml"
     config.write_text(section)
     bench.make_it("ecdaqd", WHEN_ALL_RUN + 'echo "run dir $ECDAQ_RUN_DIR" >> "$LOG"; exit 0')
-    assert bench.start("--seconds", "1", "--config", str(config)).wait(20) == 0
+    assert bench.start("--seconds", "1", "--config", str(config)).wait(SECONDS) == 0
     more = f" --edges {run_dir_of(bench)}/edges" if is_simulated else ""
     assert sync0_line(bench) == f"start ecdaq-sync0 --config {config}{more}"
 
 
 def test_without_the_check_no_edges_are_written(bench: Bench) -> None:
     bench.make_it("ecdaqd", WHEN_ALL_BUT_ONE_RUN + "exit 0")
-    assert bench.start("--seconds", "1", "--no-sync0").wait(20) == 0
+    assert bench.start("--seconds", "1", "--no-sync0").wait(SECONDS) == 0
     assert not sync0_line(bench)
     assert not any("--edges" in line for line in bench.log)
 
@@ -332,7 +378,7 @@ def test_an_unavailable_check_is_one_line_and_the_run_continues(bench: Bench) ->
     (bench.bin / "ecdaq-sync0").unlink()
     bench.make_it("ecdaqd", WHEN_RUN.format(count=3) + "exit 0")
     run = bench.start("--seconds", "1", "--no-dds")
-    _, err = run.communicate(timeout=20)
+    _, err = run.communicate(timeout=SECONDS)
     assert run.returncode == 0
     assert reports(err) == ["-- no check of SYNC0: ecdaq-sync0 is not built"]
 
@@ -342,15 +388,19 @@ def test_a_check_that_ends_by_itself_ends_nothing_else(
     bench: Bench, code: int, message: list[str]
 ) -> None:
     bench.make_it("ecdaq-sync0", f"exit {code}")
+    # The script detects an end within 0.2 s. If it ended this one, too, the line would not come.
+    alone = 'until grep -q "^start ecdaq-sync0" "$LOG"; do sleep 0.01; done; sleep 1\n'
+    bench.make_it("ecdaqd", alone + 'echo "continues ecdaqd" >> "$LOG"')
     run = bench.start("--no-dds")
     bench.wait_for_log(*(f"start {name}" for name in PROGRAMS if name != "ecdaq-dds"))
     assert run.stderr is not None
     assert run.stderr.readline().startswith("-- starting")
     assert [run.stderr.readline().rstrip() for _ in message] == message
+    bench.wait_for_log("continues ecdaqd")
     assert run.poll() is None
     assert not ends(bench)
     os.killpg(run.pid, signal.SIGINT)
-    _, err = run.communicate(timeout=20)
+    _, err = run.communicate(timeout=SECONDS)
     assert run.returncode == 0
     assert not err
     assert ends(bench) == ["end ecdaqd", "end ecdaq-record", "end ecdaq-sim"]
