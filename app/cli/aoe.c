@@ -4,7 +4,6 @@
 
 #include "base/args.h"
 #include "cli/mail.h"
-#include "cli/source.h"
 #include "wire/aoe.h"
 
 enum { READ_BYTES = 256 };
@@ -19,25 +18,20 @@ static void write_keys(struct json *js, const struct mail *mail)
 
 static enum exit_code take_object(struct mail *mail, char **operands)
 {
-	enum exit_code result = mail_parse_object(mail, operands[2]);
+	enum exit_code result = mail_parse_target(mail, operands);
 
 	mail->request.argument[0] = AOE_GROUP_SDO;
 	mail->request.argument[1] = aoe_sdo_offset(mail->request.index, mail->request.subindex);
-	return result == EXIT_CODE_OK
-		       ? source_slave_pos(mail->cli, operands[1], &mail->request.slave_pos)
-		       : result;
+	return result;
 }
 
 static enum exit_code read_object(struct mail *mail, char **operands, int count)
 {
-	int type;
-	enum exit_code result = mail_parse_type(mail, &type);
+	enum exit_code result = take_object(mail, operands);
 
 	(void)count;
 	mail->request.length = READ_BYTES;
-	result = result == EXIT_CODE_OK ? take_object(mail, operands) : result;
-	result = result == EXIT_CODE_OK ? mail_ask(mail, ADMIN_AOE_READ) : result;
-	return result == EXIT_CODE_OK ? mail_show(mail, write_keys) : result;
+	return result == EXIT_CODE_OK ? mail_read(mail, ADMIN_AOE_READ, write_keys) : result;
 }
 
 static enum exit_code write_object(struct mail *mail, char **operands, int count)

@@ -11,6 +11,7 @@
 
 #include "base/bytes.h"
 #include "cli/hex.h"
+#include "cli/source.h"
 #include "config/sdo_value.h"
 
 void mail_init(struct mail *mail, struct cli *cli)
@@ -98,6 +99,15 @@ enum exit_code mail_parse_object(struct mail *mail, const char *text)
 	mail->request.index = (uint16_t)index;
 	mail->request.subindex = (uint8_t)subindex;
 	return EXIT_CODE_OK;
+}
+
+enum exit_code mail_parse_target(struct mail *mail, char **operands)
+{
+	enum exit_code result = mail_parse_object(mail, operands[2]);
+
+	return result == EXIT_CODE_OK
+		       ? source_slave_pos(mail->cli, operands[1], &mail->request.slave_pos)
+		       : result;
 }
 
 enum exit_code mail_parse_type(const struct mail *mail, int *ret_type)
@@ -260,8 +270,7 @@ static void show_json(const struct mail *mail, int type, char *text, size_t text
 	json_end_line(&js);
 }
 
-enum exit_code mail_show(const struct mail *mail,
-			 void (*write_keys)(struct json *js, const struct mail *mail))
+static enum exit_code show(const struct mail *mail, mail_keys_writer write_keys)
 {
 	size_t len = mail->transfer.answer_len;
 	size_t text_len = 3 * len + 64;
@@ -291,4 +300,13 @@ enum exit_code mail_show(const struct mail *mail,
 	}
 	free(text);
 	return EXIT_CODE_OK;
+}
+
+enum exit_code mail_read(struct mail *mail, enum admin_verb verb, mail_keys_writer write_keys)
+{
+	int type;
+	enum exit_code result = mail_parse_type(mail, &type);
+
+	result = result == EXIT_CODE_OK ? mail_ask(mail, verb) : result;
+	return result == EXIT_CODE_OK ? show(mail, write_keys) : result;
 }

@@ -49,6 +49,8 @@ enum exit_code mail_try(struct mail *mail, enum admin_verb verb, int *ret_refuse
 
 /** "0x1018:1": hexadecimal with 0x, else decimal; the subindex may be left out. */
 enum exit_code mail_parse_object(struct mail *mail, const char *text);
+/** The same of operands[2], and the slave of operands[1]. */
+enum exit_code mail_parse_target(struct mail *mail, char **operands);
 /** --type: an enum sdo_type, MAIL_STRING or MAIL_NO_TYPE. */
 enum exit_code mail_parse_type(const struct mail *mail, int *ret_type);
 /** Data of the request: @text as the type of --type, which must be there. */
@@ -56,11 +58,12 @@ enum exit_code mail_parse_value(struct mail *mail, const char *text);
 /** Data of the request: bytes in hex, "0a1b" or "0a 1b". */
 enum exit_code mail_parse_bytes(struct mail *mail, const char *text);
 
+/* The members of an answer as JSON before the value. */
+typedef void (*mail_keys_writer)(struct json *js, const struct mail *mail);
 /**
- * Show the answer as the type of --type, else by its length. As JSON: "bytes" and "value" in an
- * object that write_keys() begins.
+ * Ask @verb and show the answer as the type of --type, else by its length. As JSON: "bytes" and
+ * "value" in an object that write_keys() begins.
  */
-enum exit_code mail_show(const struct mail *mail,
-			 void (*write_keys)(struct json *js, const struct mail *mail));
+enum exit_code mail_read(struct mail *mail, enum admin_verb verb, mail_keys_writer write_keys);
 
 #endif

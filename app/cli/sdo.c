@@ -15,27 +15,22 @@ static void write_keys(struct json *js, const struct mail *mail)
 /* The object and the slave, the same of read and write. */
 static enum exit_code take_object(struct mail *mail, char **operands)
 {
-	enum exit_code result = mail_parse_object(mail, operands[2]);
+	enum exit_code result = mail_parse_target(mail, operands);
 
 	if (result == EXIT_CODE_OK && mail->request.argument[0] != 0 &&
 	    mail->request.subindex > 1) {
 		return cli_fail(mail->cli, EXIT_CODE_USAGE,
 				"%s: --complete: expected subindex 0 or 1", operands[2]);
 	}
-	return result == EXIT_CODE_OK
-		       ? source_slave_pos(mail->cli, operands[1], &mail->request.slave_pos)
-		       : result;
+	return result;
 }
 
 static enum exit_code read_object(struct mail *mail, char **operands, int count)
 {
-	int type;
-	enum exit_code result = mail_parse_type(mail, &type);
+	enum exit_code result = take_object(mail, operands);
 
 	(void)count;
-	result = result == EXIT_CODE_OK ? take_object(mail, operands) : result;
-	result = result == EXIT_CODE_OK ? mail_ask(mail, ADMIN_SDO_READ) : result;
-	return result == EXIT_CODE_OK ? mail_show(mail, write_keys) : result;
+	return result == EXIT_CODE_OK ? mail_read(mail, ADMIN_SDO_READ, write_keys) : result;
 }
 
 static enum exit_code write_object(struct mail *mail, char **operands, int count)
