@@ -3,6 +3,7 @@
 
 #include "base/bytes.h"
 #include "base/prng.h"
+#include "devices/catalogue.h"
 #include "devices/fb1111_piccolo.h"
 #include "harness/test.h"
 #include "wire/datagram.h"
@@ -41,6 +42,14 @@ static void on_edge(void *ctx, unsigned slave, int64_t t_ns, uint64_t system_tim
 			}
 		}
 	}
+}
+
+int virtual_bench_slave(const char *name, int position, struct segment_slave_spec *ret_spec)
+{
+	static struct slave_model model; /* large */
+
+	CHECK_EQ(catalogue_find(name, &model), 0);
+	return catalogue_slave(&model, position, ret_spec);
 }
 
 static void make_segment(struct virtual_bench *b)

@@ -20,6 +20,9 @@ enum { VIRTUAL_EDGES = 128 }; /* that are remembered of each slave */
 /* Fill the spec of the slave at @position; a negative errno ends the test. */
 typedef int (*virtual_slave_maker)(int position, struct segment_slave_spec *ret_spec);
 
+/** A maker's slave of the catalogue, by @name. */
+int virtual_bench_slave(const char *name, int position, struct segment_slave_spec *ret_spec);
+
 struct virtual_spec {
 	unsigned slaves;          /* 0: 2 */
 	virtual_slave_maker make; /* NULL: FB1111-Piccolo boards */

@@ -426,6 +426,18 @@ void virtual_master_settle(struct virtual_master *vm)
 	virtual_master_forget(vm);
 }
 
+void virtual_master_check_undisturbed(const struct virtual_master *vm, uint64_t samples)
+{
+	CHECK(vm->result.samples >= samples);
+	CHECK_EQ(vm->result.op, vm->result.samples);
+	CHECK_EQ(vm->result.gaps, 0);
+	CHECK_EQ(vm->result.lost, 0);
+	CHECK_EQ(vm->result.late, 0);
+	CHECK_EQ(vm->result.skipped, 0);
+	CHECK_EQ(vm->result.wkc_low, 0);
+	CHECK_EQ(vm->result.bad, 0);
+}
+
 const struct sample_header *virtual_master_sample(const struct virtual_master *vm)
 {
 	return &vm->newest_header;

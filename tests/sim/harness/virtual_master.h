@@ -95,6 +95,8 @@ void virtual_master_forget(struct virtual_master *vm);
 
 /** In OP, some cycles on, with no sample counted yet. Ends the test where OP is not reached. */
 void virtual_master_settle(struct virtual_master *vm);
+/** At least @samples cycles since it settled, all in OP, none lost, late, skipped, low or bad. */
+void virtual_master_check_undisturbed(const struct virtual_master *vm, uint64_t samples);
 
 /** The newest sample's header; the value of the channel named @name in it. */
 const struct sample_header *virtual_master_sample(const struct virtual_master *vm);

@@ -26,14 +26,6 @@ static int make(int position, struct segment_slave_spec *ret_spec)
 	return catalogue_slave(&model, position, ret_spec);
 }
 
-static int make_some(const char *const *names, int position, struct segment_slave_spec *ret_spec)
-{
-	static struct slave_model model;
-
-	CHECK_EQ(catalogue_find(names[position], &model), 0);
-	return catalogue_slave(&model, position, ret_spec);
-}
-
 static void open_all(unsigned slaves, virtual_slave_maker maker, const char *const *settings)
 {
 	virtual_bench_init(&b,
@@ -96,7 +88,7 @@ static int make_analog(int position, struct segment_slave_spec *ret_spec)
 {
 	static const char *const names[] = { "ek1100", "el3104", "el4132" };
 
-	return make_some(names, position, ret_spec);
+	return virtual_bench_slave(names[position], position, ret_spec);
 }
 
 TEST(catalogue, an_analog_terminal_shows_the_signal_at_its_scale)
@@ -125,7 +117,7 @@ static int make_drive(int position, struct segment_slave_spec *ret_spec)
 {
 	static const char *const names[] = { "akd", "el1008", "el2828" };
 
-	return make_some(names, position, ret_spec);
+	return virtual_bench_slave(names[position], position, ret_spec);
 }
 
 static void set(const char *channel, uint64_t raw)

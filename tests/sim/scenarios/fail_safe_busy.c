@@ -10,12 +10,12 @@
 #include "base/bytes.h"
 #include "base/prng.h"
 #include "daemon/session_internal.h"
-#include "devices/catalogue.h"
 #include "devices/fb1111_piccolo.h"
 #include "harness/test.h"
 #include "mailbox/mailbox.h"
 #include "sim/scenarios/output_watch.h"
 #include "wire/foe.h"
+#include "wire/sii.h"
 
 enum {
 	PERIOD_NS = 1000000,
@@ -48,13 +48,8 @@ static int admin;
 
 static int make(int position, struct segment_slave_spec *ret_spec)
 {
-	static struct slave_model model;
-
-	if (position != DRIVE) {
-		return fb1111_piccolo_slave(position, ret_spec);
-	}
-	CHECK_EQ(catalogue_find("akd", &model), 0);
-	return catalogue_slave(&model, position, ret_spec);
+	return position == DRIVE ? virtual_bench_slave("akd", position, ret_spec)
+				 : fb1111_piccolo_slave(position, ret_spec);
 }
 
 static void submit(struct mailbox_request *rq)

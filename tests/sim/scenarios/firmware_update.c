@@ -243,6 +243,15 @@ static int begin_write(void)
 	return fd;
 }
 
+/* Write the file again, now whole. */
+static void update_to(const char *version)
+{
+	lead(AL_BOOT);
+	CHECK_EQ(write_file().result, 0);
+	lead(AL_PREOP);
+	check_version(BOARD, version);
+}
+
 TEST(firmware_update, a_client_that_goes_away_leaves_boot_and_the_old_version)
 {
 	open_bench("bus.target=preop");
@@ -253,10 +262,7 @@ TEST(firmware_update, a_client_that_goes_away_leaves_boot_and_the_old_version)
 	CHECK_EQ(al_state(BOARD), AL_BOOT);
 	lead(AL_PREOP);
 	check_version(BOARD, piccolo_description.software_version);
-	lead(AL_BOOT);
-	CHECK_EQ(write_file().result, 0);
-	lead(AL_PREOP);
-	check_version(BOARD, "7.3");
+	update_to("7.3");
 	close_bench();
 }
 
@@ -281,9 +287,6 @@ TEST(firmware_update, a_power_cut_in_the_middle_is_reported_and_the_update_can_b
 	CHECK_EQ(al_state(BOARD), AL_INIT);
 	lead(AL_PREOP);
 	check_version(BOARD, piccolo_description.software_version);
-	lead(AL_BOOT);
-	CHECK_EQ(write_file().result, 0);
-	lead(AL_PREOP);
-	check_version(BOARD, "7.4");
+	update_to("7.4");
 	close_bench();
 }

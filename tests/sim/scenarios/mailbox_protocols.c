@@ -86,18 +86,6 @@ static void submit(struct mailbox_request *rq)
 	CHECK_EQ(mailbox_submit(bus_mailbox(vm.session->bus), rq), 0);
 }
 
-static void check_undisturbed(uint64_t cycles)
-{
-	CHECK(vm.result.samples >= cycles);
-	CHECK_EQ(vm.result.op, vm.result.samples);
-	CHECK_EQ(vm.result.gaps, 0);
-	CHECK_EQ(vm.result.lost, 0);
-	CHECK_EQ(vm.result.late, 0);
-	CHECK_EQ(vm.result.skipped, 0);
-	CHECK_EQ(vm.result.wkc_low, 0);
-	CHECK_EQ(vm.result.bad, 0);
-}
-
 TEST(sim_mailbox_protocols, all_of_them_in_op_disturb_no_cycle)
 {
 	enum { ROUNDS = 3, CYCLES = 4000 };
@@ -124,7 +112,7 @@ TEST(sim_mailbox_protocols, all_of_them_in_op_disturb_no_cycle)
 		CHECK_EQ(rq[3].len, 4);
 		CHECK_EQ(rq[4].len, sizeof(echo));
 	}
-	check_undisturbed((uint64_t)ROUNDS * CYCLES);
+	virtual_master_check_undisturbed(&vm, (uint64_t)ROUNDS * CYCLES);
 	CHECK(vm.result.phase_max_ns <= phase_idle_ns + 2000);
 	virtual_master_close(&vm);
 }
@@ -177,6 +165,6 @@ TEST(sim_mailbox_protocols, a_slave_that_is_busy_for_ever_disturbs_neither_cycle
 	for (unsigned i = 1; i < REQUESTS; i++) {
 		CHECK_EQ(rq[i].result, 0);
 	}
-	check_undisturbed(CYCLES);
+	virtual_master_check_undisturbed(&vm, CYCLES);
 	virtual_master_close(&vm);
 }
