@@ -16,9 +16,9 @@ static void write_keys(struct json *js, const struct mail *mail)
 	json_u64(js, "subindex", mail->request.subindex);
 }
 
-static enum exit_code take_object(struct mail *mail, char **operands)
+static enum exit_code take_object(struct mail *mail, const char *word)
 {
-	enum exit_code result = mail_parse_target(mail, operands);
+	enum exit_code result = mail_parse_object(mail, word);
 
 	mail->request.argument[0] = AOE_GROUP_SDO;
 	mail->request.argument[1] = aoe_sdo_offset(mail->request.index, mail->request.subindex);
@@ -27,11 +27,12 @@ static enum exit_code take_object(struct mail *mail, char **operands)
 
 static enum exit_code read_object(struct mail *mail, char **operands, int count)
 {
-	enum exit_code result = take_object(mail, operands);
+	enum exit_code result = take_object(mail, operands[2]);
 
 	(void)count;
 	mail->request.length = READ_BYTES;
-	return result == EXIT_CODE_OK ? mail_read(mail, ADMIN_AOE_READ, write_keys) : result;
+	return result == EXIT_CODE_OK ? mail_read(mail, ADMIN_AOE_READ, operands[1], write_keys)
+				      : result;
 }
 
 static enum exit_code write_object(struct mail *mail, char **operands, int count)
@@ -39,8 +40,8 @@ static enum exit_code write_object(struct mail *mail, char **operands, int count
 	enum exit_code result = mail_parse_value(mail, operands[3]);
 
 	(void)count;
-	result = result == EXIT_CODE_OK ? take_object(mail, operands) : result;
-	return result == EXIT_CODE_OK ? mail_ask(mail, ADMIN_AOE_WRITE) : result;
+	result = result == EXIT_CODE_OK ? take_object(mail, operands[2]) : result;
+	return result == EXIT_CODE_OK ? mail_write(mail, ADMIN_AOE_WRITE, operands[1]) : result;
 }
 
 enum exit_code verb_aoe(struct cli *cli, int argc, char **argv)

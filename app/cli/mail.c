@@ -101,15 +101,6 @@ enum exit_code mail_parse_object(struct mail *mail, const char *text)
 	return EXIT_CODE_OK;
 }
 
-enum exit_code mail_parse_target(struct mail *mail, char **operands)
-{
-	enum exit_code result = mail_parse_object(mail, operands[2]);
-
-	return result == EXIT_CODE_OK
-		       ? source_slave_pos(mail->cli, operands[1], &mail->request.slave_pos)
-		       : result;
-}
-
 enum exit_code mail_parse_type(const struct mail *mail, int *ret_type)
 {
 	*ret_type = MAIL_NO_TYPE;
@@ -302,11 +293,19 @@ static enum exit_code show(const struct mail *mail, mail_keys_writer write_keys)
 	return EXIT_CODE_OK;
 }
 
-enum exit_code mail_read(struct mail *mail, enum admin_verb verb, mail_keys_writer write_keys)
+enum exit_code mail_write(struct mail *mail, enum admin_verb verb, const char *word)
+{
+	enum exit_code result = source_slave_pos(mail->cli, word, &mail->request.slave_pos);
+
+	return result == EXIT_CODE_OK ? mail_ask(mail, verb) : result;
+}
+
+enum exit_code mail_read(struct mail *mail, enum admin_verb verb, const char *word,
+			 mail_keys_writer write_keys)
 {
 	int type;
 	enum exit_code result = mail_parse_type(mail, &type);
 
-	result = result == EXIT_CODE_OK ? mail_ask(mail, verb) : result;
+	result = result == EXIT_CODE_OK ? mail_write(mail, verb, word) : result;
 	return result == EXIT_CODE_OK ? show(mail, write_keys) : result;
 }

@@ -49,8 +49,6 @@ enum exit_code mail_try(struct mail *mail, enum admin_verb verb, int *ret_refuse
 
 /** "0x1018:1": hexadecimal with 0x, else decimal; the subindex may be left out. */
 enum exit_code mail_parse_object(struct mail *mail, const char *text);
-/** The same of operands[2], and the slave of operands[1]. */
-enum exit_code mail_parse_target(struct mail *mail, char **operands);
 /** --type: an enum sdo_type, MAIL_STRING or MAIL_NO_TYPE. */
 enum exit_code mail_parse_type(const struct mail *mail, int *ret_type);
 /** Data of the request: @text as the type of --type, which must be there. */
@@ -61,9 +59,12 @@ enum exit_code mail_parse_bytes(struct mail *mail, const char *text);
 /* The members of an answer as JSON before the value. */
 typedef void (*mail_keys_writer)(struct json *js, const struct mail *mail);
 /**
- * Ask @verb and show the answer as the type of --type, else by its length. As JSON: "bytes" and
- * "value" in an object that write_keys() begins.
+ * Send the request as @verb to the slave that @word names, and show the answer as the type of
+ * --type, else by its length. As JSON: "bytes" and "value" in an object that write_keys() begins.
  */
-enum exit_code mail_read(struct mail *mail, enum admin_verb verb, mail_keys_writer write_keys);
+enum exit_code mail_read(struct mail *mail, enum admin_verb verb, const char *word,
+			 mail_keys_writer write_keys);
+/** Send the request as @verb to the slave that @word names. */
+enum exit_code mail_write(struct mail *mail, enum admin_verb verb, const char *word);
 
 #endif

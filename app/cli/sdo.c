@@ -12,25 +12,25 @@ static void write_keys(struct json *js, const struct mail *mail)
 	json_u64(js, "subindex", mail->request.subindex);
 }
 
-/* The object and the slave, the same of read and write. */
-static enum exit_code take_object(struct mail *mail, char **operands)
+static enum exit_code take_object(struct mail *mail, const char *word)
 {
-	enum exit_code result = mail_parse_target(mail, operands);
+	enum exit_code result = mail_parse_object(mail, word);
 
 	if (result == EXIT_CODE_OK && mail->request.argument[0] != 0 &&
 	    mail->request.subindex > 1) {
 		return cli_fail(mail->cli, EXIT_CODE_USAGE,
-				"%s: --complete: expected subindex 0 or 1", operands[2]);
+				"%s: --complete: expected subindex 0 or 1", word);
 	}
 	return result;
 }
 
 static enum exit_code read_object(struct mail *mail, char **operands, int count)
 {
-	enum exit_code result = take_object(mail, operands);
+	enum exit_code result = take_object(mail, operands[2]);
 
 	(void)count;
-	return result == EXIT_CODE_OK ? mail_read(mail, ADMIN_SDO_READ, write_keys) : result;
+	return result == EXIT_CODE_OK ? mail_read(mail, ADMIN_SDO_READ, operands[1], write_keys)
+				      : result;
 }
 
 static enum exit_code write_object(struct mail *mail, char **operands, int count)
@@ -46,8 +46,8 @@ static enum exit_code write_object(struct mail *mail, char **operands, int count
 	} else {
 		result = mail_parse_bytes(mail, operands[3]);
 	}
-	result = result == EXIT_CODE_OK ? take_object(mail, operands) : result;
-	return result == EXIT_CODE_OK ? mail_ask(mail, ADMIN_SDO_WRITE) : result;
+	result = result == EXIT_CODE_OK ? take_object(mail, operands[2]) : result;
+	return result == EXIT_CODE_OK ? mail_write(mail, ADMIN_SDO_WRITE, operands[1]) : result;
 }
 
 static enum exit_code list_objects(struct mail *mail, char **operands, int count)
