@@ -216,8 +216,8 @@ static const struct option rows[] = {
 	  .min = "1",
 	  .max = "100000",
 	  .unit = "cycles",
-	  .prose = "Number of cycles in a row in which the phase error must be below "
-		   "dc.lock_limit." },
+	  .prose = "Number of cycles with a phase error below dc.lock_limit after which it is "
+		   "locked; each cycle above it takes two of them back." },
 	{ .name = "dc.unlock_limit",
 	  .type = OPTION_DURATION,
 	  FIELD(dc_unlock_limit_ns),
