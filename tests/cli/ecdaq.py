@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
+import signal
 import subprocess
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -82,7 +84,7 @@ def json_lines(result: Result) -> list[Any]:
     return [json.loads(line) for line in works(result).splitlines()]
 
 
-def wait_until(what: Callable[[], bool], seconds: float = 20.0) -> None:
+def wait_until(what: Callable[[], bool], seconds: float = 60.0) -> None:
     """Poll until it is true."""
     deadline = time.monotonic() + seconds
     while not what():
@@ -116,6 +118,31 @@ class Fake:
         return subprocess.Popen(
             [ECDAQ, *words], env=environment(self.run_dir), text=True, **options
         )
+
+    @contextlib.contextmanager
+    def held(self) -> Iterator[None]:
+        """Stopped: what it shows stays as it is, however long a reader takes."""
+        self.process.send_signal(signal.SIGSTOP)
+        os.waitpid(self.process.pid, os.WUNTRACED)
+        yield
+        self.process.send_signal(signal.SIGCONT)
+
+    def sample(self, cycle: int, *channels: str) -> Any:
+        """Raw values of a sample that is not older than @cycle."""
+        found: list[Any] = []
+
+        def is_there() -> bool:
+            words = ["--count", "1", "--json", "--raw"]
+            found.append(json_of(self("watch", *channels, *words)))
+            return found[-1]["cycle"] >= cycle
+
+        wait_until(is_there)
+        return found[-1]
+
+    def next_cycle(self) -> int:
+        """No command that was answered before takes effect later."""
+        number: int = json_of(self("status", "--json"))["cycle_number"]
+        return number + 1
 
     def end(self) -> None:
         """Let it end in order."""

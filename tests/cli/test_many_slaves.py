@@ -94,8 +94,8 @@ def test_as_many_outputs_as_a_request_has_are_set_at_once_and_no_more(daemon: Fa
         "use several commands, each takes effect in a cycle of its own",
     )
     # None of them was sent.
-    shown = json_lines(daemon("watch", "--json", "--count", "1", "piccolo0.led", "piccolo511.led"))
-    assert shown[0]["values"] == {"piccolo0.led": 0, "piccolo511.led": 1}
+    shown = daemon.sample(daemon.next_cycle(), "piccolo0.led", "piccolo511.led")
+    assert shown["values"] == {"piccolo0.led": 0, "piccolo511.led": 1}
 
 
 def record(folder: Path, cycles: int, bad_every: int) -> Path:
