@@ -127,7 +127,14 @@ def test_recording_watch_and_dds_agree_which_slave_is_bad_while_the_last_has_no_
     for name, good in readers.items():
         wrong = {c: (flags[c], recording[c], good[c]) for c in common if good[c] != recording[c]}
         assert not wrong, (name, len(wrong), sorted(wrong.items())[:3])
-    flagged = [c for c in cycles if c in common and flags[c] == WKC_LOW]
+    # The frame came back from the first slave as it should, and from the last not at all: where the
+    # master was late, the watchdog of the first may have expired, too.
+    halved = {
+        m.cycle
+        for m in live.recorded(bench.segment.record_dir, "/ecdaq/cycle")
+        if m.flags == WKC_LOW and 2 * m.wkc == m.wkc_expected
+    }
+    flagged = [c for c in cycles if c in common and c in halved]
     print(f"{len(flagged)} common cycles without power")
     assert len(flagged) >= MIN_CYCLES
     assert {c: recording[c] for c in flagged if recording[c] != ONLY_LAST_IS_BAD} == {}
