@@ -53,7 +53,7 @@ def test_hostile_writer_of_the_board_cannot_end_the_master(
         ):
             link.setblocking(False)
             link.connect(str(bench.segment.run_dir / "commands-remote"))
-    status = bench.segment.wait_for_cycles(1000, 30)
-    assert status["state"] == "OP"
+    bench.segment.wait_for_cycles(1000, 30)
+    bench.segment.wait_for_op()  # of the same ecdaqd
     assert bench.segment.stop("daemon") == 0
     assert bench.segment.stop("recorder") == 0
