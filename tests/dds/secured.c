@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * secured DOMAIN INTERFACE KEYS SECONDS [OUTPUT VALUE]: a participant on the PC with the keys of
- * the folder KEYS (none: "-"), configured as ecdaq-dds configures itself. Listens until it has
- * heard enough, and with OUTPUT commands it until that is accepted; for SECONDS at most. Prints one
- * line of JSON at the end.
+ * secured DOMAIN INTERFACE KEYS SECONDS RESULT_S [OUTPUT VALUE]: a participant on the PC with the
+ * keys of the folder KEYS (none: "-"), configured as ecdaq-dds configures itself. Listens until it
+ * has heard enough samples, and with OUTPUT commands it until that is accepted; then for RESULT_S
+ * seconds at most for a result of ecdaq-sync0. All that for SECONDS at most. Prints one line of
+ * JSON at the end.
  */
 #include <dlfcn.h>
 #include <stdio.h>
@@ -133,24 +134,40 @@ static void command(struct pc *pc, char *output, double value)
 	}
 }
 
+/* @output: NULL: nothing to command. */
+static void run(struct pc *pc, time_t seconds, time_t result_s, char *output, double value)
+{
+	time_t end = time(NULL) + seconds;
+	time_t had = 0; /* all but a result */
+
+	while (time(NULL) < end) {
+		if (output != NULL) {
+			command(pc, output, value);
+		}
+		dds_sleepfor(DDS_MSECS(PERIOD_MS)); /* a pace, not a synchronisation */
+		take(pc);
+		if (pc->samples <= ENOUGH || (output != NULL && !pc->is_accepted)) {
+			continue;
+		}
+		had = had == 0 ? time(NULL) : had;
+		if (pc->results > 0 || time(NULL) >= had + result_s) {
+			return;
+		}
+	}
+}
+
 int main(int argc, char **argv)
 {
 	struct pc pc = { .samples = 0 };
-	time_t end;
+	int is_commander = argc == 8;
 
-	if ((argc != 5 && argc != 7) || join(&pc, argv) < 0) {
+	if ((argc != 6 && argc != 8) || join(&pc, argv) < 0) {
 		fputs("secured: cannot join\n", stderr);
 		return 2;
 	}
-	open_all(&pc, argc == 7);
-	end = time(NULL) + strtol(argv[4], NULL, 10);
-	while (time(NULL) < end && !(pc.samples > ENOUGH && (argc == 5 || pc.is_accepted))) {
-		if (argc == 7) {
-			command(&pc, argv[5], strtod(argv[6], NULL));
-		}
-		dds_sleepfor(DDS_MSECS(PERIOD_MS)); /* a pace, not a synchronisation */
-		take(&pc);
-	}
+	open_all(&pc, is_commander);
+	run(&pc, strtol(argv[4], NULL, 10), strtol(argv[5], NULL, 10),
+	    is_commander ? argv[6] : NULL, is_commander ? strtod(argv[7], NULL) : 0);
 	printf("{\"samples\": %ld, \"results\": %ld, \"sent\": %llu, \"reader\": %d, \"writer\": "
 	       "%d, \"answered\": "
 	       "%d, "

@@ -23,7 +23,7 @@ SECURED = {
 }
 # A handshake, the exchange of keys and the matching of encrypted endpoints, on a busy machine.
 TIMEOUT_S = "30"
-# How long a subscriber that must receive nothing runs, after others have received samples.
+# How long one listens that must receive nothing, after it or others have received samples.
 SILENCE_S = "5"
 
 
@@ -81,8 +81,8 @@ def test_samples_need_a_key_and_commands_need_a_commanders_key(
     assert "do not allow" not in bench.segment.log("dds")
 
     friends = {
-        "alice": start(bench, "alice", store / "alice", TIMEOUT_S),
-        "bob": start(bench, "bob", store / "bob", TIMEOUT_S, LED, "1"),
+        "alice": start(bench, "alice", store / "alice", TIMEOUT_S, TIMEOUT_S),
+        "bob": start(bench, "bob", store / "bob", TIMEOUT_S, "0", LED, "1"),
     }
     alice, bob = (result(bench, name, process) for name, process in friends.items())
     assert alice["samples"] > 100 and alice["results"] > 0, alice
@@ -92,9 +92,9 @@ def test_samples_need_a_key_and_commands_need_a_commanders_key(
     security("init", "--dir", str(other))
     security("add-commander", "bob", "--dir", str(other))
     strangers = {
-        "mallory": start(bench, "mallory", store / "alice", SILENCE_S, LED, "0"),
-        "eve": start(bench, "eve", None, SILENCE_S, LED, "0"),
-        "fake": start(bench, "fake", other / "bob", SILENCE_S, LED, "0"),
+        "mallory": start(bench, "mallory", store / "alice", SILENCE_S, "0", LED, "0"),
+        "eve": start(bench, "eve", None, SILENCE_S, "0", LED, "0"),
+        "fake": start(bench, "fake", other / "bob", SILENCE_S, "0", LED, "0"),
     }
     mallory, eve, fake = (result(bench, name, process) for name, process in strangers.items())
     # A subscriber's key does not command: it is refused a writer.
@@ -195,6 +195,7 @@ def test_keys_older_than_a_topic_are_reported_and_the_rest_is_published(
     bench = make_bench(**{"dds.security": str(folder / "appliance")})
     check_sync0(bench)
     assert "these keys do not allow ecdaq/sync0" in bench.segment.log("dds")
-    alice = result(bench, "alice", start(bench, "alice", folder / "alice", TIMEOUT_S))
+    process = start(bench, "alice", folder / "alice", TIMEOUT_S, SILENCE_S)
+    alice = result(bench, "alice", process)
     assert alice["samples"] > 100
     assert alice["results"] == 0
