@@ -39,7 +39,7 @@ def command(link: ecdaq.Link, asked: dict) -> dict:
 def main() -> None:
     interface, domain = sys.argv[1:]
     with ecdaq.connect(interface, domain=int(domain)) as link:
-        print(json.dumps({"ready": [c.name for c in link.channels()]}), flush=True)
+        print(json.dumps({"ready": [c.name for c in link.channels(60)]}), flush=True)
         for line in sys.stdin:
             print(json.dumps(command(link, json.loads(line))), flush=True)
 

@@ -1,13 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""Take channel table, status and samples of all slaves; print what was got as one JSON line."""
+"""Take channel table, status and samples of all slaves; print what was got as one JSON line.
+
+INTERFACE DOMAIN SLAVES SECONDS: it ends some seconds after it has samples of all, after SECONDS at
+the latest.
+"""
 
 from __future__ import annotations
 
 import json
+import math
 import sys
 import time
 
 import ecdaq
+
+MORE_S = 5.0
 
 
 def main() -> None:
@@ -18,7 +25,10 @@ def main() -> None:
         wrong: list[str] = []
         cycles: dict[int, list[int]] = {}
         end = time.monotonic() + seconds
-        while time.monotonic() < end and (len(cycles) < slaves or time.monotonic() < end - 3):
+        had_all = math.inf
+        while time.monotonic() < min(end, had_all + MORE_S):
+            if len(cycles) == slaves and had_all == math.inf:
+                had_all = time.monotonic()
             for s in link.subscribe(0.2):
                 cycles.setdefault(s.slave, []).append(s.cycle)
                 # Of piccolos without a shot: the time of the edge, and a number of values each.

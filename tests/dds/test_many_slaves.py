@@ -25,8 +25,8 @@ def test_all_of_512_slaves_comes_over_dds(make_bench: Callable[..., Bench]) -> N
     try:
         assert master.stdout is not None and master.stdout.readline() == "ready\n"
         bench.start_dds()
-        taker = bench.python("taker", "many_python.py", "dds1", "7", str(SLAVES), "12")
-        wait_for("end of the subscriber", lambda: taker.poll() is not None, 90)
+        taker = bench.python("taker", "many_python.py", "dds1", "7", str(SLAVES), "60")
+        wait_for("end of the subscriber", lambda: taker.poll() is not None, 150)
     finally:
         master.kill()
         master.communicate()
