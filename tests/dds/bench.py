@@ -76,12 +76,13 @@ class Commander:
         return self._answer()
 
     def settled(self, values: dict[str, float], **more: Any) -> dict[str, Any]:
-        """The answer to a command; one that only a busy machine refuses is repeated."""
-        for _ in range(20):
-            answer = self.command(values, **more)
-            if not is_passing(answer):
-                return answer
-        raise AssertionError(answer)
+        """The answer to a command; one that only a busy machine refuses is repeated for a while."""
+
+        def answer() -> dict[str, Any]:
+            got = self.command(values, **more)
+            return {} if is_passing(got) else got
+
+        return wait_for(f"answer to {values}", answer, 60)
 
     def accepted(self, values: dict[str, float]) -> int:
         """The cycle of a command that has to pass."""
