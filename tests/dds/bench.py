@@ -48,6 +48,7 @@ PASSING_REASONS = (
     "the commander is not alive",
     "not in OP",
     "no answer",
+    "no reply within",
 )
 
 

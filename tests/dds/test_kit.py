@@ -16,7 +16,7 @@ from typing import Any
 import ecdaq
 import pandas
 import pytest
-from bench import ROOT, Bench, live, wait_for
+from bench import PASSING_REASONS, ROOT, Bench, live, wait_for
 from cyclonedds.idl import types
 from ecdaq import keys, remote
 from ecdaq.idl_types import TOPICS, SampleV1, StatusV1
@@ -186,28 +186,44 @@ def test_progress_is_shown_on_a_terminal_and_only_there(
     assert shown.endswith("\r\033[K")  # the line is cleared at the end
 
 
+TOOL = ("--interface", "dds1", "--domain", "7")
+
+
+def run_tool(bench: Bench, name: str, *words: str) -> tuple[int, str]:
+    """Exit code and output of ecdaq-remote; what only a busy machine refuses is repeated."""
+    for n in range(20):  # a second each
+        code = bench.module(f"{name}{n}", "ecdaq", *TOOL, *words).wait(60)
+        text = bench.log(f"{name}{n}")
+        if code == 0 or not any(why in text for why in PASSING_REASONS):
+            return code, text
+    raise AssertionError(text)
+
+
 def test_remote_tool_watches_records_sets_and_shows_status(
     make_bench: Callable[..., Bench],
 ) -> None:
     bench = make_bench(**{"outputs[0].channel": "piccolo0.led", "outputs[0].owner": "remote"})
     bench.start_all()
-    tool = ["--interface", "dds1", "--domain", "7"]
+    shown = {}
     for name, words, expected in (
-        ("status", ["status", "--json"], '"state": "OP"'),
+        # On its way back to OP where the master was not run for 100 ms.
+        ("status", ["status", "--json"], r'"state": "(OP|RECOVERING)"'),
         ("watch", ["watch", "--seconds", "2"], "piccolo1 cycle"),
-        ("set", ["set", "piccolo0.led=on"], "piccolo0.led=on from cycle"),
+        ("set", ["set", "piccolo0.led=on"], r"piccolo0\.led=on from cycle"),
         ("csv", ["record", "--csv", "--seconds", "2", "--dir", str(bench.folder)], "0 gaps, 0 "),
     ):
-        assert bench.module(name, "ecdaq", *tool, *words).wait(40) == 0, bench.logs()
-        assert expected in bench.log(name)
-    assert bench.module("refused", "ecdaq", *tool, "set", "piccolo1.led=on").wait(40) == 17
-    assert "owned by local" in bench.log("refused")
+        code, shown[name] = run_tool(bench, name, *words)
+        assert code == 0, bench.logs()
+        assert re.search(expected, shown[name]), shown[name]
+    code, refused = run_tool(bench, "refused", "set", "piccolo1.led=on")
+    assert code == 17
+    assert "owned by local" in refused
     # Nanoseconds since 2000, every digit.
-    assert re.search(r" sample_time=\d{18}\b", bench.log("watch"))
-    assert re.search(r"piccolo0\.csv: \d{3,} samples\n", bench.log("csv"))
+    assert re.search(r" sample_time=\d{18}\b", shown["watch"])
+    assert re.search(r"piccolo0\.csv: \d{3,} samples\n", shown["csv"])
     # Without an end: it is ended as by Ctrl-C, and finishes its file.
     folder = bench.folder / "mcap"
-    recorder = bench.module("mcap", "ecdaq", *tool, "record", "--dir", str(folder))
+    recorder = bench.module("mcap", "ecdaq", *TOOL, "record", "--dir", str(folder))
     wait_for("its file", lambda: folder.exists() and list(folder.iterdir()), 60)
     bench.segment.wait_for_cycles(4000, 60)
     recorder.send_signal(signal.SIGINT)
