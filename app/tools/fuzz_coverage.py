@@ -27,7 +27,7 @@ PARSERS: dict[str, tuple[str, ...]] = {
         f"master/bus/{name}.c"
         for name in (
             *("eeprom", "identity", "coe_map", "sii_read", "sii_entries", "enumerate", "scan"),
-            *("map_sm", "map_check", "channels", "names"),
+            *("map_sm", "map_check", "channels", "names", "read_ahead"),
         )
     ),
     "coe": tuple(
