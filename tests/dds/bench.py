@@ -136,14 +136,14 @@ class Bench:
         """Returns when ecdaq-dds knows so many readers of ecdaq/sample and ecdaq/block: a cycle,
         of later ones it repeats for each of them what got lost.
 
-        Where others read already, a reader may get samples before that; of those, some may be
+        Not more: one that ended without a word is known until its lease is over. Where others read already, a reader may get samples before that; of those, some may be
         missing, and are not repeated.
         """
         pid = self.segment.processes["dds"].pid
 
         def are_known() -> bool:
             dds = self.segment.status().get("dds") or {"pid": 0}
-            return dds["pid"] == pid and dds["subscribers"] >= count
+            return dds["pid"] == pid and dds["subscribers"] == count
 
         wait_for(f"{count} subscribers in the list of ecdaq-dds", are_known, 60)
         return self.segment.status()["cycle_number"]
