@@ -136,8 +136,9 @@ class Bench:
         """Returns when ecdaq-dds knows so many readers of ecdaq/sample and ecdaq/block: a cycle,
         of later ones it repeats for each of them what got lost.
 
-        Not more: one that ended without a word is known until its lease is over. Where others read already, a reader may get samples before that; of those, some may be
-        missing, and are not repeated.
+        Not more: one that ended without a word is known until its lease is over. Where others read
+        already, a reader may get samples before that; of those, some may be missing, and are not
+        repeated.
         """
         pid = self.segment.processes["dds"].pid
 
