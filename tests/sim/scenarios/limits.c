@@ -213,6 +213,7 @@ TEST(limits, the_greatest_bus_is_exchanged_and_all_its_outputs_arrive)
 {
 	begin(LIMIT_SLAVES, slave_text, one_datagram);
 	virtual_master_settle(&vm);
+	printf("%d slaves: OP after %.1f s of bus time\n", LIMIT_SLAVES, (double)vm.op_ns * 1e-9);
 	exchange_all();
 	set_all_outputs();
 	CHECK_EQ(virtual_master_run(&vm, 2), SESSION_GOES_ON);
@@ -228,6 +229,7 @@ TEST(limits, a_lost_slave_beyond_the_first_words_is_bad_at_once_and_lost_after_t
 	for (unsigned phase = 0; phase < VIRTUAL_SERVICE_CYCLES; phase += 6) {
 		begin(SLAVES, slave_text, per_slave);
 		CHECK_EQ(virtual_master_bring_up(&vm), 0);
+		printf("%u slaves: OP after %.1f s of bus time\n", SLAVES, (double)vm.op_ns * 1e-9);
 		CHECK_EQ(virtual_master_run(&vm, CYCLES + phase), SESSION_GOES_ON);
 		CHECK(slave_set_is_empty(&virtual_master_sample(&vm)->slaves_bad));
 		lose_one_slave(SLAVES);
