@@ -124,8 +124,10 @@ class Fake:
         """Stopped: what it shows stays as it is, however long a reader takes."""
         self.process.send_signal(signal.SIGSTOP)
         os.waitpid(self.process.pid, os.WUNTRACED)
-        yield
-        self.process.send_signal(signal.SIGCONT)
+        try:
+            yield
+        finally:
+            self.process.send_signal(signal.SIGCONT)
 
     def sample(self, cycle: int, *channels: str) -> Any:
         """Raw values of a sample that is not older than @cycle."""
