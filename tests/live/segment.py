@@ -16,6 +16,10 @@ ROOT = Path(__file__).resolve().parents[2]
 BIN = Path(os.environ.get("ECDAQ_BIN_DIR", ROOT / "build" / "stage" / "bin"))
 
 
+# app/master/daemon/watch.c: so long without a frame, and the bus is no longer in OP.
+SILENT_CYCLES = 50
+
+
 class NeverError(AssertionError):
     """Something that had to happen did not."""
 
@@ -180,6 +184,35 @@ class Segment:
         for file in self.run_dir.iterdir():
             file.unlink()
         self.run_dir.rmdir()
+
+
+class Undisturbed:
+    """From here to check() the bus is in OP, unless this machine did not run master or segment for
+    so long that it had to leave it. Whether something else delays frames is checked on virtual time
+    (tests/sim)."""
+
+    def __init__(self, segment: Segment) -> None:
+        self.segment = segment
+        self.before = segment.wait_for_op()
+        self.left_before = self.left()
+
+    def left(self) -> int:
+        events = self.segment.ecdaq("events", "--json").stdout.splitlines()
+        return sum(
+            event["event"] == "bus_state" and event["text"].startswith("bus: OP -> RECOVERING")
+            for event in map(json.loads, events)
+        )
+
+    def check(self) -> None:
+        left = self.left() - self.left_before
+        status = self.segment.wait_for_op()
+        for key in ("pid", "session"):
+            assert status[key] == self.before[key], key
+        assert status["samples_bad_unexplained"] == 0
+        counters = ("frames_lost", "cycles_skipped")
+        bad = {key: status[key] - self.before[key] for key in counters}
+        print(f"{left} times out of OP, {bad}")
+        assert sum(bad.values()) >= left * SILENT_CYCLES, (left, bad)
 
 
 def recorded(folder: Path, topic: str) -> Iterator[Any]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from segment import Segment, wait_for
+from segment import Segment, Undisturbed, wait_for
 
 REFUSED, USAGE = 17, 2
 PROTOCOLS_BYTE, ALL_PROTOCOLS = 0x38, 0x3F
@@ -250,12 +250,10 @@ def each_protocol_works(bus: Segment, value: str) -> None:
 
 # The last one: it leads the bus to other states.
 def test_each_works_in_op_beside_the_cycle_and_in_preop_and_safeop(bus: Segment) -> None:
-    before = bus.status()
+    undisturbed = Undisturbed(bus)
     each_protocol_works(bus, "1001")
-    after = bus.status()
-    assert (after["state"], after["samples_bad_unexplained"]) == ("OP", 0)
-    assert (after["op_lost"], after["session"]) == (before["op_lost"], before["session"])
-    assert after["cycles"] > before["cycles"]
+    assert bus.status()["cycles"] > undisturbed.before["cycles"]
+    undisturbed.check()
     for state, value in (("PREOP", "1002"), ("SAFEOP", "1003")):
         run(bus, "state", state)
         assert bus.status()["state"] == state
