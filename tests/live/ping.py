@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""ping.py ADDRESS COUNT BYTES: echo requests, each after the answer to the one before it, or after
-a second; prints the number of answers with the same bytes. Runs in the namespace of the master."""
+"""ping.py ADDRESS COUNT BYTES SECONDS: echo requests, each after the answer to the one before it,
+or after SECONDS; prints the number of answers with the same bytes. Runs in the namespace of the
+master."""
 
 from __future__ import annotations
 
@@ -8,8 +9,6 @@ import socket
 import struct
 import sys
 import time
-
-SECONDS = 1.0
 
 
 def checksum(data: bytes) -> int:
@@ -25,8 +24,8 @@ def request(number: int, size: int) -> bytes:
     return struct.pack(">BBHHH", 8, 0, checksum(head + body), 0x6563, number) + body
 
 
-def is_answered(sock: socket.socket, sent: bytes) -> bool:
-    end = time.monotonic() + SECONDS
+def is_answered(sock: socket.socket, sent: bytes, seconds: float) -> bool:
+    end = time.monotonic() + seconds
     while time.monotonic() < end:
         sock.settimeout(max(end - time.monotonic(), 0.001))
         try:
@@ -41,6 +40,7 @@ def is_answered(sock: socket.socket, sent: bytes) -> bool:
 
 def main() -> int:
     address, count, size = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+    seconds = float(sys.argv[4])
     answers = 0
     with socket.socket(socket.AF_INET, socket.SOCK_RAW, socket.IPPROTO_ICMP) as sock:
         for number in range(count):
@@ -49,7 +49,7 @@ def main() -> int:
                 sock.sendto(sent, (address, 0))
             except OSError:
                 continue  # nobody has answered by ARP
-            answers += is_answered(sock, sent)
+            answers += is_answered(sock, sent, seconds)
     print(answers)
     return 0
 
