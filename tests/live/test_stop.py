@@ -9,9 +9,9 @@ from collections.abc import Callable
 
 from segment import Segment, wait_for
 
-# A second for the bus; the rest is for a loaded machine.
-LIMIT_S = 5.0
-PATIENT = {"bus.op_timeout": "120s", "bus.scan_timeout": "60s"}
+# tests/sim checks on virtual time that a stop takes a second. Here: it waits for none of these.
+PATIENT = {"bus.op_timeout": "120s", "bus.scan_timeout": "60s", "bus.mailbox_timeout": "60s"}
+LIMIT_S = 30.0
 
 
 def stop_in_time(segment: Segment, signals: int = 1) -> int:
@@ -19,7 +19,7 @@ def stop_in_time(segment: Segment, signals: int = 1) -> int:
     process = segment.processes["daemon"]
     for _ in range(signals):
         process.send_signal(signal.SIGINT)
-    code = process.wait(60)
+    code = process.wait(150)
     assert time.monotonic() - start < LIMIT_S
     return code
 
@@ -43,7 +43,7 @@ def test_the_scan_of_an_empty_wire_ends_at_once_and_as_told(
 
 
 def test_a_second_ctrl_c_does_not_cut_the_stop_short(make_segment: Callable[..., Segment]) -> None:
-    segment = make_segment()
+    segment = make_segment(settings=PATIENT)
     segment.start_all()
     assert stop_in_time(segment, signals=3) == 0
     assert segment.status()["state"] == "STOPPED"
