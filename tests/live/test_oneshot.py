@@ -5,11 +5,12 @@ from __future__ import annotations
 
 import json
 import signal
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from segment import Segment, recorded, wait_for
+from segment import Segment, Undisturbed, recorded, wait_for
 from test_sync0 import Checked
 
 SLAVE, OTHER = 1, 0
@@ -23,6 +24,19 @@ def make(make_segment: Callable[..., Segment]) -> Checked:
     checked = Checked(make_segment(settings=MODES))
     checked.wait_for_windows(1)
     return checked
+
+
+def judge(make_segment: Callable[..., Segment], shoot: Callable[[Checked], None]) -> None:
+    """A slave that this machine made leave OP does not fire: then once more, with a new segment."""
+    for attempt in range(3):
+        checked = make(make_segment)
+        undisturbed = Undisturbed(checked.segment)
+        try:
+            shoot(checked)
+            return
+        except (AssertionError, subprocess.CalledProcessError):
+            if attempt == 2 or undisturbed.left() == undisturbed.left_before:
+                raise
 
 
 def fire(checked: Checked, ahead: str = AHEAD, *more: str) -> int:
@@ -54,7 +68,10 @@ def pulses(edges: Path) -> list[int]:
 def test_a_shot_is_timed_against_its_command_and_a_missing_one_is_reported(
     make_segment: Callable[..., Segment],
 ) -> None:
-    checked = make(make_segment)
+    judge(make_segment, shots_and_a_missing_one)
+
+
+def shots_and_a_missing_one(checked: Checked) -> None:
     segment = checked.segment
     segment.start_recorder()
     came = fire(checked, AHEAD, "--wait")
@@ -93,7 +110,10 @@ def test_a_shot_is_timed_against_its_command_and_a_missing_one_is_reported(
 def test_another_command_cancels_a_shot_and_a_check_that_starts_late_reports_nothing(
     make_segment: Callable[..., Segment],
 ) -> None:
-    checked = make(make_segment)
+    judge(make_segment, a_cancelled_shot_and_a_late_check)
+
+
+def a_cancelled_shot_and_a_late_check(checked: Checked) -> None:
     segment = checked.segment
     cancelled = fire(checked, "30s")
     first = fire(checked, AHEAD, "--wait")
