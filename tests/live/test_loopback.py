@@ -52,7 +52,8 @@ def test_inputs_come_out_of_the_coupler_a_cycle_later(
             lambda wanted=wanted: int(send_line(segment, "io slave=0")["slot4"], 0) == wanted,
             60,
         )
-    segment.wait_for_cycles(2000, 60)
+        segment.wait_for_cycles(500, 60)
+    segment.wait_for_cycles(1000, 60)
     assert segment.stop("daemon") == 0
     assert segment.stop("recorder") == 0
     check_recording(segment)

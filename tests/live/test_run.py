@@ -10,7 +10,6 @@ import os
 import re
 import signal
 import subprocess
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,6 +20,11 @@ from segment import BIN, ROOT, Segment, recorded, wait_for
 PERIOD_NS = 1_000_000
 MINUTE_CYCLES = int(os.environ.get("ECDAQ_LIVE_CYCLES", "60000"))
 PICCOLOS = ("piccolo0", "piccolo1")
+ROUNDS = 10
+# SAMPLE_NOT_OP, SAMPLE_FAIL_SAFE, SAMPLE_SKIPPED: no frame carried what was set.
+NOT_SENT = 0x08 | 0x10 | 0x20
+# A recording of this size has samples: its descriptions take less.
+HEAD_BYTES = 100_000
 
 
 def fit_sine(time_s: np.ndarray, volt: np.ndarray) -> tuple[float, float, float]:
@@ -109,11 +113,13 @@ def test_a_recorder_killed_for_ten_seconds_misses_no_cycle(
 ) -> None:
     segment = make_segment()
     segment.start_all()
-    wait_for("a recording", lambda: segment.status().get("recorded_cycles", 0) > 1000, 30)
+    wait_for("a recording", lambda: segment.status().get("recorded_cycles", 0) > 1000, 60)
     assert segment.stop("recorder", signal.SIGKILL) == -signal.SIGKILL
     segment.wait_for_cycles(10_000, 60)
     segment.start_recorder()
-    segment.wait_for_cycles(2_000, 30)
+    # It counts its own: first all that it missed.
+    wait_for("the backlog", lambda: segment.status()["recorded_cycles"] > 10_000, 60)
+    segment.wait_for_cycles(2_000, 60)
     assert segment.stop("daemon") == 0
     assert segment.stop("recorder") == 0
     cycles = [m.cycle for m in recorded(segment.record_dir, "/ecdaq/cycle")]
@@ -126,7 +132,7 @@ def test_a_recorder_killed_for_ten_seconds_misses_no_cycle(
 def test_a_stopped_reader_of_the_ring_changes_nothing_for_the_cycle(
     make_segment: Callable[..., Segment],
 ) -> None:
-    """Half the time with a reader, half with it stopped, in one run; counts are compared."""
+    """Rounds with a reader and with it stopped, in one run; counts are compared."""
     segment = make_segment()
     segment.start_all()
     segment.start(
@@ -138,18 +144,20 @@ def test_a_stopped_reader_of_the_ring_changes_nothing_for_the_cycle(
         f"{PICCOLOS[0]}.adc",
     )
     lost: dict[signal.Signals, list[int]] = {signal.SIGCONT: [], signal.SIGSTOP: []}
-    for number in [signal.SIGCONT, signal.SIGSTOP] * 3:
+    # The machine's own losses come and go; those of a reader that holds up the cycle would be in
+    # each round.
+    for number in [signal.SIGCONT, signal.SIGSTOP] * ROUNDS:
         segment.send("watch", number)
         before = segment.status()
         after = segment.wait_for_cycles(2_000, 60)
         lost[number].append(after["frames_lost"] - before["frames_lost"])
         for key in ("page_faults", "samples_bad_unexplained"):
             assert after[key] == 0
+        if lost[signal.SIGSTOP] and min(lost[signal.SIGSTOP]) <= max(lost[signal.SIGCONT]):
+            break
     segment.send("watch", signal.SIGCONT)
     print(f"frames lost in 2000 cycles: {lost}")
-    # The machine's own losses come and go; those of a reader that holds up the cycle would be in
-    # each round.
-    assert min(lost[signal.SIGSTOP]) <= max(lost[signal.SIGCONT]) + 5
+    assert min(lost[signal.SIGSTOP]) <= max(lost[signal.SIGCONT])
 
 
 def test_the_cycle_thread_is_alone_with_its_rights(make_segment: Callable[..., Segment]) -> None:
@@ -159,7 +167,10 @@ def test_the_cycle_thread_is_alone_with_its_rights(make_segment: Callable[..., S
     daemon = segment.processes["daemon"].pid
     classes: dict[str, str] = {}
     for task in Path(f"/proc/{daemon}/task").iterdir():
-        got = subprocess.run(["chrt", "-p", task.name], capture_output=True, text=True, check=True)
+        got = subprocess.run(["chrt", "-p", task.name], capture_output=True, text=True, check=False)
+        if not task.exists():
+            continue  # it has ended
+        assert got.returncode == 0, got.stderr
         classes[(task / "comm").read_text().strip()] = got.stdout
     cycle = [text for name, text in classes.items() if "cycle" in name]
     assert len(cycle) == 1, classes
@@ -175,12 +186,15 @@ def test_an_output_set_by_the_operator_is_on_the_wire_in_the_cycle_printed(
     segment = make_segment()
     segment.start_all()
     answer = json.loads(segment.ecdaq("set", f"{PICCOLOS[1]}.led=on", "--json").stdout)
-    segment.wait_for_cycles(500, 30)
+    segment.wait_for_cycles(500, 60)
+    segment.wait_for_op()
     assert segment.stop("daemon") == 0
     assert segment.stop("recorder") == 0
+    sent = {c.cycle for c in recorded(segment.record_dir, "/ecdaq/cycle") if not c.flags & NOT_SENT}
     led = {m.cycle: m.led for m in recorded(segment.record_dir, f"/ecdaq/{PICCOLOS[1]}")}
-    first_on = min(cycle for cycle, value in led.items() if value)
-    assert first_on == answer["cycle"]
+    assert min(cycle for cycle, value in led.items() if value) >= answer["cycle"]
+    # A cycle that this machine skipped has no frame: then the next one.
+    assert led[min(cycle for cycle in sent if cycle >= answer["cycle"])]
 
 
 def test_build_sh_run_ends_with_one_json_line(tmp_path: Path) -> None:
@@ -245,9 +259,12 @@ def test_ctrl_c_ends_the_run_in_order(tmp_path: Path) -> None:
     )
     try:
         record = tmp_path / "record"
-        wait_for("a recording", lambda: record.exists() and list(record.iterdir()), 120)
-        end = time.monotonic() + 3
-        wait_for("three seconds of it", lambda: time.monotonic() > end, 5)
+
+        def has_samples() -> bool:
+            return any(path.stat().st_size > HEAD_BYTES for path in record.glob("*.part"))
+
+        # build.sh may have to build first.
+        wait_for("a recording", has_samples, 300)
         os.killpg(process.pid, signal.SIGINT)
         output, _ = process.communicate(timeout=60)
     finally:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from typing import Any
 
 from segment import Segment, wait_for
 
@@ -14,8 +15,12 @@ def test_it_waits_for_the_first_slave_and_goes_on_by_itself(
 ) -> None:
     segment = make_segment(settings={"bus.scan_timeout": "1s", "bus.target": "preop"})
     segment.start_waiting_daemon()
-    wait_for("waiting", lambda: segment.status().get("waiting"), 30)
-    status = segment.status()
+
+    def is_waiting() -> dict[str, Any]:
+        status = segment.status()
+        return status if status.get("waiting") else {}
+
+    status = wait_for("waiting", is_waiting, 60)
     assert (status["state"], status["target"], status["link_up"]) == ("DOWN", "PREOP", True)
     assert "no slave answers" in status["message"]
     segment.start_sim()
