@@ -91,6 +91,8 @@ class Segment:
         self.run_dir = Path("/dev/shm") / f"ecdaq-live-{os.getpid()}-{folder.name}"
         self.run_dir.mkdir(mode=0o750)
         self.settings = {"bus.interface": "ecat0", "record.dir": str(self.record_dir)}
+        # The clocks settle in so many frames, which take long on a busy machine.
+        self.settings["dc.lock_timeout"] = "60s"
         self.settings |= settings or {}
         self.space = Namespace()
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
@@ -142,7 +144,7 @@ class Segment:
         got = self.ecdaq("status", "--json", check=False)
         return json.loads(got.stdout) if got.returncode == 0 else {}
 
-    def wait_for_op(self, seconds: float = 60) -> dict[str, Any]:
+    def wait_for_op(self, seconds: float = 120) -> dict[str, Any]:
         def in_op() -> dict[str, Any]:
             daemon = self.processes["daemon"]
             if daemon.poll() is not None:
