@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from segment import BIN, ROOT, Segment, wait_for
+from segment import BIN, ROOT, Segment, recorded, wait_for
 
 BUILD = Path(os.environ.get("ECDAQ_BUILD", ROOT / "build" / "release"))
 TROUBLE = BUILD / "tests" / "control" / "trouble.so"
@@ -41,20 +41,31 @@ def terminals(segment: Segment, slave: int = 0) -> dict[str, float]:
     return {key: float(value) for key, value in (w.split("=") for w in answer.split())}
 
 
-def start(segment: Segment) -> dict[str, Any]:
+def begin(segment: Segment) -> None:
     segment.start_sim("--control", str(segment.folder / "control"))
-    wait_for("control socket", (segment.folder / "control").exists, 30)
+    wait_for("control socket", (segment.folder / "control").exists, 60)
     segment.start_daemon()
+
+
+def start(segment: Segment) -> dict[str, Any]:
+    begin(segment)
     return segment.wait_for_op()
 
 
 def in_trouble(make_segment: Callable[..., Segment], how: str) -> Segment:
-    """In OP with the LED on, by a program that will be in trouble in its 3000th cycle."""
+    """With a program that switches the LED on and is in trouble in its 3000th cycle."""
     options = {"control.program": str(TROUBLE), "control.options": f"how={how}, after=3000"}
     segment = make_segment(settings=OWNED | options)
-    start(segment)
-    wait_for("LED", lambda: terminals(segment)["led"] == 1, 60)
+    begin(segment)
+    segment.start_recorder()
     return segment
+
+
+def check_led(segment: Segment) -> None:
+    """It was on, as the recording shows (three seconds may be too short to look), and goes off."""
+    assert segment.stop("recorder") == 0
+    assert any(sample.led for sample in recorded(segment.record_dir, "/ecdaq/a"))
+    wait_for("LED off", lambda: terminals(segment)["led"] == 0, 60)
 
 
 def end_of(segment: Segment) -> int:
@@ -105,7 +116,7 @@ def test_after_a_crash_ecdaqd_ends_in_order_and_the_outputs_are_safe(
 ) -> None:
     segment = in_trouble(make_segment, "crash")
     assert end_of(segment) == CONTROL_EXIT
-    wait_for("LED off", lambda: terminals(segment)["led"] == 0, 60)
+    check_led(segment)
     line = segment.log("daemon").splitlines()
     message = [text for text in line if text.startswith("ecdaqd: control: ")]
     assert len(message) == 1 and "crashed with SIGSEGV (at 0x10) in cycle" in message[0]
@@ -121,7 +132,7 @@ def test_a_loop_without_end_ends_ecdaqd_and_the_watchdog_makes_the_outputs_safe(
 ) -> None:
     segment = in_trouble(make_segment, "loop")
     assert end_of(segment) == CONTROL_EXIT
-    wait_for("LED off", lambda: terminals(segment)["led"] == 0, 60)
+    check_led(segment)
     assert "control: trouble: cycle() has not returned for" in segment.log("daemon")
     status = segment.status()
     assert status["state"] == "FAILED" and status["exit_code"] == CONTROL_EXIT
