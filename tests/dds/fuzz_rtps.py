@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: MIT
 """Send an appliance RTPS packets that are nearly right: what peers on this host sent it, changed.
 
-Listens on the interface until it has seen enough of what goes to the appliance, prints "learned",
-then sends changed copies for some seconds, always the same for a seed and what was learned.
+Listens on the interface to what goes to the appliance, for some seconds and until SIGUSR1, prints
+"learned", then sends changed copies for some seconds, always the same for a seed and what was
+learned.
 """
 
 from __future__ import annotations
 
 import argparse
 import random
+import signal
 import socket
 import struct
 import time
@@ -29,12 +31,15 @@ def udp_of(frame: bytes) -> tuple[str, int, bytes] | None:
 
 def learn(interface: str, host: str, seconds: float) -> list[tuple[int, bytes]]:
     """Port and payload of what went to @host or to a group, one of each kind and length."""
+    told: list[int] = []
+    signal.signal(signal.SIGUSR1, lambda number, _: told.append(number))
+    print("listening", flush=True)
     seen: dict[tuple[int, int, bytes], tuple[int, bytes]] = {}
     listener = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, socket.htons(3))
     listener.bind((interface, 0))
     listener.settimeout(0.1)
     end = time.monotonic() + seconds
-    while time.monotonic() < end and len(seen) < MOST:
+    while time.monotonic() < end or not told:
         try:
             frame, address = listener.recvfrom(65536)
         except TimeoutError:
@@ -43,7 +48,7 @@ def learn(interface: str, host: str, seconds: float) -> list[tuple[int, bytes]]:
         if address[2] != socket.PACKET_OUTGOING or found is None or found[2][:4] != MAGIC:
             continue
         to, port, payload = found
-        if to == host or to.startswith("239."):
+        if len(seen) < MOST and (to == host or to.startswith("239.")):
             seen[port, len(payload), payload[20:21]] = (port, payload)
     listener.close()
     return list(seen.values())
@@ -123,7 +128,6 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, required=True)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
-    print("listening", flush=True)
     learned = learn(options.interface, options.host, options.learn)
     print(f"learned {len(learned)} packets", flush=True)
     if learned:

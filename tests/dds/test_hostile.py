@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+import signal
 import subprocess
 from collections.abc import Callable
 
@@ -47,6 +48,8 @@ def start_fuzzer(bench: Bench, seconds: float) -> tuple[subprocess.Popen[bytes],
     decoy = bench.commander()
     for k in range(20):
         decoy.accepted({LED: k % 2})
+    # Not before: a changed copy may make the appliance ignore the decoy's own packets.
+    fuzzer.send_signal(signal.SIGUSR1)
     wait_for("what it learned", lambda: "learned" in bench.log("fuzzer"), 60)
     assert fuzzer.poll() is None, bench.log("fuzzer")
     return fuzzer, decoy
