@@ -191,10 +191,6 @@ def test_command_is_in_the_slave_in_the_cycle_that_the_answer_names(
     cycle = {m.cycle: m for m in cycles_of(bench)}
     for trip in trips:
         assert led[trip.cycle].led == trip.value
-        # The answer names the first frame that came back: the frame before it that came back.
-        back = (k for k in range(trip.cycle - 1, 0, -1) if not cycle[k].flags & (SKIPPED | LOST))
-        before = next(back)
-        assert led[before].led != trip.value
     there = [trip for trip in trips if trip.led_cycles is not None]
     for trip in there:  # whole: each slave that the frame passed took its outputs
         assert cycle[trip.cycle].wkc == cycle[trip.cycle].wkc_expected
