@@ -272,22 +272,35 @@ start_view()
 {
 	setpriv --pdeathsig TERM "$bin/ecdaq" top --leave-text 'q: stop master, segment and recorder' <&3 4>&- 5>&- &
 	pid[view]=$!
-	trap suspend TSTP
+	trap 'suspended=yes' TSTP
 }
 
 # Ctrl-Z: the view gives the terminal back before this script stops, and with it the job of the shell.
+# Not in the trap itself: the time limit of a read that a trap interrupts ends the trap. And without
+# commands, which another Ctrl-Z would stop: this script would wait for them.
 suspend()
 {
-	local state tries
+	local tries
 
-	for ((tries = 0; tries < 100; tries++)); do
-		state=$(awk '/^State:/ { print $2 }' "/proc/${pid[view]:-none}/status" 2> /dev/null) || break
-		[[ $state != [TZ] ]] || break
-		sleep 0.02 || true
+	for ((tries = 0; tries < 250; tries++)); do
+		is_view_running || break
+		read -r -t 0.02 -u 5 || true
 	done
 	trap - TSTP
+	suspended=no
 	kill -TSTP "$$"
-	trap suspend TSTP
+	trap 'suspended=yes' TSTP
+}
+
+# Neither stopped nor ended.
+is_view_running()
+{
+	local key state rest
+
+	while read -r key state rest; do
+		[ "$key" != State: ] || break
+	done 2> /dev/null < "/proc/${pid[view]:-none}/status" || return 1
+	[[ ${state:-Z} != [TZ] ]]
 }
 
 # Does the configuration itself name what ecdaq-sync0 checks?
@@ -338,6 +351,7 @@ stop_dds()
 
 failed=0
 interrupted=no
+suspended=no
 
 end_in_order()
 {
@@ -373,6 +387,7 @@ wait_for_end()
 
 	while [ "$interrupted" = no ]; do
 		read -r -t 0.2 -u 5 || true
+		[ "$suspended" = no ] || suspend
 		for name in "${!pid[@]}"; do
 			has_ended "$name" || continue
 			case $name$status in

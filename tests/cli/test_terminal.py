@@ -11,6 +11,7 @@ import select
 import signal
 import struct
 import subprocess
+import sys
 import termios
 import time
 from collections.abc import Callable, Iterator
@@ -316,6 +317,50 @@ def test_a_run_is_suspended_with_its_view_and_q_ends_it(
     terminal.press("q")
     text = terminal.wait_for_new("READY> ")
     assert "2 slaves" in text[text.rfind(LEAVE) :] and not terminal.has_keys()
+
+
+# A view that takes its time to stop, as the real one does on a slow machine.
+SLOW_VIEW = """#!{python}
+import os, signal, sys, time
+if sys.argv[1] != "top":
+    os.execv("{ecdaq}", ["ecdaq", *sys.argv[1:]])
+def suspend(number, frame):
+    signal.signal(signal.SIGTSTP, signal.SIG_IGN)
+    time.sleep(1)
+    print("view stops", flush=True)
+    os.kill(os.getpid(), signal.SIGSTOP)
+    signal.signal(signal.SIGTSTP, suspend)
+    print("view continues", flush=True)
+signal.signal(signal.SIGTSTP, suspend)
+print("view runs", flush=True)
+while True:
+    signal.pause()
+"""
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="makes a network namespace, which takes root")
+def test_a_view_that_stops_late_suspends_the_run_as_well(
+    run_dir: Path, tmp_path: Path, terminal: Terminal
+) -> None:
+    for name in ("ecdaqd", "ecdaq-record", "ecdaq-sim"):
+        (tmp_path / name).write_text(OTHER)
+        (tmp_path / name).chmod(0o755)
+    (tmp_path / "ecdaq").write_text(SLOW_VIEW.format(ecdaq=ECDAQ, python=sys.executable))
+    (tmp_path / "ecdaq").chmod(0o755)
+    script = f"{ROOT}/app/tools/run-segment.sh --no-dds --record {tmp_path}/record"
+    terminal.start_shell(run_dir, ECDAQ_BIN_DIR=str(tmp_path))
+    terminal.press(f"{script}\n")
+    terminal.wait_for_new("view runs")
+    for _ in range(2):
+        # A second key must not stop a command that the script waits for.
+        terminal.press("\x1a")
+        terminal.press("\x1a")
+        text = terminal.wait_for_new(r"(?s)Stopped.*READY> ")
+        assert "view stops" in text.split("Stopped")[0]
+        terminal.press("fg\n")
+        terminal.wait_for_new("view continues")
+    terminal.press("\x03")
+    terminal.wait_for_new("READY> ")
 
 
 def test_a_live_plot_starts_full_and_scrolls(daemon: Fake, terminal: Terminal) -> None:
