@@ -119,7 +119,7 @@ class Books:
                 self.cycle_of[due] = cycle
                 if frame != 0:
                     guest_of[due] = mono - (frame - due)
-            else:
+            elif words[0] != "l":  # the head: what each line is of
                 slave, mono, _dc, seqno = (int(word) for word in words)
                 self.edges.setdefault(slave, []).append(Edge(mono, seqno))
         self.begin_ns = self.beginning(guest_of)
