@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 from pathlib import Path
+from typing import Any
 
 from metadata import Recipe
 
@@ -38,6 +40,9 @@ def license_fields(recipe: Recipe) -> list[str]:
             )
     if not recipe.value("LIC_FILES_CHKSUM"):
         found.append(f"{recipe.file}: no LIC_FILES_CHKSUM")
+    foreign = "apt://" in recipe.value("SRC_URI") or recipe.value("PYPI_PACKAGE")
+    if foreign and not recipe.value("HOMEPAGE"):
+        found.append(f"{recipe.file}: no HOMEPAGE, though its source is not ours")
     return found
 
 
@@ -67,6 +72,25 @@ def pins(recipe: Recipe) -> list[str]:
     ):
         found.append(f"{recipe.file}: PYPI_SHA256 is no SHA-256")
     return found
+
+
+def patch_status(name: str, text: str) -> list[str]:
+    """A patch says where it is upstream, in words that yocto-check-layer accepts."""
+    words = r"Accepted|Backport|Denied|Inactive-Upstream|Inappropriate|Pending|Submitted"
+    if re.search(rf"^Upstream-Status: ({words})\b", text, re.MULTILINE):
+        return []
+    return [f"{name}: no valid Upstream-Status"]
+
+
+def networking_tasks(recipe: Recipe) -> list[str]:
+    """Only fetching uses the network, so that a build can be repeated without it."""
+    # An image's packages are fetched where they are installed.
+    allowed = {"do_fetch", "do_rootfs_base"}
+    return [
+        f"{recipe.file}: {task} uses the network"
+        for task in recipe.tasks
+        if recipe.flag(task, "network") and task not in allowed
+    ]
 
 
 def soem_pin(recipe: Recipe, lock: Path) -> list[str]:
@@ -124,16 +148,42 @@ def no_hosts(name: str, text: str) -> list[str]:
     ]
 
 
-def layer_conf(name: str, text: str) -> list[str]:
-    """A layer names its collection, where its files are, and what it fits to."""
+def collections(configuration: Any) -> list[str]:
+    """Each collection has pattern, priority, version, series, and dependencies that exist."""
     found = []
-    collection = re.search(r'^BBFILE_COLLECTIONS \+= "(\w+)"', text, re.MULTILINE)
-    if not collection:
-        return [f"{name}: no BBFILE_COLLECTIONS"]
-    for field in ("BBFILE_PATTERN", "BBFILE_PRIORITY", "LAYERVERSION", "LAYERSERIES_COMPAT"):
-        if f"{field}_{collection[1]} " not in text:
-            found.append(f"{name}: no {field}_{collection[1]}")
-    for forbidden in ("MACHINE", "DISTRO"):
-        if re.search(rf"^{forbidden}\s*[?:]*=", text, re.MULTILINE):
-            found.append(f"{name}: a layer does not choose the {forbidden}")
+    names = (configuration.getVar("BBFILE_COLLECTIONS") or "").split()
+    series = set((configuration.getVar("LAYERSERIES_CORENAMES") or "").split())
+    for name in names:
+        for field in ("BBFILE_PATTERN", "LAYERVERSION", "LAYERSERIES_COMPAT"):
+            if not configuration.getVar(f"{field}_{name}"):
+                found.append(f"{name}: no {field}_{name}")
+        if not (configuration.getVar(f"BBFILE_PRIORITY_{name}") or "").isdigit():
+            found.append(f"{name}: BBFILE_PRIORITY_{name} is no number")
+        if not series & set((configuration.getVar(f"LAYERSERIES_COMPAT_{name}") or "").split()):
+            found.append(f"{name}: LAYERSERIES_COMPAT_{name} has none of {sorted(series)}")
+        needed = (configuration.getVar(f"LAYERDEPENDS_{name}") or "").split()
+        if name != "core" and not needed:
+            found.append(f"{name}: no LAYERDEPENDS_{name}")
+        found += [
+            f"{name}: needs {other}, which is no layer" for other in needed if other not in names
+        ]
     return found
+
+
+def owners(configuration: Any, file: Path) -> list[str]:
+    """The collections whose BBFILE_PATTERN matches a recipe; it should be one."""
+    names = (configuration.getVar("BBFILE_COLLECTIONS") or "").split()
+    return [
+        name
+        for name in names
+        if re.match(configuration.getVar(f"BBFILE_PATTERN_{name}") or "$.", os.path.normpath(file))
+    ]
+
+
+def choices(name: str, text: str) -> list[str]:
+    """A layer offers machines and distributions, and chooses none."""
+    return [
+        f"{name}: a layer does not choose the {variable}"
+        for variable in ("MACHINE", "DISTRO")
+        if re.search(rf"^{variable}\s*[?:]*=", text, re.MULTILINE)
+    ]

@@ -97,11 +97,6 @@ def test_fields_are_in_order(path: Path) -> None:
     assert rules.field_order(path.name, path.read_text()) == []
 
 
-@pytest.mark.parametrize("path", sorted((TOP / "layers").glob("*/conf/layer.conf")), ids=str)
-def test_layers_keep_the_rules(path: Path) -> None:
-    assert rules.layer_conf(str(path), path.read_text()) == []
-
-
 def test_no_registry_is_named() -> None:
     found = [line for path in TEXTS for line in rules.no_hosts(str(path), path.read_text())]
     assert found == []

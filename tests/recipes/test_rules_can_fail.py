@@ -87,17 +87,66 @@ def test_a_registry_by_name_is_found() -> None:
     assert rules.no_hosts("x", f"deb http://{host}/debian trixie main\n") != []
 
 
+@pytest.mark.parametrize("text", ['MACHINE ?= "y"\n', 'A = "1"\nDISTRO = "y"\n'])
+def test_a_layer_that_chooses_is_found(text: str) -> None:
+    assert rules.choices("x.conf", 'MACHINE_FEATURES = ""\n') == []
+    assert rules.choices("x.conf", text) != []
+
+
+LAYER = {
+    "BBFILE_COLLECTIONS": "core x",
+    "LAYERSERIES_CORENAMES": "v1 next",
+    **{f"BBFILE_PATTERN_{n}": f"^/{n}/" for n in ("core", "x")},
+    **{f"BBFILE_PRIORITY_{n}": "5" for n in ("core", "x")},
+    **{f"LAYERVERSION_{n}": "1" for n in ("core", "x")},
+    **{f"LAYERSERIES_COMPAT_{n}": "v1" for n in ("core", "x")},
+    "LAYERDEPENDS_x": "core",
+}
+
+
 @pytest.mark.parametrize(
-    "text",
+    "values",
     [
-        "",
-        'BBFILE_COLLECTIONS += "x"\n',
-        'BBFILE_COLLECTIONS += "x"\nBBFILE_PATTERN_x = ""\nBBFILE_PRIORITY_x = ""\n'
-        'LAYERVERSION_x = ""\nLAYERSERIES_COMPAT_x = ""\nMACHINE ?= "y"\n',
+        {"BBFILE_PATTERN_x": ""},
+        {"BBFILE_PRIORITY_x": "high"},
+        {"LAYERVERSION_x": ""},
+        {"LAYERSERIES_COMPAT_x": ""},
+        {"LAYERSERIES_COMPAT_x": "v0"},
+        {"LAYERDEPENDS_x": ""},
+        {"LAYERDEPENDS_x": "core y"},
     ],
 )
-def test_a_layer_that_breaks_a_rule_is_found(text: str) -> None:
-    assert rules.layer_conf("layer.conf", text) != []
+def test_an_incomplete_layer_is_found(values: dict[str, str]) -> None:
+    assert rules.collections(Data(**LAYER)) == []
+    assert len(rules.collections(Data(**(LAYER | values)))) >= 1
+
+
+def test_a_recipe_of_no_layer_is_found() -> None:
+    assert rules.owners(Data(**LAYER), Path("/x/recipes/a.bb")) == ["x"]
+    assert rules.owners(Data(**LAYER), Path("/x/../recipes/a.bb")) == []
+
+
+def test_a_foreign_source_without_a_homepage_is_found() -> None:
+    assert rules.license_fields(recipe(SRC_URI="apt://linux")) != []
+    assert rules.license_fields(recipe(SRC_URI="apt://linux", HOMEPAGE="https://x/")) == []
+
+
+def test_a_build_that_uses_the_network_is_found() -> None:
+    class Flags(Data):
+        def getVarFlag(self, task: str, _name: str, _expand: bool) -> Any:  # noqa: N802
+            return self.values.get(task)
+
+    tasks: dict[str, list[str]] = {"do_fetch": [], "do_dpkg_build": []}
+    good = Recipe("x", Path("x.bb"), Flags(do_fetch="1"), tasks)
+    bad = Recipe("x", Path("x.bb"), Flags(do_dpkg_build="1"), tasks)
+    assert rules.networking_tasks(good) == []
+    assert rules.networking_tasks(bad) == ["x.bb: do_dpkg_build uses the network"]
+
+
+@pytest.mark.parametrize("text", ["Fix it.\n", "Upstream-Status: Unknown\n"])
+def test_a_patch_without_a_status_is_found(text: str) -> None:
+    assert rules.patch_status("a.patch", "Upstream-Status: Inappropriate [x]\n") == []
+    assert rules.patch_status("a.patch", text) != []
 
 
 @pytest.mark.parametrize(

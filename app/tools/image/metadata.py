@@ -8,6 +8,7 @@ import logging
 import os
 import sys
 import types
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -71,13 +72,15 @@ class Recipe:
         return self.file.parts[-4] if len(self.file.parts) > 3 else ""
 
 
-def write_configuration(top: Path, build: Path, settings: dict[str, str]) -> None:
+def write_configuration(
+    top: Path, build: Path, settings: dict[str, str], layers: Sequence[str]
+) -> None:
     """bblayers.conf and local.conf, as one writes them for BitBake."""
     conf = build / "conf"
     conf.mkdir(parents=True, exist_ok=True)
-    layers = " ".join(str(top / layer) for layer in LAYERS)
+    folders = " ".join(str(top / layer) for layer in layers)
     (conf / "bblayers.conf").write_text(
-        f'BBPATH = "${{TOPDIR}}"\nBBFILES = ""\nBBLAYERS = "{layers}"\n'
+        f'BBPATH = "${{TOPDIR}}"\nBBFILES = ""\nBBLAYERS = "{folders}"\n'
     )
     lines = [f'{name} = "{value}"\n' for name, value in settings.items()]
     (conf / "local.conf").write_text("".join(lines))
@@ -86,15 +89,22 @@ def write_configuration(top: Path, build: Path, settings: dict[str, str]) -> Non
 class Metadata:
     """The configuration of one machine and every recipe of the layers, parsed."""
 
-    def __init__(self, top: Path, build: Path, settings: dict[str, str]) -> None:
+    def __init__(
+        self,
+        top: Path,
+        build: Path,
+        settings: dict[str, str],
+        layers: Sequence[str] = LAYERS,
+    ) -> None:
         self.top = top
+        self.configuration: Any = None
         self.bb = import_bb()
         self.recipes: dict[str, Recipe] = {}
         self._collect = _Collect()
         logger = logging.getLogger("BitBake")
         logger.propagate = False
         logger.addHandler(self._collect)
-        write_configuration(top, build, settings)
+        write_configuration(top, build, settings, layers)
         try:
             self._parse(build)
         finally:
@@ -115,6 +125,7 @@ class Metadata:
         try:
             builder = bb.cookerdata.CookerDataBuilder(configuration, True)
             builder.parseBaseConfiguration(worker=True)
+            self.configuration = builder.data
             for file in self._recipe_files(builder.data):
                 self._parse_recipe(builder, file)
         except (bb.BBHandledException, bb.parse.ParseError, bb.data_smart.ExpansionError) as error:
