@@ -123,6 +123,8 @@ if [ -z "$plan" ]; then
 	done
 	need_arm64
 fi
-# shellcheck disable=SC2086 # --dry-run or nothing
-PYTHONDONTWRITEBYTECODE=1 exec nice -n 10 "$venv/bin/python" "$here/bake.py" --machine "$machine" \
+# What a build mounts in its chroots goes with its last process, also if that is killed.
+[ -n "$plan" ] || alone='unshare --mount --propagation private'
+# shellcheck disable=SC2086 # lists of words, or nothing
+PYTHONDONTWRITEBYTECODE=1 exec ${alone:-} nice -n 10 "$venv/bin/python" "$here/bake.py" --machine "$machine" \
 	--cache "$cache" --build "$root/build/image" --jobs "$jobs" $plan "$recipe"
