@@ -60,7 +60,8 @@ help_test()
 	cat <<'USAGE'
 usage: ./build.sh test [--fail-fast | --keep-going] [--only PATTERN] [--fuzz-seconds N] [GROUP...]
 
-Without GROUP all groups run, the fast ones first, cli and docs beside the computing ones:
+Without GROUP all groups run, the fast ones first, cli and docs beside the computing ones; meanwhile
+the images are built with what time the processors have left:
   unit     app/, module by module; also under ASan+UBSan, and what threads share under TSan
   tidy     the rules of the source tree: include table, banned calls, sizes, formatting, links, lint
   cli      the operator's tool and the programs' command lines; also under ASan+UBSan

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Callable
-from multiprocessing.connection import Connection
+from collections.abc import Callable, Iterable
+from multiprocessing.connection import Connection, wait
 from typing import Generic, TypeVar
 
 from processes import adopt_orphans
@@ -18,9 +18,9 @@ class Beside(Generic[Result]):
 
     def __init__(self, function: Callable[[], Result]) -> None:
         context = multiprocessing.get_context("fork")
-        self._here, there = context.Pipe()
+        self.connection, there = context.Pipe()
         self._process = context.Process(
-            target=self._work, args=(function, self._here, there), daemon=True
+            target=self._work, args=(function, self.connection, there), daemon=True
         )
         self._process.start()
         there.close()
@@ -36,10 +36,16 @@ class Beside(Generic[Result]):
     def result(self) -> Result | None:
         """What the function returned; None if it ended without."""
         try:
-            result = self._here.recv()
-            self._here.send(None)
+            result = self.connection.recv()
+            self.connection.send(None)
         except EOFError:
             result = None
-        self._here.close()
+        self.connection.close()
         self._process.join()
         return result
+
+
+def wait_for_any(running: Iterable[Beside[Result]]) -> list[Beside[Result]]:
+    """Wait until at least one has its result or has ended without; those."""
+    connections = {one.connection: one for one in running}
+    return [connections[ready] for ready in wait(connections) if isinstance(ready, Connection)]

@@ -19,12 +19,12 @@ import subprocess
 import sys
 import time
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from beside import Beside
+from beside import Beside, wait_for_any
 from fuzz_coverage import LEAST_PERCENT, CoverageError, make_seeds, reached
 from processes import adopt_orphans, end_group, wait_and_reap
 from test_report import Outcome, fail_unexpected_skips, read_junit, tail
@@ -40,7 +40,6 @@ FUZZ_SEED = 20261122
 FUZZ_RUNS_PER_SECOND = 2
 SLOWEST = 10
 IMAGES = ("qemuarm64", "raspberrypi4-64")
-WIRE_FILES = "*/test_?0_sync0_*.py"
 # What threads share: the tests of these modules run under ThreadSanitizer.
 SHARED_STATE = (
     "ring",
@@ -156,14 +155,15 @@ def run_ctest(suite: Suite, options: argparse.Namespace) -> Outcome:
 
 
 def run_pytest(suite: Suite, options: argparse.Namespace) -> Outcome:
-    folder = ROOT / suite.arguments[0]
-    if not any(folder.glob("test_*.py")):
+    """suite.arguments: a folder or a file of tests, and options of pytest."""
+    path = ROOT / suite.arguments[0]
+    if not path.is_file() and not any(path.glob("test_*.py")):
         return Outcome()
     slug = suite.name.replace(" ", "-")
     junit, log = LOGS / f"{slug}.xml", LOGS / f"{slug}.log"
     junit.unlink(missing_ok=True)
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-rs"]
-    command += [f"--junitxml={junit}", *suite.arguments[1:], str(folder)]
+    command += [f"--junitxml={junit}", *suite.arguments[1:], str(path)]
     if options.only:
         command += ["-k", options.only]
     status = run_logged(command, log, environment(suite), suite.seconds)
@@ -227,23 +227,63 @@ def run_fuzz_target(suite: Suite, target: Path, seconds: int) -> Outcome:
     return outcome
 
 
-def add_results(total: Outcome, running: dict[str, Beside[Outcome]]) -> None:
-    """Wait for all that runs beside this process."""
-    for name, one in running.items():
-        total.add(one.result() or Outcome(failures=[f"{name}: ended without a result"]))
+def run_side_by_side(functions: Mapping[str, Callable[[], Outcome]]) -> Outcome:
+    """All of them, as many at once as there are processors; started and added in their order."""
+    waiting = list(functions.items())
+    running: dict[str, Beside[Outcome]] = {}
+    results: dict[str, Outcome] = {}
+    while waiting or running:
+        while waiting and len(running) < (os.cpu_count() or 1):
+            name, function = waiting.pop(0)
+            running[name] = Beside(function)
+        ended = wait_for_any(running.values())
+        results |= {n: result_of(n, one) for n, one in running.items() if one in ended}
+        running = {n: one for n, one in running.items() if one not in ended}
+    total = Outcome()
+    for name in functions:
+        total.add(results[name])
+    return total
+
+
+def result_of(name: str, one: Beside[Outcome]) -> Outcome:
+    """Wait for one that runs beside this process."""
+    return one.result() or Outcome(failures=[f"{name}: ended without a result"])
 
 
 def run_fuzz(suite: Suite, options: argparse.Namespace) -> Outcome:
-    outcome = Outcome()
     targets = [p for p in (suite.build_dir / "tests" / "fuzz").glob("**/fuzz_*") if p.is_file()]
     chosen = sorted(p for p in targets if os.access(p, os.X_OK) and re.search(options.only, p.name))
-    at_once = os.cpu_count() or 1
-    for first in range(0, len(chosen), at_once):
-        running = {
-            target.name: Beside(partial(run_fuzz_target, suite, target, options.fuzz_seconds))
-            for target in chosen[first : first + at_once]
+    return run_side_by_side(
+        {
+            target.name: partial(run_fuzz_target, suite, target, options.fuzz_seconds)
+            for target in chosen
         }
-        add_results(outcome, running)
+    )
+
+
+def needs_idle_host(path: Path) -> bool:
+    """Whether something on the host has to keep pace with the machine of a file of boot tests."""
+    return re.search(r"^(OUTSIDE|WIRE) = True$", path.read_text(), re.M) is not None
+
+
+def run_booted(suite: Suite, options: argparse.Namespace) -> Outcome:
+    """The files of boot tests that match suite.arguments[0], a pytest for each. A machine that is
+    alone with its clock uses one processor of the host: as many at once as there are processors.
+    Then those that need an idle host, one after the other."""
+    paths = sorted((ROOT / "tests" / "boot").glob(suite.arguments[0]))
+    files = {
+        path: replace(
+            suite,
+            name=f"{suite.name} {path.stem.removeprefix('test_')}",
+            arguments=(str(path.relative_to(ROOT)), *suite.arguments[1:]),
+        )
+        for path in paths
+    }
+    one_by_one = [path for path in paths if needs_idle_host(path)]
+    together = [path for path in paths if path not in one_by_one]
+    outcome = run_side_by_side({p.name: partial(run_pytest, files[p], options) for p in together})
+    for path in one_by_one:
+        outcome.add(run_pytest(files[path], options))
     return outcome
 
 
@@ -287,10 +327,9 @@ def pytest(group: str, flavour: str, *options: str) -> Suite:
     return Suite(f"{group} python {flavour}", flavour, run_pytest, (f"tests/{group}", *options))
 
 
-def booted(name: str, *options: str) -> Suite:
+def booted(name: str, files: str) -> Suite:
     """Tests of the images, most of them in QEMU."""
-    suite = pytest("boot", "release", "-s", *options)
-    return replace(suite, name=f"{name} python", seconds=BOOT_SECONDS, images=IMAGES)
+    return Suite(f"{name} python", "release", run_booted, (files, "-s"), BOOT_SECONDS, IMAGES)
 
 
 # Fast groups first. Tests labelled "long" run in the release flavour only.
@@ -344,8 +383,8 @@ GROUPS: dict[str, list[Suite]] = {
     "coverage": [Suite("coverage", "coverage", run_coverage)],
     # Hours of bus time.
     "long": [ctest("long", "release")],
-    "boot": [booted("boot", f"--ignore-glob={WIRE_FILES}")],
-    "wire": [booted("wire", "-k", "test_70_sync0 or test_80_sync0")],
+    "boot": [booted("boot", "test_[0-6]*.py")],
+    "wire": [booted("wire", "test_[78]*.py")],
 }
 # Part of other groups, long, or too exact for a loaded machine: only when named.
 ON_REQUEST = ("control", "sync0", "coverage", "long", "wire")
@@ -359,6 +398,7 @@ class Builder:
 
     def __init__(self) -> None:
         self.failed: dict[str, str | None] = {}
+        self.images_beside: Beside[dict[str, str | None]] | None = None
 
     def build(self, flavour: str) -> str | None:
         """None, or the last lines of the failed build."""
@@ -367,8 +407,20 @@ class Builder:
             self.failed[flavour] = self.make(flavour, [script, flavour], SUITE_SECONDS)
         return self.failed[flavour]
 
+    def begin_images(self, machines: Sequence[str]) -> None:
+        """Build images beside the tests, with the time of the processors that these leave idle."""
+
+        def build() -> dict[str, str | None]:
+            os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+            return {machine: self.image(machine) for machine in machines}
+
+        self.images_beside = Beside(build)
+
     def image(self, machine: str) -> str | None:
-        """The same for a machine's image."""
+        """The same as build() for a machine's image."""
+        if self.images_beside is not None:
+            beside, self.images_beside = self.images_beside, None
+            self.failed |= beside.result() or {}
         if machine not in self.failed:
             command = [ROOT / "build.sh", "image", "--machine", machine]
             self.failed[machine] = self.make(machine, command, IMAGE_SECONDS)
@@ -389,9 +441,14 @@ class Builder:
         return problem
 
 
+def may_boot(groups: Sequence[str]) -> bool:
+    """Making and booting an image needs root: without it, only a user's explicit wish fails."""
+    return os.geteuid() == 0 or "boot" in groups
+
+
 def run_group(group: str, builder: Builder, options: argparse.Namespace) -> Outcome:
     total = Outcome()
-    if group == "boot" and os.geteuid() != 0 and group not in options.groups:
+    if group == "boot" and not may_boot(options.groups):
         return Outcome(skips=["boot: making and booting an image needs root"])
     for suite in GROUPS[group]:
         problem = builder.prepare(suite)
@@ -443,12 +500,15 @@ def run_in_order(wanted: Sequence[str], builder: Builder, options: argparse.Name
     alone = [group for group in wanted if group not in (*computing, *waiting)]
     if len(computing) + len(waiting) < 2 or options.fail_fast:
         return run_all(wanted, builder, options)
+    if "boot" in alone and may_boot(options.groups):
+        builder.begin_images(IMAGES)
     # Two processes must not build in the same folder.
     for suite in (suite for group in waiting for suite in GROUPS[group]):
         builder.build(suite.flavour)
     beside = {name: Beside(partial(run_timed, name, builder, options)) for name in waiting}
     total = run_all(computing, builder, options)
-    add_results(total, beside)
+    for name, one in beside.items():
+        total.add(result_of(name, one))
     total.add(run_all(alone, builder, options))
     return total
 

@@ -156,6 +156,28 @@ def test_an_image_that_cannot_be_made_fails_its_suite(
     assert "no kernel for a" in outcome.failures[0]
 
 
+def test_images_are_built_beside_other_groups_and_a_failed_one_fails_its_suite(
+    monkeypatch: pytest.MonkeyPatch, own_build: Path, tmp_path: Path
+) -> None:
+    """Each of the two waits for the other; the build takes only idle time."""
+    unit, image = tmp_path / "unit", tmp_path / "image"
+    script = own_build / "build.sh"
+    script.write_text(
+        f"#!/bin/sh\n[ $3 = qemuarm64 ] || {{ echo 'no kernel'; exit 1; }}\n"
+        f"chrt --pid $$ > {image}; until [ -s {unit} ]; do sleep 0.01; done\n"
+    )
+    script.chmod(0o755)
+    booting = Suite("boot", "release", lambda *_: Outcome(passed=1), images=run_tests.IMAGES)
+    monkeypatch.setitem(run_tests.GROUPS, "unit", [meeting(unit, image)])
+    monkeypatch.setitem(run_tests.GROUPS, "replay", [meeting(unit, image)])
+    monkeypatch.setitem(run_tests.GROUPS, "boot", [booting])
+    options = argparse.Namespace(only="", fail_fast=False, fuzz_seconds=1, groups=["boot"])
+    outcome = run_tests.run_in_order(["unit", "replay", "boot"], ReadyBuilder(), options)
+    assert outcome.totals() == "2 passed, 1 failed, 0 skipped"
+    assert "no kernel" in outcome.failures[0]
+    assert "SCHED_IDLE" in image.read_text()
+
+
 def test_without_root_no_image_is_built_and_the_reason_is_printed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -254,6 +276,46 @@ def test_fuzz_targets_need_a_corpus_and_the_canary_must_be_found(own_build: Path
     assert "fuzz: canary is found: ended with 0" in heads(
         run_tests.run_fuzz(run_tests.GROUPS["fuzz"][0], OPTIONS)
     )
+
+
+BOOTED = """
+import time
+from pathlib import Path
+
+HERE = Path(__file__).parent
+
+def test_it(request):
+    own = Path(__file__).stem
+    (HERE / f"{own}.started").touch()
+    end = time.monotonic() + 60
+    while not (HERE / "OTHER.started").exists():
+        assert time.monotonic() < end, "does not run at the same time"
+        time.sleep(0.01)
+    (HERE / f"{own}.ended").touch()
+"""
+
+
+def test_machines_boot_side_by_side_but_those_that_need_an_idle_host(
+    own_build: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    folder = own_build / "tests" / "boot"
+    folder.mkdir(parents=True)
+    for own, other in (("a", "b"), ("b", "a")):
+        (folder / f"test_0{own}.py").write_text(BOOTED.replace("OTHER", f"test_0{other}"))
+    for own, other in (("c", "d"), ("d", "c")):
+        (folder / f"test_1{own}.py").write_text(
+            "OUTSIDE = True\nfrom pathlib import Path\n\n\ndef test_it():\n"
+            "    here = Path(__file__).parent\n"
+            "    assert len(list(here.glob('*.ended'))) == 2\n"
+            f"    assert not (here / '{other}.running').exists()\n"
+            f"    (here / '{own}.running').touch()\n"
+            "    import time\n    time.sleep(1)\n"
+            f"    (here / '{own}.running').unlink()\n"
+        )
+    outcome = run_tests.run_booted(run_tests.booted("boot", "test_*.py"), OPTIONS)
+    assert outcome.failures == []
+    assert outcome.totals() == "4 passed, 0 failed, 0 skipped"
 
 
 def test_a_fuzz_target_runs_on_each_core(own_build: Path, monkeypatch: pytest.MonkeyPatch) -> None:
