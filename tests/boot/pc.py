@@ -9,21 +9,45 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 
 import ecdaq
 
 LED = "piccolo0.led"
 TIMEOUT_S = 120.0
+ANSWER_S = 5.0
+
+
+def command(link: ecdaq.Link, value: int) -> tuple[int, int]:
+    """Set the LED; the cycle that carried it, and after how many commands.
+
+    A command is valid for a second, and an emulator can stop for longer: then it is lost without
+    an answer, or the bus has left OP for a moment. The user gives it again.
+    """
+    end = time.monotonic() + TIMEOUT_S
+    tries = 0
+    while True:
+        tries += 1
+        try:
+            return link.command({LED: value}, seconds=ANSWER_S), tries
+        except ecdaq.NoAnswerError:
+            if time.monotonic() > end:
+                raise
+        except ecdaq.RefusedError as error:
+            if str(error) != "the bus is not in OP" or time.monotonic() > end:
+                raise
+            link.events(1.0)
 
 
 def led_follows(link: ecdaq.Link, value: int) -> dict[str, int]:
     """Command the LED; the first sample from that cycle on, and what the LED was in it."""
     place = link.channels()[LED].place
-    cycle = link.command({LED: value}, seconds=TIMEOUT_S)
+    cycle, tries = command(link, value)
     for sample in link.subscribe(TIMEOUT_S, slave=0):
         if sample.cycle >= cycle:
-            return {"expected": value, "cycle": cycle, "seen": int(sample.raw[place])}
-    return {"expected": value, "cycle": cycle, "seen": -1}
+            seen = int(sample.raw[place])
+            return {"expected": value, "cycle": cycle, "seen": seen, "commands": tries}
+    return {"expected": value, "cycle": cycle, "seen": -1, "commands": tries}
 
 
 def main() -> None:
