@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from machine import Machine
 
-TIMING = "host"
 START = {"options": ("-rtc", "base=2001-02-03")}
 LAST_RUN = "2035-01-02"
 
