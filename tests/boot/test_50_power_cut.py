@@ -3,7 +3,7 @@
 its journal alone, and the recordings open.
 
 In guest time, so that the moments are spread over the guest's second and not over the host's load.
-ECDAQ_POWER_CUTS: how many (3). ECDAQ_POWER_CUT_SEED.
+ECDAQ_POWER_CUTS: how many (1). ECDAQ_POWER_CUT_SEED.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 from machine import Machine, profile, wait_for
 
 BOOT_FILES = {"ecdaq.yaml": profile("guest")}
-CUTS = int(os.environ.get("ECDAQ_POWER_CUTS", "3"))
+CUTS = int(os.environ.get("ECDAQ_POWER_CUTS", "1"))
 SEED = int(os.environ.get("ECDAQ_POWER_CUT_SEED", "1"))
 OP_S = 900
 # What a cut may cost at most: one record.sync_period (1 s) and one record.chunk_period (100 ms),

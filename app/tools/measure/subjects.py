@@ -18,7 +18,7 @@ SCENARIOS = "build/release/tests/sim/scenarios"
 LOCK_TEST = "sim_clocks.lock_phase_and_sync0_hold_from_a_hundred_starts"
 SECONDS = os.environ.get("ECDAQ_DDS_SECONDS", "60")
 TRIALS = os.environ.get("ECDAQ_FAULT_TRIALS", "20")
-CUTS = os.environ.get("ECDAQ_POWER_CUTS", "3")
+CUTS = os.environ.get("ECDAQ_POWER_CUTS", "20")
 
 
 def run(command: list[str], keep: str, root: Path) -> list[str]:
