@@ -13,6 +13,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from ecdaq import Fake
 from made_machine import Machine
+from recording import PRODUCER, RECORD, Bench
 
 
 @pytest.fixture
@@ -47,3 +48,14 @@ def daemon(fake: Callable[..., Fake]) -> Fake:
 @pytest.fixture
 def machine(tmp_path: Path) -> Machine:
     return Machine(tmp_path)
+
+
+@pytest.fixture
+def bench(run_dir: Path, tmp_path: Path) -> Iterator[Bench]:
+    for program in (RECORD, PRODUCER):
+        if not program.exists():
+            pytest.fail(f"{program} is not there: run ./build.sh build")
+    made = Bench(run_dir, tmp_path / "records")
+    made.folder.mkdir()
+    yield made
+    made.close()

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import csv
 import io
 import itertools
@@ -12,106 +11,19 @@ import os
 import shutil
 import signal
 import subprocess
-import time
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from ecdaq import BIN, BUILD, ECDAQ, NOBODY
+from ecdaq import NOBODY
 from mcap.reader import make_reader
-from mcap_ros2.decoder import DecoderFactory
+from recording import RECORD, Bench, wait_until
 
-RECORD = BIN / "ecdaq-record"
-PRODUCER = BUILD / "tests" / "cli" / "test_ring_producer"
 OLD_RECORDING = Path(__file__).parent / "recordings" / "bad_slaves_in_one_word.mcap"
 PERIOD_NS = 1_000_000
 # More than a file has before its first sample: schemas, IDL, channel table.
 HEAD = 30_000
-
-
-def wait_until(what: str, ready: Callable[[], bool], seconds: float = 60) -> None:
-    end = time.monotonic() + seconds
-    while not ready():
-        assert time.monotonic() < end, f"{what}: not within {seconds} s"
-        time.sleep(0.02)
-
-
-class Bench:
-    """Rings in one folder, recordings in another, and the processes between them."""
-
-    def __init__(self, run_dir: Path, folder: Path) -> None:
-        self.run_dir = run_dir
-        self.folder = folder
-        self.processes: list[subprocess.Popen[str]] = []
-
-    def start(self, *command: str | Path) -> subprocess.Popen[str]:
-        process = subprocess.Popen(
-            [str(word) for word in command],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        self.processes.append(process)
-        return process
-
-    def produce(self, *options: str) -> subprocess.Popen[str]:
-        return self.start(PRODUCER, self.run_dir, *options)
-
-    def record(self, *options: str) -> subprocess.Popen[str]:
-        return self.start(
-            RECORD, "--run-dir", self.run_dir, "--dir", self.folder,
-            "--set", "record.reserve=0B", *options,
-        )  # fmt: skip
-
-    def record_all(self, *options: str) -> str:
-        """Record a session that has ended; its messages."""
-        process = self.record("--once", *options)
-        _, output = process.communicate(timeout=60)
-        assert process.returncode == 0, output
-        return output
-
-    def recorded_bytes(self) -> int:
-        """Of all files; one that is renamed meanwhile does not count."""
-        total = 0
-        for path in self.folder.glob("ecdaq-*"):
-            with contextlib.suppress(FileNotFoundError):
-                total += path.stat().st_size
-        return total
-
-    def log(self, *words: str | Path) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [ECDAQ, "log", *words], capture_output=True, text=True, timeout=60, check=False
-        )
-
-    def files(self) -> list[Path]:
-        return sorted(self.folder.glob("*.mcap"))
-
-    def messages(self, topic: str) -> Iterator[tuple[int, Any]]:
-        for path in self.files():
-            with path.open("rb") as file:
-                reader = make_reader(file, decoder_factories=[DecoderFactory()], validate_crcs=True)
-                for _, _, raw, message in reader.iter_decoded_messages(topics=[topic]):
-                    yield raw.log_time, message
-
-    def close(self) -> None:
-        for process in self.processes:
-            if process.poll() is None:
-                process.kill()
-            process.communicate()
-
-
-@pytest.fixture
-def bench(run_dir: Path, tmp_path: Path) -> Iterator[Bench]:
-    for program in (RECORD, PRODUCER):
-        if not program.exists():
-            pytest.fail(f"{program} is not there: run ./build.sh build")
-    made = Bench(run_dir, tmp_path / "records")
-    made.folder.mkdir()
-    yield made
-    made.close()
 
 
 def test_every_sample_decodes_and_is_what_the_ring_held(bench: Bench) -> None:

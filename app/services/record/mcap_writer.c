@@ -330,6 +330,11 @@ int mcap_writer_copy_chunk(struct mcap_writer *w, const uint8_t *record, size_t 
 	return r < 0 ? r : mcap_index_chunk(&w->index, &place, messages);
 }
 
+int mcap_writer_cut(struct mcap_writer *w, uint64_t bytes)
+{
+	return w->io.truncate(w->io.ctx, bytes);
+}
+
 int mcap_writer_sync(struct mcap_writer *w)
 {
 	return w->io.sync(w->io.ctx);

@@ -77,6 +77,8 @@ int mcap_writer_copy_chunk(struct mcap_writer *w, const uint8_t *record, size_t 
 			   const char *compression, size_t uncompressed_len,
 			   const struct mcap_chunk_index *messages);
 
+/** Cut the file to its first @bytes; nothing can be written after that. 0 or -errno. */
+int mcap_writer_cut(struct mcap_writer *w, uint64_t bytes);
 /** Make all that is written durable. 0 or -errno. */
 int mcap_writer_sync(struct mcap_writer *w);
 /**

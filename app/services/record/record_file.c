@@ -200,6 +200,11 @@ int record_file_close_chunk(struct record_file *f)
 	return r;
 }
 
+int record_file_cut(struct record_file *f, uint64_t bytes)
+{
+	return mcap_writer_cut(f->w, bytes);
+}
+
 int record_file_sync(struct record_file *f)
 {
 	return mcap_writer_sync(f->w);
@@ -255,9 +260,4 @@ int record_file_is_full(const struct record_file *f)
 uint64_t record_file_open_cycles(const struct record_file *f)
 {
 	return f->open_cycles;
-}
-
-uint64_t record_file_last_cycle(const struct record_file *f)
-{
-	return f->last_cycle;
 }

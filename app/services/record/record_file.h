@@ -38,6 +38,8 @@ int record_file_timemap(struct record_file *f, const struct timemap_state *state
 
 /** Write the open chunk. 0 or -errno: it stays open, try again. */
 int record_file_close_chunk(struct record_file *f);
+/** Cut to the first @bytes, after which only record_file_destroy() is left. 0 or -errno. */
+int record_file_cut(struct record_file *f, uint64_t bytes);
 /** Make durable what is written. */
 int record_file_sync(struct record_file *f);
 
@@ -52,8 +54,7 @@ uint64_t record_file_bytes(const struct record_file *f);
 uint64_t record_file_final_bytes(const struct record_file *f);
 /** 1: it cannot take more, finish it. */
 int record_file_is_full(const struct record_file *f);
-/** Samples behind the last closed chunk; the number of the last sample. */
+/** Samples behind the last closed chunk. */
 uint64_t record_file_open_cycles(const struct record_file *f);
-uint64_t record_file_last_cycle(const struct record_file *f);
 
 #endif

@@ -194,7 +194,14 @@ static void report_outcome(const struct recover_report *report, const char *name
 static void set_state(struct store_state *state, const struct track *t)
 {
 	if (t->has_session && t->before.sequence >= state->sequence) {
+		struct store_state known = *state;
+
 		*state = track_state(t);
+		/* Not in the recordings; a mark of another ring is known as such by its time. */
+		state->sync0_next = known.sync0_next;
+		state->sync0_mono_ns = known.sync0_mono_ns;
+		state->sync0_event_next = known.sync0_event_next;
+		state->sync0_event_mono_ns = known.sync0_event_mono_ns;
 	}
 }
 

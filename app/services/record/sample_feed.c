@@ -20,6 +20,7 @@ struct sample_feed {
 	int has_ended; /* the reader has said so */
 	uint64_t next_cycle;
 	int has_next;          /* next_cycle is known: what is not it is a gap */
+	uint64_t first_cycle;  /* taken by this feed, where it knew of none before */
 	int is_catching_up;    /* what is before next_cycle was recorded before */
 	int has_lost_slots;    /* since the newest sample taken */
 	uint64_t missed_start; /* slots that had left the ring when we came */
@@ -29,7 +30,7 @@ struct sample_feed {
 /* A resume point beyond what the master has made is not of this ring, whatever it says. */
 static int resume_is_believable(struct sample_feed *s, const struct store_state *resume)
 {
-	if (resume->session != sample_feed_number(s)) {
+	if (resume->session != sample_feed_number(s) || resume->cycles == 0) {
 		return 0;
 	}
 	return resume->next_cycle <=
@@ -97,8 +98,8 @@ void sample_feed_rewind(struct sample_feed *s)
 	const struct store_state *resume = sink_resume_point(s->sink);
 
 	if (resume->session == sample_feed_number(s)) {
-		s->next_cycle = resume->next_cycle;
-		s->has_next = 1;
+		s->next_cycle = resume->cycles > 0 ? resume->next_cycle : s->first_cycle;
+		s->has_next = s->has_next || resume->cycles > 0;
 	}
 	go_to_start(s);
 }
@@ -191,6 +192,7 @@ static int take_sample(struct sample_feed *s)
 	}
 	s->has_lost_slots = 0;
 	s->is_catching_up = 0;
+	s->first_cycle = s->has_next ? s->first_cycle : h->cycle;
 	s->has_next = 1;
 	s->next_cycle = h->cycle + 1;
 	return 0;

@@ -3,10 +3,12 @@
 
 #include <errno.h>
 #include <inttypes.h>
+#include <limits.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "base/clock.h"
 
@@ -15,8 +17,11 @@
 struct sink {
 	struct recorder_options opt;
 	struct store *store;
-	struct store_state resume; /* where to resume if recording stopped now */
+	struct store_state resume;  /* where to resume if recording stopped now */
+	struct store_state durable; /* the same after the last good sync */
+	uint64_t durable_bytes;     /* of the open file */
 	enum sink_state state;
+	int error; /* why the state is not SINK_READY */
 	int has_rewind;
 	struct record_file *file;    /* NULL between files */
 	const struct layout *layout; /* NULL between sessions */
@@ -25,9 +30,8 @@ struct sink {
 	int64_t file_opened_ns;
 	int64_t chunk_opened_ns; /* 0: the chunk is empty */
 	int64_t synced_ns;
-	int64_t checked_ns; /* last check of free space and errors */
-	int is_dirty;       /* written since the last sync */
-	uint64_t synced_cycle;
+	int64_t checked_ns;   /* last check of free space and errors */
+	int is_dirty;         /* written since the last sync */
 	uint64_t events_lost; /* in this session, by this process */
 	uint64_t files;
 	uint64_t bytes_done; /* in finished files */
@@ -35,6 +39,9 @@ struct sink {
 	int64_t last_utc_ns;     /* of the newest sample */
 	struct event full_event; /* the disk was full: written to the next file */
 	int64_t full_utc_ns;
+	int has_put_full_event;   /* to the open file, which is not durable yet */
+	char abandoned[PATH_MAX]; /* a file that failed, to be cut to abandoned_bytes; "": none */
+	uint64_t abandoned_bytes;
 	char path[512]; /* of the newest file */
 	char message[256];
 };
@@ -46,9 +53,9 @@ static int finish_file(struct sink *s, const char *reason);
 static int is_rotation_due(const struct sink *s);
 
 /* The newest cycle recorded; 0 before the first. */
-static uint64_t last_cycle(const struct sink *s)
+static uint64_t last_cycle(const struct store_state *state)
 {
-	return s->resume.next_cycle > 0 ? s->resume.next_cycle - 1 : 0;
+	return state->next_cycle > 0 ? state->next_cycle - 1 : 0;
 }
 
 __attribute__((format(printf, 2, 3))) static void report(struct sink *s, const char *format, ...)
@@ -59,6 +66,28 @@ __attribute__((format(printf, 2, 3))) static void report(struct sink *s, const c
 	vsnprintf(s->message, sizeof(s->message), format, args);
 	va_end(args);
 	s->opt.report(s->opt.report_ctx, s->message);
+}
+
+static void halt(struct sink *s, int error, const char *what)
+{
+	int is_full = error == -ENOSPC || error == -EDQUOT;
+
+	s->checked_ns = s->now_ns;
+	s->error = error;
+	if (is_full && s->state != SINK_FULL) {
+		report(s,
+		       "recording stopped, disk full: %s: %" PRIu64 " bytes free, reserve %" PRIu64,
+		       s->opt.dir, s->bytes_free, s->opt.reserve_bytes);
+		s->full_event = (struct event){ .id = EVENT_RECORD_DISK_FULL,
+						.cycle = s->resume.next_cycle,
+						.value = (int64_t)s->bytes_free,
+						.slave_pos = EVENT_NO_SLAVE };
+		s->full_utc_ns = s->last_utc_ns;
+	} else if (!is_full && s->state != SINK_FAILED) {
+		report(s, "recording failed: %s: %s: %s; trying again", s->opt.dir, what,
+		       strerror(-error));
+	}
+	s->state = is_full ? SINK_FULL : SINK_FAILED;
 }
 
 static void report_recovery(void *ctx, const char *text)
@@ -76,21 +105,6 @@ static int recover(struct sink *s)
 	return r < 0 ? r : store_save_state(s->store, &s->resume);
 }
 
-static int open_store(struct sink *s, char *error, size_t error_bytes)
-{
-	int64_t pid = 0;
-	int r = store_open(s->opt.dir, &s->store, &pid);
-
-	if (r == -EBUSY) {
-		snprintf(error, error_bytes,
-			 "%s: another ecdaq-record (process %" PRId64 ") records there", s->opt.dir,
-			 pid);
-	} else if (r < 0) {
-		snprintf(error, error_bytes, "%s: %s", s->opt.dir, strerror(-r));
-	}
-	return r;
-}
-
 int sink_create(const struct recorder_options *opt, struct sink **ret_sink, char *error,
 		size_t error_bytes)
 {
@@ -102,7 +116,7 @@ int sink_create(const struct recorder_options *opt, struct sink **ret_sink, char
 		return -ENOMEM;
 	}
 	s->opt = *opt;
-	r = open_store(s, error, error_bytes);
+	r = store_open_or_tell(s->opt.dir, &s->store, error, error_bytes);
 	if (r < 0) {
 		free(s);
 		return r;
@@ -111,10 +125,9 @@ int sink_create(const struct recorder_options *opt, struct sink **ret_sink, char
 	(void)store_load_state(s->store, &s->resume);
 	r = recover(s);
 	if (r < 0) {
-		report(s, "%s: cannot recover what is there: %s; trying again", opt->dir,
-		       strerror(-r));
-		s->state = SINK_FAILED;
+		halt(s, r, "cannot recover what is there");
 	}
+	s->durable = s->resume;
 	*ret_sink = s;
 	return 0;
 }
@@ -172,32 +185,34 @@ static int read_free_bytes(struct sink *s)
 		       : store_free_bytes(s->store, &s->bytes_free);
 }
 
+/* All that was written to the open file is on disk. */
+static void note_durable(struct sink *s)
+{
+	s->durable = s->resume;
+	s->durable_bytes = record_file_bytes(s->file);
+	if (s->has_put_full_event) {
+		s->full_event.id = EVENT_NONE;
+		s->has_put_full_event = 0;
+	}
+}
+
+/* A call to the file system failed: nothing since the last sync is believed to be on disk. */
 static int fail(struct sink *s, int error, const char *what)
 {
-	s->checked_ns = s->now_ns;
-	if (error == -ENOSPC || error == -EDQUOT) {
-		if (s->state != SINK_FULL) {
-			report(s,
-			       "recording stopped, disk full: %s: %" PRIu64
-			       " bytes free, reserve %" PRIu64,
-			       s->opt.dir, s->bytes_free, s->opt.reserve_bytes);
-			s->full_event = (struct event){ .id = EVENT_RECORD_DISK_FULL,
-							.cycle = s->resume.next_cycle,
-							.value = (int64_t)s->bytes_free,
-							.slave_pos = EVENT_NO_SLAVE };
-			s->full_utc_ns = s->last_utc_ns;
-		}
-		s->state = SINK_FULL;
-		return error;
+	uint64_t sequence = s->resume.sequence;
+
+	halt(s, error, what);
+	if (s->file != NULL) {
+		snprintf(s->abandoned, sizeof(s->abandoned), "%s", record_file_path(s->file));
+		s->abandoned_bytes = s->durable_bytes;
+		/* Now, or a recorder that starts meanwhile would believe it; if it fails, later. */
+		(void)record_file_cut(s->file, s->abandoned_bytes);
+		record_file_destroy(s->file);
+		s->file = NULL;
 	}
-	if (s->state != SINK_FAILED) {
-		report(s, "recording failed: %s: %s: %s; trying again", s->opt.dir, what,
-		       strerror(-error));
-	}
-	/* What is on disk is recovered as after a crash; what is not is still in the ring. */
-	record_file_destroy(s->file);
-	s->file = NULL;
-	s->state = SINK_FAILED;
+	s->has_put_full_event = 0;
+	s->resume = s->durable;
+	s->resume.sequence = sequence;
 	return error;
 }
 
@@ -214,7 +229,7 @@ void sink_begin_session(struct sink *s, const struct layout *layout, enum sink_n
 		s->resume.missing = 0;
 	}
 	s->events_lost = 0;
-	s->synced_cycle = last_cycle(s);
+	s->durable = s->resume;
 }
 
 void sink_count_gap(struct sink *s, uint64_t cycles)
@@ -239,7 +254,7 @@ static void check_space(struct sink *s)
 	}
 	s->checked_ns = s->now_ns;
 	if (read_free_bytes(s) == 0 && s->bytes_free < s->opt.reserve_bytes) {
-		(void)fail(s, -ENOSPC, s->opt.dir);
+		halt(s, -ENOSPC, s->opt.dir);
 		/* The reserve is there for this: leave a whole file behind. */
 		(void)finish_file(s, "disk full");
 	}
@@ -267,6 +282,24 @@ static void tick_ready(struct sink *s)
 	}
 }
 
+/* Finish what a failure left behind, and be ready. */
+static void come_back(struct sink *s)
+{
+	if (s->abandoned[0] != '\0' && truncate(s->abandoned, (off_t)s->abandoned_bytes) < 0 &&
+	    errno != ENOENT) {
+		return;
+	}
+	if (recover(s) < 0) {
+		return;
+	}
+	s->abandoned[0] = '\0';
+	s->durable = s->resume;
+	s->state = SINK_READY;
+	s->has_rewind = 1;
+	report(s, "recording again from cycle %" PRIu64, s->resume.next_cycle);
+	s->message[0] = '\0';
+}
+
 /* Once a second: is there space again? The reserve and an eighth, so that it does not go to and
  * fro. */
 static void tick_full(struct sink *s)
@@ -274,27 +307,9 @@ static void tick_full(struct sink *s)
 	uint64_t wanted = s->opt.reserve_bytes + s->opt.reserve_bytes / 8;
 
 	s->checked_ns = s->now_ns;
-	if (s->file != NULL && finish_file(s, "disk full") < 0) {
-		return;
+	if (read_free_bytes(s) == 0 && s->bytes_free >= wanted && s->bytes_free > 0) {
+		come_back(s);
 	}
-	if (read_free_bytes(s) < 0 || s->bytes_free < wanted || s->bytes_free == 0) {
-		return;
-	}
-	s->state = SINK_READY;
-	report(s, "recording again: %" PRIu64 " bytes free", s->bytes_free);
-	s->message[0] = '\0';
-}
-
-static void tick_failed(struct sink *s)
-{
-	s->checked_ns = s->now_ns;
-	if (recover(s) < 0) {
-		return;
-	}
-	s->state = SINK_READY;
-	s->has_rewind = 1;
-	report(s, "resuming after cycle %" PRIu64, s->resume.next_cycle);
-	s->message[0] = '\0';
 }
 
 void sink_tick(struct sink *s, int64_t now_ns)
@@ -307,7 +322,8 @@ void sink_tick(struct sink *s, int64_t now_ns)
 	} else if (s->state == SINK_FULL) {
 		tick_full(s);
 	} else {
-		tick_failed(s);
+		s->checked_ns = now_ns;
+		come_back(s);
 	}
 }
 
@@ -327,8 +343,8 @@ void sink_get_status(struct sink *s, struct record_status *page)
 	atomic_store_explicit(&page->recorded_gaps, s->resume.gaps, memory_order_relaxed);
 	atomic_store_explicit(&page->cycles_missing, s->resume.missing, memory_order_relaxed);
 	atomic_store_explicit(&page->first_cycle, s->resume.first_cycle, memory_order_relaxed);
-	atomic_store_explicit(&page->last_cycle, last_cycle(s), memory_order_relaxed);
-	atomic_store_explicit(&page->synced_cycle, s->synced_cycle, memory_order_relaxed);
+	atomic_store_explicit(&page->last_cycle, last_cycle(&s->resume), memory_order_relaxed);
+	atomic_store_explicit(&page->synced_cycle, last_cycle(&s->durable), memory_order_relaxed);
 	atomic_store_explicit(&page->bytes_written, s->bytes_done + open_bytes,
 			      memory_order_relaxed);
 	atomic_store_explicit(&page->files, s->files, memory_order_relaxed);
@@ -363,9 +379,7 @@ static int put_first_events(struct sink *s, uint64_t first_cycle, int64_t utc_ns
 	r = put_own_event(s, &s->full_event, s->full_utc_ns);
 	ev.id = EVENT_RECORD_RESUMED;
 	r = r < 0 ? r : put_own_event(s, &ev, utc_ns);
-	if (r == 0) {
-		s->full_event.id = EVENT_NONE;
-	}
+	s->has_put_full_event = r == 0;
 	return r;
 }
 
@@ -397,6 +411,7 @@ int sink_open_file(struct sink *s, uint64_t first_cycle, int64_t utc_ns)
 		return fail(s, r, name);
 	}
 	s->resume.sequence++;
+	s->durable_bytes = 0;
 	s->files++;
 	snprintf(s->path, sizeof(s->path), "%s", record_file_path(s->file));
 	s->file_opened_ns = s->now_ns;
@@ -419,6 +434,7 @@ static int finish_file(struct sink *s, const char *reason)
 		/* The state before the name: if we are killed in between, .part and state agree. */
 		int saved = store_save_state(s->store, &s->resume);
 
+		note_durable(s);
 		if (saved < 0) { /* the newest file holds the same, it is only slower to read */
 			report(s, "%s: state file: %s", s->opt.dir, strerror(-saved));
 		}
@@ -428,7 +444,6 @@ static int finish_file(struct sink *s, const char *reason)
 		return fail(s, r, record_file_path(s->file));
 	}
 	snprintf(s->path, sizeof(s->path), "%s", record_file_path(s->file));
-	s->synced_cycle = last_cycle(s);
 	s->is_dirty = 0;
 	s->chunk_opened_ns = 0;
 	s->bytes_done += record_file_bytes(s->file);
@@ -443,7 +458,7 @@ static int finish_file(struct sink *s, const char *reason)
 
 int sink_end_session(struct sink *s, const char *reason)
 {
-	int r = s->file != NULL ? finish_file(s, reason) : 0;
+	int r = s->state != SINK_READY ? s->error : s->file != NULL ? finish_file(s, reason) : 0;
 
 	if (r < 0) {
 		return r;
@@ -563,7 +578,6 @@ int sink_clock_step(struct sink *s, const struct timemap_state *state)
 
 static int sync_file(struct sink *s)
 {
-	uint64_t last_closed;
 	int r;
 
 	if (s->chunk_opened_ns != 0) {
@@ -572,13 +586,12 @@ static int sync_file(struct sink *s)
 			return r;
 		}
 	}
-	last_closed = record_file_last_cycle(s->file);
 	r = record_file_sync(s->file);
 	if (r < 0) {
 		return fail(s, r, record_file_path(s->file));
 	}
 	s->synced_ns = s->now_ns;
-	s->synced_cycle = last_closed;
+	note_durable(s);
 	s->is_dirty = 0;
 	return 0;
 }

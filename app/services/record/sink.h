@@ -2,7 +2,9 @@
 /*
  * Where samples go: the store and the file being written, with all that is due on time (chunk,
  * sync, rotation, budget) and all that can go wrong. A full disk or a failing one makes the sink
- * not ready; the caller then leaves samples in the ring and comes back. Context: blocking.
+ * not ready; the caller then leaves samples in the ring and comes back. A file whose write or sync
+ * failed is cut to what the last sync made durable: after a failed sync the page cache shows bytes
+ * that the disk may not have. The rest is read again from the ring. Context: blocking.
  */
 #ifndef RECORD_SINK_H
 #define RECORD_SINK_H
@@ -19,8 +21,7 @@ struct sink;
 enum sink_state {
 	SINK_READY,
 	SINK_FULL,   /* no space, or less than the reserve; checked again every second */
-	SINK_FAILED, /* another error; every second all is recovered as at start, then it is ready
-			again */
+	SINK_FAILED, /* another error; tried again every second */
 };
 
 /** Lock the directory and recover what is unfinished. As recorder_create(). */
@@ -44,7 +45,8 @@ enum sink_news {
 
 /** A session begins: its layout (kept until sink_end_session()). */
 void sink_begin_session(struct sink *s, const struct layout *layout, enum sink_news news);
-/** Finish the file of the session. 0, or -errno: not ready now; call again when it is. */
+/** Finish the file of the session. 0, or -errno: not ready, and not all is recorded; call again
+ * when it is. */
 int sink_end_session(struct sink *s, const char *reason);
 
 enum sink_state sink_state(const struct sink *s);

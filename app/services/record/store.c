@@ -95,6 +95,20 @@ int store_open(const char *dir, struct store **ret_store, int64_t *ret_pid)
 	return 0;
 }
 
+int store_open_or_tell(const char *dir, struct store **ret_store, char *error, size_t error_bytes)
+{
+	int64_t pid = 0;
+	int r = store_open(dir, ret_store, &pid);
+
+	if (r == -EBUSY) {
+		snprintf(error, error_bytes,
+			 "%s: another ecdaq-record (process %" PRId64 ") records there", dir, pid);
+	} else if (r < 0) {
+		snprintf(error, error_bytes, "%s: %s", dir, strerror(-r));
+	}
+	return r;
+}
+
 int store_is_locked(const char *dir)
 {
 	char path[PATH_MAX];

@@ -44,6 +44,8 @@ struct store_state {
  * unknown); -errno. Free with store_close().
  */
 int store_open(const char *dir, struct store **ret_store, int64_t *ret_pid);
+/** The same with one line in @error where it fails. */
+int store_open_or_tell(const char *dir, struct store **ret_store, char *error, size_t error_bytes);
 void store_close(struct store *s);
 /** 1 if a recorder works in @dir now. */
 int store_is_locked(const char *dir);

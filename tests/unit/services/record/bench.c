@@ -5,6 +5,7 @@
 #include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "base/bytes.h"
@@ -28,11 +29,56 @@ static void bench_say(void *ctx, const char *line)
 	snprintf(b->said + len, sizeof(b->said) - len, "%s\n", line);
 }
 
+static uint64_t file_bytes(int fd)
+{
+	struct stat st;
+
+	CHECK_EQ(fstat(fd, &st), 0);
+	return (uint64_t)st.st_size;
+}
+
+static void note_lost(struct bench *b)
+{
+	struct bench_lost *lost = &b->lost[b->lost_count];
+
+	CHECK(b->lost_count < BENCH_LOST);
+	lost->file = b->file;
+	lost->from = b->synced_bytes;
+	lost->to = file_bytes(b->file_fd);
+	if (lost->to <= lost->from) {
+		return;
+	}
+	lost->fd = dup(b->file_fd);
+	CHECK(lost->fd >= 0);
+	CHECK(pread(lost->fd, lost->head, sizeof(lost->head), (off_t)lost->from) >= 0);
+	b->lost_count++;
+}
+
+/* The page cache is dropped: files are what the disk has. */
+static void drop_caches(struct bench *b)
+{
+	for (; b->lost_count > 0; b->lost_count--) {
+		struct bench_lost *lost = &b->lost[b->lost_count - 1];
+		uint8_t head[sizeof(lost->head)] = { 0 };
+
+		CHECK(pread(lost->fd, head, sizeof(head), (off_t)lost->from) >= 0);
+		for (uint64_t at = lost->from;
+		     memcmp(head, lost->head, sizeof(head)) == 0 && at < lost->to; at++) {
+			CHECK_EQ(pwrite(lost->fd, "", 1, (off_t)at), 1);
+		}
+		close(lost->fd);
+	}
+}
+
 static int call_fails(struct bench *b)
 {
 	b->calls++;
-	return b->fail_call != 0 && b->calls >= b->fail_call &&
-	       b->calls < b->fail_call + b->fail_count;
+	if (b->fail_call == 0 || b->calls < b->fail_call ||
+	    b->calls >= b->fail_call + b->fail_count) {
+		return 0;
+	}
+	note_lost(b);
+	return 1;
 }
 
 static int io_write(void *ctx, const void *data, size_t len)
@@ -50,22 +96,39 @@ static int io_sync(void *ctx)
 {
 	struct bench *b = ctx;
 
-	return call_fails(b) ? b->error : b->io.sync(b->io.ctx);
+	int r = call_fails(b) ? b->error : b->io.sync(b->io.ctx);
+
+	b->synced_bytes = r == 0 ? file_bytes(b->file_fd) : b->synced_bytes;
+	return r;
 }
 
 static int io_truncate(void *ctx, uint64_t bytes)
 {
 	struct bench *b = ctx;
 
-	return call_fails(b) ? b->error : b->io.truncate(b->io.ctx, bytes);
+	if (call_fails(b)) {
+		return b->error;
+	}
+	for (unsigned i = 0; i < b->lost_count; i++) {
+		if (b->lost[i].file == b->file && b->lost[i].to > bytes) {
+			b->lost[i].to = bytes;
+		}
+	}
+	return b->io.truncate(b->io.ctx, bytes);
 }
 
 static void seam_wrap(void *ctx, const char *path, struct mcap_io *io)
 {
 	struct bench *b = ctx;
 
-	CHECK(path[0] != '\0');
 	b->io = *io;
+	if (b->file_fd > 0) {
+		close(b->file_fd);
+	}
+	b->file_fd = open(path, O_RDWR | O_CLOEXEC);
+	CHECK(b->file_fd > 0);
+	b->synced_bytes = 0;
+	b->file++;
 	*io = (struct mcap_io){
 		.write = io_write, .sync = io_sync, .truncate = io_truncate, .ctx = b
 	};
@@ -165,6 +228,10 @@ void bench_done(struct bench *b)
 	char path[2 * BENCH_PATH_BYTES];
 
 	recorder_destroy(b->recorder);
+	drop_caches(b);
+	if (b->file_fd > 0) {
+		close(b->file_fd);
+	}
 	ring_destroy(b->ring);
 	ring_destroy(b->events);
 	remove_tree(b->dir);
@@ -315,6 +382,7 @@ struct track bench_read(struct bench *b, unsigned *ret_finished, unsigned *ret_p
 	struct reading reading = { .has_even_times = b->has_even_times };
 	size_t count;
 
+	drop_caches(b);
 	*ret_finished = 0;
 	*ret_parts = 0;
 	track_init(&reading.track);

@@ -12,7 +12,16 @@
 #include "record/recorder.h"
 #include "record/track.h"
 
-enum { BENCH_PATH_BYTES = 128, BENCH_IMAGE_BYTES = 4 };
+enum { BENCH_PATH_BYTES = 128, BENCH_IMAGE_BYTES = 4, BENCH_LOST = 8 };
+
+/* Bytes of a file that only the page cache has. */
+struct bench_lost {
+	int fd;
+	unsigned file;
+	uint64_t from;
+	uint64_t to;
+	uint8_t head[16]; /* of them: other bytes there were written later */
+};
 
 struct bench {
 	char root[BENCH_PATH_BYTES];
@@ -36,7 +45,14 @@ struct bench {
 	unsigned fail_count; /* so many */
 	int error;
 	uint64_t bytes_free; /* as the file system is to say */
-	char said[4096];     /* by the recorder, a line each */
+	/* As Linux does it: what a failed sync had is clean in the page cache, and not on the disk.
+	 */
+	struct bench_lost lost[BENCH_LOST];
+	unsigned lost_count;
+	unsigned file;         /* number of the newest file */
+	int file_fd;           /* the same, once more */
+	uint64_t synced_bytes; /* of it */
+	char said[4096];       /* by the recorder, a line each */
 };
 
 /** Rings of session @session with @slots slots, and options to record them. Start from a zeroed
@@ -61,7 +77,8 @@ void bench_wait(struct bench *b, int64_t ns);
 /** Stop in order. */
 int bench_stop(struct bench *b);
 
-/** All recordings together: cycles in order over all files (CHECKed to be readable). */
+/** All recordings together, as after the next mount: cycles in order over all files (CHECKed to be
+ * readable). */
 struct track bench_read(struct bench *b, unsigned *ret_finished, unsigned *ret_parts);
 
 #endif
