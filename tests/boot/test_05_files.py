@@ -138,10 +138,16 @@ def test_the_root_file_system_is_clean_and_has_our_programs(built: Built) -> Non
 
 def test_the_image_says_what_it_is(built: Built) -> None:
     release = built.root_file("/usr/lib/os-release").decode()
-    name, version = built.root_file("/usr/lib/ecdaq/image").decode().split()
+    text = built.root_file("/usr/lib/ecdaq/image").decode()
+    said = re.fullmatch(r"(\S+) (\S+), Debian archive: (\S+)\n", text)
+    assert said, text
+    name, version, archive = said.groups()
     assert name == f"ecdaq-image-{built.machine}"
     assert re.fullmatch(r"[0-9.]+-([0-9a-f]{7,40}(-dirty)?|unknown)", version)
+    # A cache from before the state of the archive was noted does not know it.
+    assert re.fullmatch(r"\d{4}-\d\d-\d\d|unknown", archive)
     assert f"\nIMAGE_ID={name}\nIMAGE_VERSION={version}\n" in release
+    assert f"\nECDAQ_ARCHIVE_DATE={archive}\n" in release
 
 
 def test_the_data_partition_is_made_for_large_files(built: Built) -> None:

@@ -38,7 +38,7 @@ GOOD: Files = {
     "/proc/cpuinfo": "processor\t: 0\nFeatures\t: fp asimd\n",
     "/proc/cmdline": "ro isolcpus=managed_irq,domain,3 nohz_full=3 rcu_nocbs=3 irqaffinity=0-2\n",
     "/proc/sys/kernel/osrelease": "6.12.48-ecdaq\n",
-    "/usr/lib/ecdaq/image": "ecdaq-image-raspberrypi4-64 0.1.0-1a2b3c4\n",
+    "/usr/lib/ecdaq/image": "ecdaq-image-qemuarm64 0.1.0-1a2b3c4, Debian archive: 2026-11-21\n",
     "/proc/sys/kernel/version": "#1 SMP PREEMPT_RT Debian 6.12.48-1\n",
     "/proc/sys/kernel/sched_rt_runtime_us": "-1\n",
     "/proc/sys/kernel/sched_rt_period_us": "1000000\n",

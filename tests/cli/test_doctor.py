@@ -40,7 +40,8 @@ def test_a_good_machine_has_nothing_to_fix(machine: Machine) -> None:
 
 
 def test_the_image_and_the_commit_that_it_was_built_from_are_shown(machine: Machine) -> None:
-    assert checks(machine)["image"]["value"] == "ecdaq-image-raspberrypi4-64 0.1.0-1a2b3c4"
+    image = "ecdaq-image-qemuarm64 0.1.0-1a2b3c4, Debian archive: 2026-11-21"
+    assert checks(machine)["image"]["value"] == image
     machine.change({"/usr/lib/ecdaq/image": None})
     assert checks(machine)["image"]["level"] == "SKIP"
 

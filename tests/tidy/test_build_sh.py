@@ -85,6 +85,7 @@ def test_every_variable_is_documented() -> None:
         (["image", "--machine", "pc"], "no machine 'pc'; there are: qemuarm64 raspberrypi4-64"),
         (["image", "--jobs", "0"], "'0' is not a number of tasks"),
         (["image", "--fast"], "unknown option '--fast'"),
+        (["image", "--refresh", "--plan"], "--refresh and --plan exclude each other"),
         (["boot", "--ssh-port", "x"], "'x' is not a port"),
         (["boot", "--fast"], "unknown option '--fast'"),
     ],

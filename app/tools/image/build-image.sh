@@ -10,17 +10,21 @@ cache=${XDG_CACHE_HOME:-$HOME/.cache}/ecdaq/image
 usage()
 {
 	cat <<'USAGE'
-usage: ./build.sh image [--machine MACHINE] [--recipe RECIPE] [--jobs N] [--plan]
+usage: ./build.sh image [--machine MACHINE] [--recipe RECIPE] [--jobs N]
+                        [--refresh | --plan]
 
 Builds the disk image of the appliance: a Debian 13 root file system, our PREEMPT_RT kernel and our
 programs, from the recipes in recipes/ and layers/. Needs Debian 12 or 13 on x86-64 and root (it makes
 chroots, and runs arm64 programs through the kernel's binfmt_misc). Results are cached by the
-hash of all inputs: a second run only does what changed.
+hash of all inputs: a second run only does what changed. The state of the Debian archive is one of the
+inputs: the first run notes it, and packages stay as they are until --refresh.
 
   --machine MACHINE  qemuarm64 (default): QEMU's virt machine, the segment simulated inside;
                      raspberrypi4-64: Raspberry Pi 4 Model B and Compute Module 4
   --recipe RECIPE    one recipe instead of the whole image: linux-ecdaq, soem, ecdaq, ecdaq-config
   --jobs N           tasks at the same time (default: as many as there are cores)
+  --refresh          note the archive's present state first: what is made of its packages is made again if
+                     it has others now (security updates)
   --plan             print the tasks that would run, with their hashes, and exit
 
 The results are in build/image/MACHINE/: the disk (.img, .img.zst for flashing, .bmap), the kernel, its
@@ -49,6 +53,7 @@ machine=qemuarm64
 recipe=ecdaq-image
 jobs=$(nproc)
 plan=
+refresh=no
 check=no
 while [ $# -gt 0 ]; do
 	case $1 in
@@ -62,6 +67,7 @@ while [ $# -gt 0 ]; do
 		shift
 		;;
 	--plan) plan=--dry-run ;;
+	--refresh) refresh=yes ;;
 	--check) check=yes ;; # build.sh: are the options good?
 	--help | -h)
 		usage
@@ -78,6 +84,7 @@ done
 case $jobs in
 '' | *[!0-9]* | 0) usage_error "--jobs: '$jobs' is not a number of tasks" ;;
 esac
+[ -z "$plan" ] || [ "$refresh" = no ] || usage_error "--refresh and --plan exclude each other"
 
 [ "$check" = no ] || exit 0
 
@@ -123,8 +130,16 @@ if [ -z "$plan" ]; then
 	done
 	need_arm64
 fi
+PYTHONDONTWRITEBYTECODE=1
+export PYTHONDONTWRITEBYTECODE
+set -- nice -n 10 "$venv/bin/python" "$here/bake.py" --machine "$machine" --cache "$cache" \
+	--build "$root/build/image" --jobs "$jobs"
 # What a build mounts in its chroots goes with its last process, also if that is killed.
-[ -n "$plan" ] || alone='unshare --mount --propagation private'
-# shellcheck disable=SC2086 # lists of words, or nothing
-PYTHONDONTWRITEBYTECODE=1 exec ${alone:-} nice -n 10 "$venv/bin/python" "$here/bake.py" --machine "$machine" \
-	--cache "$cache" --build "$root/build/image" --jobs "$jobs" $plan "$recipe"
+[ -n "$plan" ] || set -- unshare --mount --propagation private "$@"
+# An empty cache begins with the archive as it is now.
+[ -e "$cache/archive.conf" ] || [ -e "$cache/sdk" ] || refresh=yes
+if [ "$refresh" = yes ] && [ -z "$plan" ]; then
+	"$@" --task do_refresh sdk-chroot
+fi
+# shellcheck disable=SC2086 # --dry-run or nothing
+exec "$@" $plan "$recipe"

@@ -34,7 +34,8 @@ def image_recipes(d):
 # our packages on top of it, which takes seconds.
 do_rootfs_base[cleandirs] = "${WORKDIR}/base"
 do_rootfs_base[network] = "1"
-do_rootfs_base[vardepsexclude] += "apt_sources"
+do_rootfs_base[vardeps] += "${@archive_vardeps(d)}"
+do_rootfs_base[vardepsexclude] += "apt_sources archive_vardeps"
 do_rootfs_base[keep] = "${WORKDIR}/base"
 python do_rootfs_base() {
     suite = d.getVar("BASE_DISTRO_CODENAME")

@@ -45,6 +45,10 @@ sdk_run() {
 export PARALLEL_MAKE
 sdk_run[vardepsexclude] = "SDK_DIR WORKDIR CCACHE_DIR"
 
+# In vardeps of a task that takes packages: it runs again when the archive is another.
+def archive_vardeps(d):
+    return "ECDAQ_ARCHIVE" if d.getVar("ECDAQ_ARCHIVE") else ""
+
 # The machine's own Debian mirror: $ECDAQ_APT_MIRROR, else what apt is set up with.
 def apt_sources(d, suite, components):
     import re

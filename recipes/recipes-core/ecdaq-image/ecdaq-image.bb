@@ -18,8 +18,9 @@ remove_host_keys() {
 	run_privileged find "${IMAGE_ROOTFS}/etc/ssh" -name "ssh_host_*_key*" -delete
 }
 
-# The machine can say what it runs: version and commit, in os-release and for `ecdaq doctor`. An image that
-# is the same at a later commit is not built again, and names the one at which it was made.
+# The machine can say what it runs: version, commit, and the date of the Debian archive that its packages are
+# from, in os-release and for `ecdaq doctor`. An image that is the same at a later commit is not built again, and
+# names the one at which it was made.
 def ecdaq_commit(d):
     import subprocess
     command = ["git", "-C", d.getVar("ECDAQ_TOP"), "describe", "--always", "--dirty", "--exclude=*"]
@@ -27,12 +28,14 @@ def ecdaq_commit(d):
     return done.stdout.strip() or "unknown"
 
 ECDAQ_COMMIT ?= "${@ecdaq_commit(d)}"
+ECDAQ_ARCHIVE_DATE ?= "unknown"
 ROOTFS_POSTPROCESS_COMMAND =+ "name_image"
 name_image[vardepsexclude] += "ECDAQ_COMMIT"
 name_image() {
-	printf 'IMAGE_ID=%s\nIMAGE_VERSION=%s\n' "${PN}-${MACHINE}" "${PV}-${ECDAQ_COMMIT}" |
+	printf 'IMAGE_ID=%s\nIMAGE_VERSION=%s\nECDAQ_ARCHIVE_DATE=%s\n' "${PN}-${MACHINE}" \
+		"${PV}-${ECDAQ_COMMIT}" "${ECDAQ_ARCHIVE_DATE}" |
 		run_privileged tee -a "${IMAGE_ROOTFS}/usr/lib/os-release"
-	printf '%s %s\n' "${PN}-${MACHINE}" "${PV}-${ECDAQ_COMMIT}" |
+	printf '%s %s, Debian archive: %s\n' "${PN}-${MACHINE}" "${PV}-${ECDAQ_COMMIT}" "${ECDAQ_ARCHIVE_DATE}" |
 		run_privileged tee "${IMAGE_ROOTFS}/usr/lib/ecdaq/image"
 }
 

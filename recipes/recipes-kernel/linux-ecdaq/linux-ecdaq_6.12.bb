@@ -6,7 +6,8 @@ SECTION = "kernel"
 LICENSE = "GPL-2.0-only WITH Linux-syscall-note"
 LIC_FILES_CHKSUM = "file://COPYING;md5=6bc538ed5bd9a7fc9398086aedcd7e46"
 
-# Debian's source package, the newest of the suite when nothing is cached.
+# Debian's source package, the newest of the suite when it is fetched: with an empty cache, or after
+# ./build.sh image --refresh when the archive has changed.
 SRC_URI = "apt://linux \
            file://0001-sysfs-say-that-the-kernel-is-real-time.patch \
            file://base.cfg \

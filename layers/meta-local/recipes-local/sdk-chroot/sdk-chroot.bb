@@ -22,6 +22,8 @@ SDK_PREINSTALL += "libyaml-dev:${DISTRO_ARCH} libzstd-dev:${DISTRO_ARCH} zlib1g-
 
 do_bootstrap[dirs] = "${TMPDIR}"
 do_bootstrap[network] = "1"
+# The kernel's source is fetched by this chroot's apt, and so depends on the state of the archive, too.
+do_bootstrap[vardeps] += "${@archive_vardeps(d)}"
 # How the mirror is found does not change what it gives.
 do_bootstrap[vardepsexclude] += "apt_sources"
 python do_bootstrap() {
@@ -40,3 +42,39 @@ python do_bootstrap() {
         log=open(d.getVar("BB_LOGFILE"), "a"))
 }
 addtask bootstrap before do_build
+
+# The state of the archive as it is now becomes that of the cache. Only the Release files are fetched.
+do_refresh[cleandirs] = "${WORKDIR}/archive"
+do_refresh[dirs] = "${WORKDIR}/archive/lists/partial"
+do_refresh[network] = "1"
+do_refresh[nostamp] = "1"
+python do_refresh() {
+    import glob
+    import sys
+    sys.path.insert(0, os.path.join(d.getVar("LAYERDIR_core"), "lib"))
+    import archive
+    folder = os.path.join(d.getVar("WORKDIR"), "archive")
+    sources = apt_sources(d, d.getVar("BASE_DISTRO_CODENAME"), "main")
+    with open(os.path.join(folder, "sources.list"), "w") as file:
+        file.write("".join(line + "\n" for line in sources))
+    settings = {"Dir::State::Lists": folder + "/lists", "Dir::Cache": folder + "/cache",
+                "Dir::Etc::SourceList": folder + "/sources.list", "Dir::Etc::SourceParts": "-",
+                "Acquire::IndexTargets::deb::Packages::DefaultEnabled": "false",
+                "Acquire::IndexTargets::deb::DEP-11::DefaultEnabled": "false",
+                "Acquire::Languages": "none", "Acquire::Retries": "3", "APT::Sandbox::User": "root"}
+    options = [word for item in settings.items() for word in ("-o", "=".join(item))]
+    said, _ = bb.process.run(["apt-get", "-q", *options, "update"])
+    found = glob.glob(folder + "/lists/*Release")
+    # apt ends with success when a suite is missing.
+    if len(found) != len(sources):
+        bb.fatal(f"{len(found)} of {len(sources)} suites could be read:\n{said}")
+    releases = []
+    for path in found:
+        with open(path) as file:
+            releases.append(file.read())
+    target = os.path.join(d.getVar("TMPDIR"), "archive.conf")
+    with open(target + ".new", "w") as file:
+        file.write(archive.configuration(releases))
+    os.rename(target + ".new", target)
+}
+addtask refresh
