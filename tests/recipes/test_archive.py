@@ -92,6 +92,7 @@ class Mirror:
 
     def __init__(self, base: Path) -> None:
         self.base = base
+        self.site = f"[trusted=yes] file:{base}/mirror"
         self.publish("1", DAY_1)
 
     def publish(self, packages: str, date: str) -> None:
@@ -100,19 +101,18 @@ class Mirror:
             folder.mkdir(parents=True, exist_ok=True)
             (folder / "Release").write_text(release(packages, date, suite))
 
-    def bake(self, *arguments: str) -> subprocess.CompletedProcess[str]:
-        mirror = f"[trusted=yes] file:{self.base}/mirror"
+    def bake(self, *arguments: str, **more: str) -> subprocess.CompletedProcess[str]:
         folders = ["--cache", str(self.base / "cache"), "--build", str(self.base / "build")]
         return subprocess.run(
             [sys.executable, BAKE, *folders, *arguments],
-            env=os.environ | {"ECDAQ_APT_MIRROR": mirror},
+            env=os.environ | {"ECDAQ_APT_MIRROR": self.site} | more,
             capture_output=True,
             text=True,
             check=False,
         )
 
-    def refresh(self) -> subprocess.CompletedProcess[str]:
-        return self.bake("--task", "do_refresh", "sdk-chroot")
+    def refresh(self, **more: str) -> subprocess.CompletedProcess[str]:
+        return self.bake("--task", "do_refresh", "sdk-chroot", **more)
 
     def noted(self) -> str:
         return (self.base / "cache/archive.conf").read_text()
@@ -148,6 +148,18 @@ def test_a_suite_that_cannot_be_read_leaves_the_cache_as_it_is(mirror: Mirror) -
     assert failed.returncode == 1
     assert "1 of 2 suites could be read" in failed.stdout + failed.stderr
     assert mirror.noted() == before
+
+
+def test_security_updates_may_come_from_a_mirror_of_their_own(mirror: Mirror) -> None:
+    mirror.refresh()
+    without = mirror.noted()
+    assert mirror.refresh(ECDAQ_APT_SECURITY_MIRROR=mirror.site).returncode == 1
+    suite = mirror.base / "mirror/dists/trixie-security"
+    suite.mkdir()
+    (suite / "Release").write_text(release("3", DAY_2, "trixie-security"))
+    assert mirror.refresh(ECDAQ_APT_SECURITY_MIRROR=mirror.site).returncode == 0
+    assert 'ECDAQ_ARCHIVE_DATE = "2025-11-21"' in mirror.noted()
+    assert mirror.noted() != without
 
 
 class Script:

@@ -32,6 +32,9 @@ command line, the package list (.manifest), the bill of materials (.spdx.json) a
 
 environment:
   ECDAQ_APT_MIRROR  Debian mirror to take packages from (default: the one this machine's apt uses)
+  ECDAQ_APT_SECURITY_MIRROR
+                    mirror of its suite of security updates (default: the one this machine's apt uses;
+                    none if ECDAQ_APT_MIRROR is given: there are no security updates then)
   XDG_CACHE_HOME    ecdaq/image/ below it keeps everything between runs, 11 GB at first, up to 20 GB (default: ~/.cache)
   PYTHON            Python 3.11 or newer with venv (default: python3)
 USAGE

@@ -49,19 +49,21 @@ sdk_run[vardepsexclude] = "SDK_DIR WORKDIR CCACHE_DIR"
 def archive_vardeps(d):
     return "ECDAQ_ARCHIVE" if d.getVar("ECDAQ_ARCHIVE") else ""
 
-# The machine's own Debian mirror: $ECDAQ_APT_MIRROR, else what apt is set up with.
+# The machine's own Debian mirrors: $ECDAQ_APT_MIRROR and $ECDAQ_APT_SECURITY_MIRROR, else what apt is set up
+# with. With a mirror given and none for security there is no security suite: its place cannot be guessed.
 def apt_sources(d, suite, components):
     import re
     import subprocess
     mirror = d.getVar("ECDAQ_APT_MIRROR")
-    security = None
+    security = d.getVar("ECDAQ_APT_SECURITY_MIRROR")
     if not mirror:
         # What apt would ask for; it needs no package lists for that.
         uris = subprocess.run(["apt-get", "update", "--print-uris"], check=True,
                               capture_output=True, text=True).stdout
         sites = {name: site for site, name in re.findall(r"'(\S+?)/dists/(\S+?)/InRelease'", uris)}
         mirror = next((sites[n] for n in ("bookworm", "trixie", "forky", "sid") if n in sites), None)
-        security = next((site for name, site in sites.items() if name.endswith("-security")), None)
+        found = (site for name, site in sites.items() if name.endswith("-security"))
+        security = security or next(found, None)
     if not mirror:
         bb.fatal("no Debian mirror in this machine's apt sources: give one in ECDAQ_APT_MIRROR")
     lines = [f"deb {mirror} {suite} {components}", f"deb {mirror} {suite}-updates {components}"]
