@@ -104,6 +104,8 @@ class Machine:
         self.timing = timing
         self.space = space
         self.disk = folder / "disk.img"
+        self.disk_before = folder / "disk-before.img"
+        self.write_log = folder / "writes.log"
         subprocess.run(["cp", "--sparse=always", image, self.disk], check=True)
         # The data partition has to grow into what the image does not have.
         with self.disk.open("r+b") as disk:
@@ -119,6 +121,11 @@ class Machine:
         return subprocess.run(
             [TOOLS / "qemu.sh", self.folder, *command], check=True, capture_output=True, text=True
         )
+
+    def partitions(self) -> dict[str, tuple[int, int]]:
+        """First sector and number of sectors of each, by its name."""
+        table = json.loads(self.tool("sfdisk", "--json", "disk.img").stdout)["partitiontable"]
+        return {p["name"]: (p["start"], p["size"]) for p in table["partitions"]}
 
     def write_boot_files(self, files: Mapping[str, str]) -> None:
         """Put files into ecdaq/ of the boot partition, which starts at 4 MiB."""
@@ -151,10 +158,20 @@ class Machine:
         )
 
     def start(
-        self, append: str = "", options: tuple[str, ...] = (), ahead: tuple[str, ...] = ()
+        self,
+        append: str = "",
+        options: tuple[str, ...] = (),
+        ahead: tuple[str, ...] = (),
+        log_writes: bool = False,
     ) -> None:
-        """Power on; `ahead` is a command that runs QEMU. Each boot has a console log of its own."""
+        """Power on; `ahead` is a command that runs QEMU. Each boot has a console log of its own.
+
+        log_writes: keep the disk as it is now, and log what is written to it from now on.
+        """
         assert self.process is None
+        if log_writes:
+            subprocess.run(["cp", "--sparse=always", self.disk, self.disk_before], check=True)
+            self.write_log.write_bytes(b"")
         self.boots += 1
         log = self.folder / f"console-{self.boots}.log"
         outside = "" if self.space is None else "ecdaq.segment=outside"
@@ -165,7 +182,9 @@ class Machine:
                 *(TOOLS / "virt.sh", self.folder, self.timing, "-display", "none"),
                 *("-serial", f"file:{log}", *self.ports(), *options),
             ],
-            env=os.environ | {"ECDAQ_APPEND": f"{outside} {append}".strip()},
+            env=os.environ
+            | {"ECDAQ_APPEND": f"{outside} {append}".strip()}
+            | ({"ECDAQ_WRITE_LOG": self.write_log.name} if log_writes else {}),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=(self.folder / "qemu.log").open("ab"),

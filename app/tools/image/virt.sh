@@ -10,7 +10,8 @@
 #        waits up to half a cycle for the other. So N is 16, of which Linux uses two (nr_cpus=2; the
 #        others are never started), and the turns are short.
 # A reset ends QEMU (-no-reboot).
-# ECDAQ_APPEND adds words to the kernel's command line.
+# ECDAQ_APPEND adds words to the kernel's command line. With ECDAQ_WRITE_LOG, the name of an empty file
+# in the folder, every write and flush of the disk is logged to it (QEMU's blklogwrites).
 set -eu
 
 [ $# -ge 2 ] || {
@@ -32,8 +33,14 @@ guest)
 	;;
 esac
 shift 2
+disk=file=disk.img,format=raw
+if [ -n "${ECDAQ_WRITE_LOG:-}" ]; then
+	disk=driver=blklogwrites,file.driver=file,file.filename=disk.img
+	# A flush orders the log; the host's own power is not part of the test.
+	disk=$disk,log.driver=file,log.filename=$ECDAQ_WRITE_LOG,log.cache.no-flush=on
+fi
 # shellcheck disable=SC2086 # a list of options
 exec "$here/qemu.sh" "$folder" qemu-system-aarch64 -M virt,gic-version=3 -cpu cortex-a72 -m 1024 $timing \
 	-no-reboot -kernel vmlinux -append "$append" \
-	-drive file=disk.img,if=none,format=raw,id=disk -device virtio-blk-pci,drive=disk,num-queues=1 \
+	-drive "$disk,if=none,id=disk" -device virtio-blk-pci,drive=disk,num-queues=1 \
 	-device virtio-rng-pci "$@"

@@ -19,6 +19,7 @@ LOCK_TEST = "sim_clocks.lock_phase_and_sync0_hold_from_a_hundred_starts"
 SECONDS = os.environ.get("ECDAQ_DDS_SECONDS", "60")
 TRIALS = os.environ.get("ECDAQ_FAULT_TRIALS", "20")
 CUTS = os.environ.get("ECDAQ_POWER_CUTS", "20")
+DISKS = os.environ.get("ECDAQ_CUT_DISKS", "10000")
 
 
 def run(command: list[str], keep: str, root: Path) -> list[str]:
@@ -30,6 +31,7 @@ def run(command: list[str], keep: str, root: Path) -> list[str]:
         "ECDAQ_FLAVOUR": "release",
         "ECDAQ_DDS_SECONDS": SECONDS,
         "ECDAQ_POWER_CUTS": CUTS,
+        "ECDAQ_CUT_DISKS": DISKS,
         "ECDAQ_FAULT_TRIALS": TRIALS,
         "PYTHONDONTWRITEBYTECODE": "1",
     }
@@ -123,7 +125,12 @@ ALL = (
     subject(
         "power-cuts",
         f"{CUTS} power cuts of the image in QEMU (ECDAQ_POWER_CUTS)",
-        pytest("tests/boot/test_50_power_cut.py", keep=NOT_PYTEST),
+        pytest("tests/boot/test_50_power_cut.py", "-k", "every_cut", keep=NOT_PYTEST),
+    ),
+    subject(
+        "cut-disks",
+        f"{DISKS} disks as a power cut may leave them (ECDAQ_CUT_DISKS)",
+        pytest("tests/boot/test_50_power_cut.py", "-k", "every_disk", keep=NOT_PYTEST),
     ),
     Subject(
         "fuzz",
