@@ -34,6 +34,13 @@ Maintainer: Santiago Vila <sanvila@debian.org>
 Architecture: arm64
 Version: 13.8
 
+Package: libstdc++6
+Status: install ok installed
+Maintainer: Debian GCC Maintainers <debian-gcc@lists.debian.org>
+Architecture: arm64
+Source: gcc-14 (14.2.0-19+deb13u1)
+Version: 1:14.2.0-19+deb13u1
+
 Package: gone
 Status: deinstall ok config-files
 Architecture: arm64
@@ -50,32 +57,55 @@ def bill(tmp_path: Path) -> dict[str, Any]:
     return found
 
 
-def purls(bill: dict[str, Any]) -> dict[str, str]:
-    return {p["name"]: p["externalRefs"][0]["referenceLocator"] for p in bill["packages"]}
+def purls(bill: dict[str, Any], purpose: str = "INSTALL") -> dict[str, str]:
+    return {
+        p["name"]: p["externalRefs"][0]["referenceLocator"]
+        for p in bill["packages"]
+        if p["primaryPackagePurpose"] == purpose
+    }
 
 
 def test_the_kernel_has_the_version_of_debians_source(bill: dict[str, Any]) -> None:
-    assert purls(bill)["linux"] == "pkg:deb/debian/linux@6.12.107-1?arch=source"
+    assert purls(bill, "SOURCE")["linux"] == "pkg:deb/debian/linux@6.12.107-1?arch=source"
 
 
 def test_what_is_compiled_in_is_named(bill: dict[str, Any]) -> None:
-    assert purls(bill)["soem"] == "pkg:generic/soem@1.4.0?arch=source"
-    made_of = {
-        (r["spdxElementId"], r["relatedSpdxElement"])
+    assert purls(bill, "SOURCE")["soem"] == "pkg:generic/soem@1.4.0?arch=source"
+
+
+def test_every_package_names_its_sources(bill: dict[str, Any]) -> None:
+    assert purls(bill, "SOURCE") == {
+        "base-files": "pkg:deb/debian/base-files@13.8?arch=source",
+        "ecdaq": "pkg:generic/ecdaq@0.1.0?arch=source",
+        "gcc-14": "pkg:deb/debian/gcc-14@14.2.0-19%2Bdeb13u1?arch=source",
+        "linux": "pkg:deb/debian/linux@6.12.107-1?arch=source",
+        "linux-ecdaq": "pkg:generic/linux-ecdaq@6.12?arch=source",
+        "soem": "pkg:generic/soem@1.4.0?arch=source",
+    }
+    names = {p["SPDXID"]: p["name"] for p in bill["packages"]}
+    assert len(names) == len(bill["packages"])
+    made_of = [
+        (names[r["spdxElementId"]], names[r["relatedSpdxElement"]])
         for r in bill["relationships"]
         if r["relationshipType"] == "GENERATED_FROM"
-    }
-    assert made_of == {
-        ("SPDXRef-linux-image-ecdaq", "SPDXRef-source-linux"),
-        ("SPDXRef-ecdaq", "SPDXRef-source-soem"),
-    }
+    ]
+    assert sorted(made_of) == [
+        ("base-files", "base-files"),
+        ("ecdaq", "ecdaq"),
+        ("ecdaq", "soem"),
+        ("libstdc++6", "gcc-14"),
+        ("linux-image-ecdaq", "linux"),
+        ("linux-image-ecdaq", "linux-ecdaq"),
+    ]
 
 
 def test_only_debians_packages_are_called_debians(bill: dict[str, Any]) -> None:
-    found = purls(bill)
-    assert found["base-files"] == "pkg:deb/debian/base-files@13.8?arch=arm64"
-    assert found["ecdaq"] == "pkg:generic/ecdaq@0.1.0?arch=arm64"
-    assert "gone" not in found
+    assert purls(bill) == {
+        "base-files": "pkg:deb/debian/base-files@13.8?arch=arm64",
+        "ecdaq": "pkg:generic/ecdaq@0.1.0?arch=arm64",
+        "libstdc++6": "pkg:deb/debian/libstdc%2B%2B6@1:14.2.0-19%2Bdeb13u1?arch=arm64",
+        "linux-image-ecdaq": "pkg:generic/linux-image-ecdaq@6.12?arch=arm64",
+    }
 
 
 def test_the_packages_name_what_is_compiled_in() -> None:

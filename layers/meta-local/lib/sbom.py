@@ -9,6 +9,7 @@ import re
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from urllib.parse import quote
 
 DEP5 = re.compile(r"^Format:.*copyright-format", re.MULTILINE)
 BUILT_USING = re.compile(r"(\S+) \(= ([^)]+)\)")
@@ -81,16 +82,25 @@ def manifest(packages: list[Package]) -> str:
     )
 
 
-def _purl(package: Package) -> str:
-    # What our recipes make is not Debian's, whatever its name.
-    kind = "generic" if package.maintainer.endswith("@localhost>") else "deb/debian"
-    return f"pkg:{kind}/{package.name}@{package.version}?arch={package.architecture}"
+def _is_debians(package: Package) -> bool:
+    """What our recipes make is not Debian's, whatever its name."""
+    return not package.maintainer.endswith("@localhost>")
+
+
+def _purl(name: str, version: str, architecture: str, debians: bool) -> str:
+    kind = "deb/debian" if debians else "generic"
+    name, version = quote(name, safe=""), quote(version, safe=":")
+    return f"pkg:{kind}/{name}@{version}?arch={architecture}"
+
+
+def _id(*words: str) -> str:
+    return "SPDXRef-" + re.sub(r"[^A-Za-z0-9.-]", "-", "-".join(words))
 
 
 def _entry(package: Package) -> dict[str, object]:
     known = "; ".join(package.licenses)
     return {
-        "SPDXID": "SPDXRef-" + re.sub(r"[^A-Za-z0-9.-]", "-", package.name),
+        "SPDXID": _id(package.name),
         "name": package.name,
         "versionInfo": package.version,
         "supplier": f"Person: {package.maintainer}" if package.maintainer else "NOASSERTION",
@@ -110,17 +120,17 @@ def _entry(package: Package) -> dict[str, object]:
             {
                 "referenceCategory": "PACKAGE-MANAGER",
                 "referenceType": "purl",
-                "referenceLocator": _purl(package),
+                "referenceLocator": _purl(
+                    package.name, package.version, package.architecture, _is_debians(package)
+                ),
             }
         ],
     }
 
 
-def _source_entry(name: str, version: str) -> dict[str, object]:
-    """A source that is compiled in. One with a Debian revision is Debian's."""
-    kind = "deb/debian" if "-" in version else "generic"
+def _source_entry(name: str, version: str, debians: bool) -> dict[str, object]:
     return {
-        "SPDXID": "SPDXRef-source-" + re.sub(r"[^A-Za-z0-9.-]", "-", name),
+        "SPDXID": _id("source", name, version),
         "name": name,
         "versionInfo": version,
         "supplier": "NOASSERTION",
@@ -134,10 +144,17 @@ def _source_entry(name: str, version: str) -> dict[str, object]:
             {
                 "referenceCategory": "PACKAGE-MANAGER",
                 "referenceType": "purl",
-                "referenceLocator": f"pkg:{kind}/{name}@{version}?arch=source",
+                "referenceLocator": _purl(name, version, "source", debians),
             }
         ],
     }
+
+
+def _sources(package: Package) -> list[tuple[str, str, bool]]:
+    """Name and version of each source that a package is made of, and whether it is Debian's."""
+    # Of what is compiled in, only a source with a Debian revision is Debian's.
+    compiled_in = [(name, version, "-" in version) for name, version in package.built_using]
+    return [(package.source, package.source_version, _is_debians(package)), *compiled_in]
 
 
 def _relation(element: object, kind: str, other: object) -> dict[str, object]:
@@ -148,7 +165,8 @@ def spdx(packages: list[Package], name: str, version: str, epoch: int) -> str:
     """The document; equal packages give equal bytes."""
     digest = hashlib.sha256(manifest(packages).encode()).hexdigest()
     entries = [_entry(p) for p in packages]
-    sources = {name: _source_entry(name, v) for p in packages for name, v in p.built_using}
+    # Vulnerabilities of Debian are listed by source.
+    sources = [_source_entry(*s) for s in sorted({s for p in packages for s in _sources(p)})]
     document = {
         "spdxVersion": "SPDX-2.3",
         "dataLicense": "CC0-1.0",
@@ -159,13 +177,13 @@ def spdx(packages: list[Package], name: str, version: str, epoch: int) -> str:
             "created": datetime.fromtimestamp(epoch, UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
             "creators": ["Tool: ecdaq-image"],
         },
-        "packages": [*entries, *sources.values()],
+        "packages": [*entries, *sources],
         "relationships": [
             *(_relation("SPDXRef-DOCUMENT", "DESCRIBES", e["SPDXID"]) for e in entries),
             *(
-                _relation(e["SPDXID"], "GENERATED_FROM", sources[name]["SPDXID"])
+                _relation(e["SPDXID"], "GENERATED_FROM", _id("source", name, version))
                 for e, p in zip(entries, packages, strict=True)
-                for name, _ in p.built_using
+                for name, version, _ in _sources(p)
             ),
         ],
     }
