@@ -139,7 +139,8 @@ def test_a_recorder_without_room_goes_on_when_there_is_some_and_tells_what_it_lo
     make_segment: Callable[..., Segment],
 ) -> None:
     segment = make_segment(
-        settings=SHORT_RING | {"record.reserve": "1MiB", "record.compression": "0"}
+        settings=SHORT_RING
+        | {"record.reserve": "1MiB", "record.compression": "0", "record.when_full": "stop"}
     )
     segment.record_dir.mkdir()
     segment.space.run("mount", "-t", "tmpfs", "-o", "size=16m", "none", str(segment.record_dir))

@@ -139,7 +139,13 @@ def test_an_sdo_the_slave_refuses_is_an_error_with_its_abort_code(
 def test_a_full_disk_stops_the_recording_and_never_the_cycle(
     make_segment: Callable[..., Segment],
 ) -> None:
-    segment = make_segment(settings={"record.reserve": "1MiB", "record.compression": "0"})
+    segment = make_segment(
+        settings={
+            "record.reserve": "1MiB",
+            "record.compression": "0",
+            "record.when_full": "stop",
+        }
+    )
     segment.record_dir.mkdir()
     segment.space.run("mount", "-t", "tmpfs", "-o", "size=3m", "none", str(segment.record_dir))
     segment.start_all()

@@ -28,6 +28,7 @@ enum config_target {
 
 enum config_datagrams { CONFIG_DATAGRAMS_ONE, CONFIG_DATAGRAMS_PER_SLAVE };
 
+enum config_when_full { CONFIG_WHEN_FULL_OLDEST, CONFIG_WHEN_FULL_STOP };
 enum config_sync_type { CONFIG_SYNC_TYPE_SHOW, CONFIG_SYNC_TYPE_WRITE };
 /* slaves[].assign_activate, besides words of 1 to 0xffff */
 enum { CONFIG_ASSIGN_SII = 0, CONFIG_ASSIGN_NONE = 0x10000 };
@@ -146,8 +147,9 @@ struct config {
 	int64_t record_sync_period_ns;
 	int64_t record_rotate_period_ns;
 	uint64_t record_rotate_bytes;
-	uint64_t record_budget_bytes;  /* the oldest files are deleted above this; 0: none */
-	uint64_t record_reserve_bytes; /* stop with less than this free */
+	enum config_when_full record_when_full;
+	uint64_t record_budget_bytes;  /* of all recordings; 0: none, and nothing is deleted */
+	uint64_t record_reserve_bytes; /* stays free */
 	int32_t record_compression;    /* zstd level, 0 = none */
 	/* dds */
 	uint32_t dds_enable;

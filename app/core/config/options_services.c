@@ -53,8 +53,8 @@ static const struct option rows[] = {
 	  .min = "0B",
 	  .max = "1024TiB",
 	  .unit = "GiB",
-	  .prose = "The oldest files are deleted to keep all recordings below this. 0B: never "
-		   "delete." },
+	  .prose = "All recordings together stay below this. 0B: no limit, and nothing is ever "
+		   "deleted." },
 	{ .name = "record.reserve",
 	  .type = OPTION_SIZE,
 	  FIELD(record_reserve_bytes),
@@ -62,8 +62,17 @@ static const struct option rows[] = {
 	  .min = "0B",
 	  .max = "1TiB",
 	  .unit = "MiB",
-	  .prose = "Recording stops, with an alarm, while less than this is free on the file "
-		   "system." },
+	  .prose = "So much stays free on the file system." },
+	{ .name = "record.when_full",
+	  .type = OPTION_WORD,
+	  FIELD(record_when_full),
+	  .default_value = "oldest",
+	  .words = "oldest|stop",
+	  .prose =
+		  "At record.budget or record.reserve: oldest: the oldest recordings are deleted, "
+		  "except those with a file NAME.keep beside them; recording stops, with an alarm, "
+		  "where that is not enough. stop: recording stops, with an alarm, until there is "
+		  "room." },
 	{ .name = "record.compression",
 	  .type = OPTION_INT,
 	  FIELD(record_compression),

@@ -87,6 +87,7 @@ static struct recorder_options recorder_options(const struct recording *pg)
 		.rotate_bytes = cfg->record_rotate_bytes,
 		.budget_bytes = cfg->record_budget_bytes,
 		.reserve_bytes = cfg->record_reserve_bytes,
+		.when_full = cfg->record_when_full,
 		.zstd_level = cfg->record_compression,
 		.config_path = cfg->path,
 		.config_text = pg->config_text,
@@ -111,8 +112,7 @@ static int run(struct recorder *rec, int is_once)
 	}
 	r = recorder_finish(rec);
 	if (r < 0) {
-		error_print(program, "%s: left incomplete: %s; repaired at next start",
-			    recorder_status(rec)->path, strerror(-r));
+		error_print(program, "ended without recording all: %s", strerror(-r));
 	}
 	return r;
 }

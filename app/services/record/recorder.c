@@ -368,7 +368,7 @@ enum recorder_result recorder_step(struct recorder *rec)
 
 int recorder_finish(struct recorder *rec)
 {
-	int r = 0;
+	int r = sink_error(rec->sink);
 
 	if (rec->samples != NULL) {
 		uint64_t until = reader_newest(rec->reader);

@@ -12,6 +12,7 @@
 
 #include "base/platform.h"
 #include "base/status.h"
+#include "config/config.h"
 
 struct recorder;
 struct record_seam;
@@ -28,9 +29,10 @@ struct recorder_options {
 	int64_t sync_period_ns;
 	int64_t rotate_period_ns; /* 0: never */
 	uint64_t rotate_bytes;    /* 0: never */
-	uint64_t budget_bytes;    /* 0: none */
+	uint64_t budget_bytes;    /* 0: none, and nothing is deleted */
 	uint64_t reserve_bytes;   /* 0: none */
-	int zstd_level;           /* 0: no compression */
+	enum config_when_full when_full;
+	int zstd_level; /* 0: no compression */
 	const char *config_path;
 	const char *config_text;
 	struct platform platform;       /* its monotonic clock */
@@ -58,7 +60,7 @@ enum recorder_result {
 /** Do what there is to do, without waiting. */
 enum recorder_result recorder_step(struct recorder *rec);
 
-/** Record what is in the ring now, and finish the file. 0, or -errno: a .part stays behind. */
+/** Record what is in the ring now, and finish the file. 0, or -errno: not all is recorded. */
 int recorder_finish(struct recorder *rec);
 
 /** The figures, as in the status page. */

@@ -240,6 +240,38 @@ static int replace_by_copy(const char *part, struct recover_outcome *o)
 	return rename_part(part, ".damaged");
 }
 
+static int may_pass(int error)
+{
+	return error == -ENOSPC || error == -EDQUOT || error == -ENOMEM;
+}
+
+/* No single file stops recording. */
+static void set_aside(const char *path, const char *name, const char *why,
+		      const struct recover_report *report)
+{
+	char what[320];
+	int r = rename_part(path, ".damaged");
+
+	snprintf(what, sizeof(what), "not recovered: %s; %s%s", why,
+		 r < 0 ? "left as it is: " : "kept as .damaged", r < 0 ? strerror(-r) : "");
+	report_line(report, name, what);
+}
+
+static int recover_path(const char *path, struct recover_outcome *o)
+{
+	int r = recover_in_place(path, o);
+
+	if (r == -EPROTO || r == -ENOMEM) {
+		return r;
+	}
+	if (r == -ENODATA || (r == 0 && o->result == RECOVER_EMPTY)) {
+		o->result = RECOVER_EMPTY;
+		return unlink(path) < 0 ? -errno : 0;
+	}
+	/* Also where writing or the sync failed: a copy is written and synced from the start. */
+	return r < 0 ? replace_by_copy(path, o) : rename_part(path, ".mcap");
+}
+
 static int recover_part(const struct store *s, const struct store_entry *e,
 			const struct recover_report *report, struct store_state *state)
 {
@@ -251,24 +283,18 @@ static int recover_part(const struct store *s, const struct store_entry *e,
 		return r;
 	}
 	track_init(&o.track);
-	r = recover_in_place(path, &o);
-	if (r == -EXDEV) {
-		r = replace_by_copy(path, &o);
-	} else if (r == -EPROTO) {
-		report_line(report, e->name, "not an MCAP file, kept as .damaged");
-		return rename_part(path, ".damaged");
-	} else if (r == -ENODATA || (r == 0 && o.result == RECOVER_EMPTY)) {
-		o.result = RECOVER_EMPTY;
-		r = unlink(path) < 0 ? -errno : 0;
-	} else if (r == 0) {
-		r = rename_part(path, ".mcap");
+	r = recover_path(path, &o);
+	if (r == 0) {
+		report_outcome(report, e->name, &o);
+		set_state(state, &o.track);
+		return 0;
 	}
-	if (r < 0) {
+	if (may_pass(r)) {
 		report_line(report, e->name, strerror(-r));
 		return r;
 	}
-	report_outcome(report, e->name, &o);
-	set_state(state, &o.track);
+	set_aside(path, e->name, r == -EPROTO ? "not an MCAP file" : strerror(-r), report);
+	state->sequence = e->sequence > state->sequence ? e->sequence : state->sequence;
 	return 0;
 }
 

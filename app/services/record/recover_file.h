@@ -40,8 +40,9 @@ struct recover_report {
 
 /**
  * Repair and rename all .part files of the store, and set @state by what they hold. Empty ones are
- * removed, what cannot be read is renamed to .damaged. 0, or -errno of the first that failed in a
- * way that may pass (EIO, ENOSPC).
+ * removed; what cannot be recovered is renamed to .damaged, or left where that is refused, so that
+ * no file stops recording. 0, or -errno of what may pass: no space, no memory, the directory
+ * itself.
  */
 int recover_store(const struct store *s, const struct recover_report *report,
 		  struct store_state *state);

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "record/space.h"
 
 #define SINK_RETRY_NS NS_PER_S
 
@@ -20,8 +21,10 @@ struct sink {
 	struct store_state resume;  /* where to resume if recording stopped now */
 	struct store_state durable; /* the same after the last good sync */
 	uint64_t durable_bytes;     /* of the open file */
+	uint64_t head_bytes;        /* the same */
 	enum sink_state state;
-	int error; /* why the state is not SINK_READY */
+	int error;        /* why the state is not SINK_READY */
+	unsigned retries; /* since the last good sync */
 	int has_rewind;
 	struct record_file *file;    /* NULL between files */
 	const struct layout *layout; /* NULL between sessions */
@@ -35,7 +38,7 @@ struct sink {
 	uint64_t events_lost; /* in this session, by this process */
 	uint64_t files;
 	uint64_t bytes_done; /* in finished files */
-	uint64_t bytes_free;
+	struct space space;
 	int64_t last_utc_ns;     /* of the newest sample */
 	struct event full_event; /* the disk was full: written to the next file */
 	int64_t full_utc_ns;
@@ -71,19 +74,20 @@ __attribute__((format(printf, 2, 3))) static void report(struct sink *s, const c
 static void halt(struct sink *s, int error, const char *what)
 {
 	int is_full = error == -ENOSPC || error == -EDQUOT;
+	int is_news = error != s->error || s->retries == 0;
 
 	s->checked_ns = s->now_ns;
 	s->error = error;
-	if (is_full && s->state != SINK_FULL) {
+	if (is_full && is_news) {
 		report(s,
 		       "recording stopped, disk full: %s: %" PRIu64 " bytes free, reserve %" PRIu64,
-		       s->opt.dir, s->bytes_free, s->opt.reserve_bytes);
+		       s->opt.dir, s->space.bytes_free, s->opt.reserve_bytes);
 		s->full_event = (struct event){ .id = EVENT_RECORD_DISK_FULL,
 						.cycle = s->resume.next_cycle,
-						.value = (int64_t)s->bytes_free,
+						.value = (int64_t)s->space.bytes_free,
 						.slave_pos = EVENT_NO_SLAVE };
 		s->full_utc_ns = s->last_utc_ns;
-	} else if (!is_full && s->state != SINK_FAILED) {
+	} else if (is_news) {
 		report(s, "recording failed: %s: %s: %s; trying again", s->opt.dir, what,
 		       strerror(-error));
 	}
@@ -94,7 +98,9 @@ static void report_recovery(void *ctx, const char *text)
 {
 	struct sink *s = ctx;
 
-	s->opt.report(s->opt.report_ctx, text);
+	if (s->retries <= 1) { /* the same files again: told already */
+		s->opt.report(s->opt.report_ctx, text);
+	}
 }
 
 static int recover(struct sink *s)
@@ -102,7 +108,8 @@ static int recover(struct sink *s)
 	const struct recover_report report = { .line = report_recovery, .ctx = s };
 	int r = recover_store(s->store, &report, &s->resume);
 
-	return r < 0 ? r : store_save_state(s->store, &s->resume);
+	(void)store_save_state(s->store, &s->resume); /* the recordings know it, too */
+	return r;
 }
 
 int sink_create(const struct recorder_options *opt, struct sink **ret_sink, char *error,
@@ -116,6 +123,7 @@ int sink_create(const struct recorder_options *opt, struct sink **ret_sink, char
 		return -ENOMEM;
 	}
 	s->opt = *opt;
+	s->space.opt = &s->opt;
 	r = store_open_or_tell(s->opt.dir, &s->store, error, error_bytes);
 	if (r < 0) {
 		free(s);
@@ -163,6 +171,11 @@ struct feed_mark sink_mark(const struct sink *s, enum sink_ring which)
 	return (struct feed_mark){ resume->sync0_next, resume->sync0_mono_ns };
 }
 
+int sink_error(const struct sink *s)
+{
+	return s->state == SINK_READY ? 0 : s->error;
+}
+
 enum sink_state sink_state(const struct sink *s)
 {
 	return s->state;
@@ -176,20 +189,16 @@ int sink_take_rewind(struct sink *s)
 	return has_rewind;
 }
 
-static int read_free_bytes(struct sink *s)
-{
-	const struct record_seam *seam = s->opt.seam;
-
-	return seam != NULL && seam->free_bytes != NULL
-		       ? seam->free_bytes(seam->ctx, s->opt.dir, &s->bytes_free)
-		       : store_free_bytes(s->store, &s->bytes_free);
-}
-
 /* All that was written to the open file is on disk. */
 static void note_durable(struct sink *s)
 {
 	s->durable = s->resume;
 	s->durable_bytes = record_file_bytes(s->file);
+	if (s->retries > 0) {
+		s->retries = 0;
+		report(s, "recording again: on disk up to cycle %" PRIu64, last_cycle(&s->durable));
+		s->message[0] = '\0';
+	}
 	if (s->has_put_full_event) {
 		s->full_event.id = EVENT_NONE;
 		s->has_put_full_event = 0;
@@ -244,18 +253,12 @@ void sink_count_lost_events(struct sink *s, uint64_t events)
 	report(s, "%" PRIu64 " events were overwritten before they could be recorded", events);
 }
 
-static void check_space(struct sink *s)
+static void keep_room(struct sink *s, int r)
 {
-	uint64_t open_bytes = record_file_final_bytes(s->file);
-	int r = store_enforce_budget(s->store, s->opt.budget_bytes, open_bytes);
-
-	if (r < 0) {
-		report(s, "%s: cannot delete old recordings: %s", s->opt.dir, strerror(-r));
-	}
 	s->checked_ns = s->now_ns;
-	if (read_free_bytes(s) == 0 && s->bytes_free < s->opt.reserve_bytes) {
-		halt(s, -ENOSPC, s->opt.dir);
-		/* The reserve is there for this: leave a whole file behind. */
+	if (r < 0) {
+		halt(s, r, "room for recordings");
+		/* Room for the end was kept: leave a whole file behind. */
 		(void)finish_file(s, "disk full");
 	}
 }
@@ -274,7 +277,7 @@ static void tick_ready(struct sink *s)
 			(void)sync_file(s);
 		}
 		if (s->state == SINK_READY && s->now_ns - s->checked_ns >= SINK_RETRY_NS) {
-			check_space(s);
+			keep_room(s, space_make(&s->space, s->file, s->space.chunk_bytes));
 		}
 	}
 	if (s->state == SINK_READY && s->file != NULL && is_rotation_due(s)) {
@@ -285,6 +288,7 @@ static void tick_ready(struct sink *s)
 /* Finish what a failure left behind, and be ready. */
 static void come_back(struct sink *s)
 {
+	s->retries++;
 	if (s->abandoned[0] != '\0' && truncate(s->abandoned, (off_t)s->abandoned_bytes) < 0 &&
 	    errno != ENOENT) {
 		return;
@@ -296,20 +300,7 @@ static void come_back(struct sink *s)
 	s->durable = s->resume;
 	s->state = SINK_READY;
 	s->has_rewind = 1;
-	report(s, "recording again from cycle %" PRIu64, s->resume.next_cycle);
 	s->message[0] = '\0';
-}
-
-/* Once a second: is there space again? The reserve and an eighth, so that it does not go to and
- * fro. */
-static void tick_full(struct sink *s)
-{
-	uint64_t wanted = s->opt.reserve_bytes + s->opt.reserve_bytes / 8;
-
-	s->checked_ns = s->now_ns;
-	if (read_free_bytes(s) == 0 && s->bytes_free >= wanted && s->bytes_free > 0) {
-		come_back(s);
-	}
 }
 
 void sink_tick(struct sink *s, int64_t now_ns)
@@ -319,12 +310,17 @@ void sink_tick(struct sink *s, int64_t now_ns)
 		tick_ready(s);
 	} else if (now_ns - s->checked_ns < SINK_RETRY_NS) {
 		return;
-	} else if (s->state == SINK_FULL) {
-		tick_full(s);
 	} else {
 		s->checked_ns = now_ns;
-		come_back(s);
+		if (s->state == SINK_FAILED || space_to_begin(&s->space) == 0) {
+			come_back(s);
+		}
 	}
+}
+
+static void set_u64(_Atomic uint64_t *field, uint64_t value)
+{
+	atomic_store_explicit(field, value, memory_order_relaxed);
 }
 
 void sink_get_status(struct sink *s, struct record_status *page)
@@ -338,17 +334,16 @@ void sink_get_status(struct sink *s, struct record_status *page)
 		status_text_set(&page->text_sequence, page->message, sizeof(page->message),
 				s->message);
 	}
-	atomic_store_explicit(&page->session, s->resume.session, memory_order_relaxed);
-	atomic_store_explicit(&page->recorded_cycles, s->resume.cycles, memory_order_relaxed);
-	atomic_store_explicit(&page->recorded_gaps, s->resume.gaps, memory_order_relaxed);
-	atomic_store_explicit(&page->cycles_missing, s->resume.missing, memory_order_relaxed);
-	atomic_store_explicit(&page->first_cycle, s->resume.first_cycle, memory_order_relaxed);
-	atomic_store_explicit(&page->last_cycle, last_cycle(&s->resume), memory_order_relaxed);
-	atomic_store_explicit(&page->synced_cycle, last_cycle(&s->durable), memory_order_relaxed);
-	atomic_store_explicit(&page->bytes_written, s->bytes_done + open_bytes,
-			      memory_order_relaxed);
-	atomic_store_explicit(&page->files, s->files, memory_order_relaxed);
-	atomic_store_explicit(&page->bytes_free, s->bytes_free, memory_order_relaxed);
+	set_u64(&page->session, s->resume.session);
+	set_u64(&page->recorded_cycles, s->resume.cycles);
+	set_u64(&page->recorded_gaps, s->resume.gaps);
+	set_u64(&page->cycles_missing, s->resume.missing);
+	set_u64(&page->first_cycle, s->resume.first_cycle);
+	set_u64(&page->last_cycle, last_cycle(&s->resume));
+	set_u64(&page->synced_cycle, last_cycle(&s->durable));
+	set_u64(&page->bytes_written, s->bytes_done + open_bytes);
+	set_u64(&page->files, s->files);
+	set_u64(&page->bytes_free, s->space.bytes_free);
 }
 
 /* --- the open file --- */
@@ -402,8 +397,9 @@ int sink_open_file(struct sink *s, uint64_t first_cycle, int64_t utc_ns)
 	if (s->file != NULL) {
 		return 0;
 	}
-	if (read_free_bytes(s) == 0 && s->bytes_free < s->opt.reserve_bytes) {
-		return fail(s, -ENOSPC, s->opt.dir);
+	r = space_make(&s->space, NULL, s->head_bytes);
+	if (r < 0) {
+		return fail(s, r, "room for recordings");
 	}
 	store_make_name(name, utc_ns, s->resume.session, spec.file_sequence);
 	r = record_file_create(&spec, &s->file);
@@ -412,6 +408,8 @@ int sink_open_file(struct sink *s, uint64_t first_cycle, int64_t utc_ns)
 	}
 	s->resume.sequence++;
 	s->durable_bytes = 0;
+	s->head_bytes = record_file_bytes(s->file);
+	s->space.seen_bytes = s->head_bytes;
 	s->files++;
 	snprintf(s->path, sizeof(s->path), "%s", record_file_path(s->file));
 	s->file_opened_ns = s->now_ns;
@@ -449,22 +447,15 @@ static int finish_file(struct sink *s, const char *reason)
 	s->bytes_done += record_file_bytes(s->file);
 	record_file_destroy(s->file);
 	s->file = NULL;
-	r = store_enforce_budget(s->store, s->opt.budget_bytes, 0);
-	if (r < 0) {
-		report(s, "%s: cannot delete old recordings: %s", s->opt.dir, strerror(-r));
-	}
 	return 0;
 }
 
 int sink_end_session(struct sink *s, const char *reason)
 {
-	int r = s->state != SINK_READY ? s->error : s->file != NULL ? finish_file(s, reason) : 0;
+	int r = s->state == SINK_READY && s->file != NULL ? finish_file(s, reason) : sink_error(s);
 
-	if (r < 0) {
-		return r;
-	}
-	s->layout = NULL;
-	return 0;
+	s->layout = r < 0 ? s->layout : NULL;
+	return r;
 }
 
 static int close_chunk(struct sink *s)
@@ -476,13 +467,16 @@ static int close_chunk(struct sink *s)
 	}
 	s->chunk_opened_ns = 0;
 	s->is_dirty = 1;
-	return 0;
+	keep_room(s, space_for_chunk(&s->space, s->file));
+	return sink_error(s);
 }
 
 static int is_rotation_due(const struct sink *s)
 {
-	return (s->opt.rotate_bytes > 0 &&
-		record_file_final_bytes(s->file) >= s->opt.rotate_bytes) ||
+	uint64_t bytes = record_file_final_bytes(s->file);
+
+	return (s->opt.rotate_bytes > 0 && bytes >= s->opt.rotate_bytes) ||
+	       bytes >= space_largest_file(&s->space, s->file) ||
 	       (s->opt.rotate_period_ns > 0 &&
 		s->now_ns - s->file_opened_ns >= s->opt.rotate_period_ns) ||
 	       record_file_is_full(s->file);

@@ -50,6 +50,8 @@ void sink_begin_session(struct sink *s, const struct layout *layout, enum sink_n
 int sink_end_session(struct sink *s, const char *reason);
 
 enum sink_state sink_state(const struct sink *s);
+/** Why it is not ready: -errno; 0: it is. */
+int sink_error(const struct sink *s);
 /** 1 once after a failure was recovered: read again from sink_resume_point(). */
 int sink_take_rewind(struct sink *s);
 

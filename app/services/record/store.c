@@ -11,7 +11,6 @@
 #include <string.h>
 #include <sys/file.h>
 #include <sys/stat.h>
-#include <sys/statvfs.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -214,7 +213,36 @@ static int append_entry(struct store_entry **entries, size_t *count, const struc
 	return 0;
 }
 
-int store_list(const char *dir, struct store_entry **ret_entries, size_t *ret_count)
+/* NAME.damaged is what NAME.part was. */
+static int parse_any_name(const char *name, struct store_entry *e)
+{
+	static const char damaged[] = ".damaged";
+	char part[STORE_NAME_BYTES];
+	size_t len = strlen(name);
+
+	if (len < sizeof(damaged) || len >= sizeof(part) ||
+	    strcmp(name + len - strlen(damaged), damaged) != 0) {
+		return store_parse_name(name, &e->sequence, &e->is_part);
+	}
+	snprintf(part, sizeof(part), "%.*s.mcap", (int)(len - strlen(damaged)), name);
+	return store_parse_name(part, &e->sequence, &e->is_part);
+}
+
+/* NAME.keep, with or without the suffix of the recording in NAME. */
+static int has_pin(int dir_fd, const char *name)
+{
+	int stem = (int)(strrchr(name, '.') - name);
+	char pin[STORE_NAME_BYTES + 8];
+
+	snprintf(pin, sizeof(pin), "%.*s.keep", stem, name);
+	if (faccessat(dir_fd, pin, F_OK, AT_SYMLINK_NOFOLLOW) == 0) {
+		return 1;
+	}
+	snprintf(pin, sizeof(pin), "%s.keep", name);
+	return faccessat(dir_fd, pin, F_OK, AT_SYMLINK_NOFOLLOW) == 0;
+}
+
+static int list(const char *dir, int is_all, struct store_entry **ret_entries, size_t *ret_count)
 {
 	struct store_entry *entries = NULL;
 	size_t count = 0;
@@ -230,12 +258,14 @@ int store_list(const char *dir, struct store_entry **ret_entries, size_t *ret_co
 		struct store_entry e = { .sequence = 0 };
 		struct stat st;
 
-		if (!store_parse_name(d->d_name, &e.sequence, &e.is_part) ||
+		if (!(is_all ? parse_any_name(d->d_name, &e)
+			     : store_parse_name(d->d_name, &e.sequence, &e.is_part)) ||
 		    fstatat(fd, d->d_name, &st, AT_SYMLINK_NOFOLLOW) < 0 || !S_ISREG(st.st_mode)) {
 			continue;
 		}
 		memcpy(e.name, d->d_name, strlen(d->d_name) + 1); /* its length was checked */
 		e.bytes = (uint64_t)st.st_size;
+		e.is_pinned = is_all && has_pin(fd, e.name);
 		r = append_entry(&entries, &count, &e);
 	}
 	closedir(stream);
@@ -249,6 +279,16 @@ int store_list(const char *dir, struct store_entry **ret_entries, size_t *ret_co
 	*ret_entries = entries;
 	*ret_count = count;
 	return 0;
+}
+
+int store_list(const char *dir, struct store_entry **ret_entries, size_t *ret_count)
+{
+	return list(dir, 0, ret_entries, ret_count);
+}
+
+int store_list_all(const char *dir, struct store_entry **ret_entries, size_t *ret_count)
+{
+	return list(dir, 1, ret_entries, ret_count);
 }
 
 /* The state file's lines, and where each goes. */
@@ -359,48 +399,4 @@ int store_save_state(const struct store *s, const struct store_state *state)
 		unlink(temporary);
 	}
 	return r;
-}
-
-int store_free_bytes(const struct store *s, uint64_t *ret_bytes)
-{
-	struct statvfs fs;
-
-	if (statvfs(s->dir, &fs) < 0) {
-		return -errno;
-	}
-	*ret_bytes = (uint64_t)fs.f_bavail * fs.f_frsize;
-	return 0;
-}
-
-int store_enforce_budget(const struct store *s, uint64_t budget_bytes, uint64_t open_bytes)
-{
-	struct store_entry *entries = NULL;
-	uint64_t total = open_bytes;
-	size_t count = 0;
-	int deleted = 0;
-	int r;
-
-	if (budget_bytes == 0) {
-		return 0;
-	}
-	r = store_list(s->dir, &entries, &count);
-	if (r < 0) {
-		return r;
-	}
-	for (size_t i = 0; i < count; i++) {
-		total += entries[i].is_part ? 0 : entries[i].bytes;
-	}
-	for (size_t i = 0; i < count && total > budget_bytes; i++) {
-		char path[PATH_MAX];
-
-		if (entries[i].is_part ||
-		    store_path(s->dir, entries[i].name, path, sizeof(path)) < 0 ||
-		    unlink(path) < 0) {
-			continue;
-		}
-		total -= entries[i].bytes;
-		deleted++;
-	}
-	free(entries);
-	return deleted;
 }

@@ -20,6 +20,7 @@ struct store_entry {
 	uint64_t sequence;
 	uint64_t bytes;
 	int is_part;
+	int is_pinned; /* by store_list_all(): NAME.keep is beside it */
 };
 
 /* Where to resume, and what was recorded of that session. All zero: nothing was recorded yet. */
@@ -53,6 +54,8 @@ const char *store_dir(const struct store *s);
 
 /** Recordings in @dir in order of their sequence; free() *@ret_entries. 0 or -errno. */
 int store_list(const char *dir, struct store_entry **ret_entries, size_t *ret_count);
+/** The same with damaged ones, and who is pinned. */
+int store_list_all(const char *dir, struct store_entry **ret_entries, size_t *ret_count);
 
 /** "DIR/NAME" into @buf. 0, -ENAMETOOLONG. */
 int store_path(const char *dir, const char *name, char *buf, size_t buf_len);
@@ -65,14 +68,5 @@ int store_parse_name(const char *name, uint64_t *ret_sequence, int *ret_is_part)
 /** 0, -ENOENT, -EBADMSG (ret untouched on failure). */
 int store_load_state(const struct store *s, struct store_state *ret_state);
 int store_save_state(const struct store *s, const struct store_state *state);
-
-/** Free bytes of the file system for this user. 0 or -errno. */
-int store_free_bytes(const struct store *s, uint64_t *ret_bytes);
-
-/**
- * Delete the oldest finished recordings until all together with @open_bytes hold @budget_bytes; the
- * newest finished one goes last. Returns the number of files deleted or -errno.
- */
-int store_enforce_budget(const struct store *s, uint64_t budget_bytes, uint64_t open_bytes);
 
 #endif

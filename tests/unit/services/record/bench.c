@@ -134,10 +134,28 @@ static void seam_wrap(void *ctx, const char *path, struct mcap_io *io)
 	};
 }
 
+uint64_t bench_used(const char *dir)
+{
+	struct store_entry *entries;
+	uint64_t used = 0;
+	size_t count;
+
+	CHECK_EQ(store_list_all(dir, &entries, &count), 0);
+	for (size_t i = 0; i < count; i++) {
+		used += entries[i].bytes;
+	}
+	free(entries);
+	return used;
+}
+
 static int seam_free_bytes(void *ctx, const char *dir, uint64_t *ret_bytes)
 {
-	CHECK(dir[0] != '\0');
-	*ret_bytes = ((const struct bench *)ctx)->bytes_free;
+	struct bench *b = ctx;
+	uint64_t used = bench_used(dir);
+
+	b->most_bytes = used > b->most_bytes ? used : b->most_bytes;
+	CHECK(b->disk_bytes == 0 || used <= b->disk_bytes);
+	*ret_bytes = b->disk_bytes != 0 ? b->disk_bytes - used : b->bytes_free;
 	return 0;
 }
 

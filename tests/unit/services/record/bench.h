@@ -45,6 +45,8 @@ struct bench {
 	unsigned fail_count; /* so many */
 	int error;
 	uint64_t bytes_free; /* as the file system is to say */
+	uint64_t disk_bytes; /* not 0: free is what all files in the directory leave of this */
+	uint64_t most_bytes; /* that they had, whenever the recorder looked */
 	/* As Linux does it: what a failed sync had is clean in the page cache, and not on the disk.
 	 */
 	struct bench_lost lost[BENCH_LOST];
@@ -76,6 +78,9 @@ int bench_run(struct bench *b);
 void bench_wait(struct bench *b, int64_t ns);
 /** Stop in order. */
 int bench_stop(struct bench *b);
+
+/** Bytes of all recordings in @dir. */
+uint64_t bench_used(const char *dir);
 
 /** All recordings together, as after the next mount: cycles in order over all files (CHECKed to be
  * readable). */

@@ -129,36 +129,6 @@ TEST(store, list_is_in_order_of_sequence_whatever_the_clock_said)
 	close_all(s, dir);
 }
 
-TEST(store, the_budget_takes_the_oldest_and_never_an_open_or_foreign_file)
-{
-	char dir[PATH_BYTES];
-	char path[PATH_BYTES + STORE_NAME_BYTES];
-	struct store *s = open_new(dir);
-	struct store_entry *entries;
-	size_t count;
-
-	make_file(dir, "ecdaq-20300101T000000Z-aa-000001.mcap", 1000);
-	make_file(dir, "ecdaq-19700101T000000Z-bb-000002.mcap", 1000);
-	make_file(dir, "ecdaq-20260101T000000Z-bb-000003.mcap", 1000);
-	make_file(dir, "ecdaq-20260101T000000Z-bb-000004.part", 1000);
-	make_file(dir, "holiday.mcap", 1000000);
-	CHECK_EQ(store_enforce_budget(s, 0, 1000), 0);
-	CHECK_EQ(store_enforce_budget(s, 4000, 1000), 0);
-	CHECK_EQ(store_enforce_budget(s, 3999, 1000), 1);
-	CHECK_EQ(store_list(dir, &entries, &count), 0);
-	CHECK_EQ(count, 3);
-	CHECK_EQ(entries[0].sequence, 2);
-	free(entries);
-	CHECK_EQ(store_enforce_budget(s, 1, 1000), 2);
-	CHECK_EQ(store_list(dir, &entries, &count), 0);
-	CHECK_EQ(count, 1);
-	CHECK(entries[0].is_part);
-	free(entries);
-	CHECK_EQ(store_path(dir, "holiday.mcap", path, sizeof(path)), 0);
-	CHECK_EQ(unlink(path), 0);
-	close_all(s, dir);
-}
-
 TEST(store, state_is_read_back_and_damage_leaves_the_output_untouched)
 {
 	char dir[PATH_BYTES];
