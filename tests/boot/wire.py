@@ -163,6 +163,12 @@ class Books:
         """Edges of no pulse."""
         return [edge for edge in self.edges[slave] if not edge.pulses]
 
+    def cycle_near(self, slave: int, edge: Edge) -> int:
+        """The cycle of the slave's pulse that is nearest to an edge."""
+        at = edge.guest_ns - self.begin_ns
+        pulses = (p for p in self.pulses[slave] if p.dc_ns in self.cycle_of)
+        return self.cycle_of[min(pulses, key=lambda p: abs(p.put_ns - at)).dc_ns]
+
     def dropped(self, slave: int) -> int:
         """How many the kernel dropped, by its own count from 1."""
         return self.edges[slave][-1].seqno - len(self.edges[slave])

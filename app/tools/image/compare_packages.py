@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import hashlib
 import io
+import os
 import re
 import subprocess
 import sys
@@ -23,7 +24,8 @@ EPILOG = """\
 Isar's packages are below build/tmp/deploy in its work directory; what is there beside ours is
 ignored. Exit status: 0 equal, 1 different, 2 nothing to compare.
 """
-OURS = Path.home() / ".cache" / "ecdaq" / "image" / "deploy" / "repo"
+CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+OURS = CACHE / "ecdaq" / "image" / "deploy" / "repo"
 CHANGELOG = re.compile(r"^\./usr/share/doc/[^/]+/changelog(\.Debian)?\.gz$")
 # Sums of the files, which are compared themselves, and the fields.
 NOT_COMPARED = ("./md5sums", "./control")
