@@ -26,6 +26,14 @@ DRIVERS = {
     "r8169": "R8169",
     "smsc95xx": "USB_NET_SMSC95XX",
 }
+# Checks of memory that cost the cycle nothing; what no program of ours uses; what costs each cycle.
+HARDENING = (
+    *("FORTIFY_SOURCE", "HARDENED_USERCOPY", "LIST_HARDENED", "RANDOMIZE_BASE", "SECCOMP_FILTER"),
+    *("SLAB_FREELIST_HARDENED", "SLAB_FREELIST_RANDOM", "STACKPROTECTOR_STRONG"),
+    *("STRICT_KERNEL_RWX", "STRICT_MODULE_RWX", "UNMAP_KERNEL_AT_EL0", "VMAP_STACK"),
+)
+UNUSED = ("DEBUG_FS", "DEVMEM", "IO_URING", "LEGACY_PTYS", "LEGACY_TIOCSTI")
+COSTLY = ("INIT_ON_ALLOC_DEFAULT_ON", "RANDOMIZE_KSTACK_OFFSET_DEFAULT")
 SYSCTL_NEEDS = {
     "net.core.bpf_jit_harden": "BPF_JIT",
     "kernel.unprivileged_bpf_disabled": "BPF_SYSCALL",
@@ -71,3 +79,8 @@ def test_every_sysctl_has_the_kernel_feature_that_it_sets() -> None:
     needed = {key: SYSCTL_NEEDS[key] for key in keys if key in SYSCTL_NEEDS}
     assert len(needed) >= 2
     assert [k for k, symbol in needed.items() if ASKED.get(f"CONFIG_{symbol}") != "y"] == []
+
+
+def test_the_kernel_is_hardened_where_that_costs_no_latency() -> None:
+    wanted = dict.fromkeys(HARDENING, "y") | dict.fromkeys((*UNUSED, *COSTLY), "n")
+    assert {symbol: ASKED.get(f"CONFIG_{symbol}") for symbol in wanted} == wanted
