@@ -246,12 +246,14 @@ static int may_pass(int error)
 }
 
 /* No single file stops recording. */
-static void set_aside(const char *path, const char *name, const char *why,
+static void set_aside(const char *path, const char *name, int error,
 		      const struct recover_report *report)
 {
+	char why[160];
 	char what[320];
 	int r = rename_part(path, ".damaged");
 
+	snprintf(why, sizeof(why), "%s", error == -EPROTO ? "not an MCAP file" : strerror(-error));
 	snprintf(what, sizeof(what), "not recovered: %s; %s%s", why,
 		 r < 0 ? "left as it is: " : "kept as .damaged", r < 0 ? strerror(-r) : "");
 	report_line(report, name, what);
@@ -293,7 +295,7 @@ static int recover_part(const struct store *s, const struct store_entry *e,
 		report_line(report, e->name, strerror(-r));
 		return r;
 	}
-	set_aside(path, e->name, r == -EPROTO ? "not an MCAP file" : strerror(-r), report);
+	set_aside(path, e->name, r, report);
 	state->sequence = e->sequence > state->sequence ? e->sequence : state->sequence;
 	return 0;
 }
