@@ -207,21 +207,7 @@ do_test()
 	" -"* | *" dds "*) want_packages foreign "subscribers on Fast DDS and RustDDS" ;;
 	esac
 	[ -z "${CI:-}" ] || want_packages ci "a cache of compilations"
-	[ -z "${CI:-}" ] || [ $# -gt 0 ] || begin_images
 	exec "$PYTHON" "$root/app/tools/run_tests.py" "$@"
-}
-
-# begin_images: the images that group boot needs, beside the other groups. They take long when
-# nothing is cached; the groups before boot wait for bus time more than they compute. What is not
-# ready then, or failed, is built by the group itself.
-begin_images()
-{
-	[ "$(id -u)" = 0 ] || return 0
-	need_packages image
-	mkdir -p "$root/build/test-logs"
-	for machine in qemuarm64 raspberrypi4-64; do
-		nice -n 19 "$root/app/tools/image/build-image.sh" --machine "$machine" || break
-	done > "$root/build/test-logs/build-images.log" 2>&1 < /dev/null &
 }
 
 do_run()
