@@ -267,40 +267,23 @@ stop()
 	esac
 }
 
-# The live view stays in this process group: Ctrl-Z and fg reach it, too.
+# The live view stays in this process group: Ctrl-Z and fg reach it, too. It gives the terminal back
+# before it stops; the trap keeps this script from stopping before that, and with it the job of the shell.
 start_view()
 {
+	trap ':' TSTP
 	setpriv --pdeathsig TERM "$bin/ecdaq" top --leave-text 'q: stop master, segment and recorder' <&3 4>&- 5>&- &
 	pid[view]=$!
-	trap 'suspended=yes' TSTP
 }
 
-# Ctrl-Z: the view gives the terminal back before this script stops, and with it the job of the shell.
-# Not in the trap itself: the time limit of a read that a trap interrupts ends the trap. And without
-# commands, which another Ctrl-Z would stop: this script would wait for them.
-suspend()
-{
-	local tries
-
-	for ((tries = 0; tries < 250; tries++)); do
-		is_view_running || break
-		read -r -t 0.02 -u 5 || true
-	done
-	trap - TSTP
-	suspended=no
-	kill -TSTP "$$"
-	trap 'suspended=yes' TSTP
-}
-
-# Neither stopped nor ended.
-is_view_running()
+is_view_stopped()
 {
 	local key state rest
 
 	while read -r key state rest; do
 		[ "$key" != State: ] || break
 	done 2> /dev/null < "/proc/${pid[view]:-none}/status" || return 1
-	[[ ${state:-Z} != [TZ] ]]
+	[ "${state:-}" = T ]
 }
 
 # Does the configuration itself name what ecdaq-sync0 checks?
@@ -351,7 +334,6 @@ stop_dds()
 
 failed=0
 interrupted=no
-suspended=no
 
 end_in_order()
 {
@@ -387,7 +369,8 @@ wait_for_end()
 
 	while [ "$interrupted" = no ]; do
 		read -r -t 0.2 -u 5 || true
-		[ "$suspended" = no ] || suspend
+		# Without a command that another Ctrl-Z would stop: this script would wait for it.
+		! is_view_stopped || kill -STOP "$$"
 		for name in "${!pid[@]}"; do
 			has_ended "$name" || continue
 			case $name$status in
