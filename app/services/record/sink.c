@@ -80,8 +80,10 @@ static void halt(struct sink *s, int error, const char *what)
 	s->error = error;
 	if (is_full && is_news) {
 		report(s,
-		       "recording stopped, disk full: %s: %" PRIu64 " bytes free, reserve %" PRIu64,
-		       s->opt.dir, s->space.bytes_free, s->opt.reserve_bytes);
+		       "recording stopped, disk full: %s: %" PRIu64 " bytes free, reserve %" PRIu64
+		       "; %" PRIu64 " bytes of recordings, budget %" PRIu64,
+		       s->opt.dir, s->space.bytes_free, s->opt.reserve_bytes, s->space.bytes_kept,
+		       s->opt.budget_bytes);
 		s->full_event = (struct event){ .id = EVENT_RECORD_DISK_FULL,
 						.cycle = s->resume.next_cycle,
 						.value = (int64_t)s->space.bytes_free,

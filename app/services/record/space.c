@@ -64,6 +64,7 @@ static int delete_oldest(struct space *sp, const struct record_file *file, uint6
 {
 	uint64_t deletable = 0;
 	char path[PATH_MAX];
+	int r = 0;
 
 	for (size_t i = 0; i < count; i++) {
 		deletable += entry[i].is_part || entry[i].is_pinned ? 0 : entry[i].bytes;
@@ -78,8 +79,9 @@ static int delete_oldest(struct space *sp, const struct record_file *file, uint6
 			continue;
 		}
 		sp->bytes_kept -= entry[i].bytes;
-		if (look(sp) < 0) {
-			return -EIO;
+		r = look(sp);
+		if (r < 0) {
+			return r;
 		}
 	}
 	return excess(sp, file, more) > 0 ? -ENOSPC : 0;

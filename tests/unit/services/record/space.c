@@ -186,6 +186,20 @@ TEST(space, when_full_stop_deletes_nothing_and_keeps_the_reserve)
 	bench_done(&b);
 }
 
+TEST(space, a_budget_that_is_used_up_is_named_in_the_alarm)
+{
+	struct bench b = { .calls = 0 };
+
+	bench_init(&b, 100, 8192);
+	b.options.budget_bytes = 600000;
+	b.options.when_full = CONFIG_WHEN_FULL_STOP;
+	record_much(&b);
+	CHECK_EQ(recorder_status(b.recorder)->state, RECORD_DISK_FULL);
+	CHECK(strstr(b.said, " bytes of recordings, budget 600000") != NULL);
+	CHECK_EQ(bench_stop(&b), -ENOSPC);
+	bench_done(&b);
+}
+
 TEST(space, stopped_without_room_it_says_that_not_all_is_recorded)
 {
 	struct bench b = { .calls = 0 };
