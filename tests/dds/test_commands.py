@@ -71,6 +71,34 @@ def test_answer_names_the_first_cycle_that_came_back_with_the_value(
     )
 
 
+def test_a_repeated_command_gets_the_same_answer_and_is_executed_once(
+    make_bench: Callable[..., Bench],
+) -> None:
+    output = "piccolo0.oneshot_time"
+    bench = make_bench(**REMOTE_LED | {"outputs[0].channel": output})
+    bench.start_all()
+    commander = bench.commander()
+    number = 1000
+
+    def first_accepted() -> dict[str, Any]:
+        nonlocal number
+        number += 1
+        answer = commander.command({output: 1}, id=number)
+        assert answer["accepted"] or is_passing(answer), answer
+        return answer if answer["accepted"] else {}
+
+    first = wait_for("accepted command", first_accepted, 60)
+    # The value tells whether it was executed; a commander would not change it.
+    again = commander.command({output: 2}, id=number)
+    assert (again["accepted"], again["cycle"]) == (True, first["cycle"])
+    refused = commander.settled({"piccolo0.adc": 1}, id=number + 1)
+    again = commander.settled({output: 2}, id=number + 1)
+    assert not again["accepted"] and again["reason"] == refused["reason"]
+    end(bench)
+    seen = {m.oneshot_time for m in cycles_of(bench)}
+    assert 1 in seen and 2 not in seen
+
+
 def hold_led(bench: Bench, commander: Commander) -> None:
     """Returns when the LED has been on for 1000 cycles, and is on.
 

@@ -8,7 +8,8 @@ import itertools
 import json
 import re
 import signal
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,9 +19,9 @@ import pandas
 import pytest
 from bench import PASSING_REASONS, ROOT, Bench, live, wait_for
 from cyclonedds.idl import types
-from ecdaq import keys, remote
-from ecdaq.idl_types import TOPICS, SampleV1, StatusV1
-from ecdaq.link import Channel, domain_config
+from ecdaq import NoAnswerError, keys, remote
+from ecdaq.idl_types import TOPICS, ReplyV1, SampleV1, StatusV1
+from ecdaq.link import Channel, Link, domain_config
 
 IDL = (ROOT / "app" / "services" / "publish" / "idl" / "ecdaq.idl").read_text()
 
@@ -116,6 +117,34 @@ def test_raw_values_that_do_not_fit_are_a_value_error() -> None:
         for value in (-1, 1 << 64):
             with pytest.raises(ValueError, match=re.escape("0 to 2**64 - 1")):
                 link.send({"piccolo0.led": value}, raw=True)
+
+
+def test_a_command_without_a_reply_is_repeated_with_its_id() -> None:
+    sent: list[int] = []
+
+    class Lossy(Link):
+        """The first command, or its reply, is lost."""
+
+        def __init__(self) -> None:
+            pass
+
+        def send(self, values: Mapping[str, float], **more: Any) -> int:
+            sent.append(more["message_id"] or 7)
+            return sent[-1]
+
+        def replies(self, seconds: float) -> list[ReplyV1]:
+            if len(sent) == 1:
+                time.sleep(seconds)
+                return []
+            other = ReplyV1("me", 6, 1, True, 41, "")
+            return [other, ReplyV1("me", sent[-1], 1, True, 42, "")]
+
+    assert Lossy().command({"piccolo0.led": 1}) == 42
+    assert sent == [7, 7]
+    sent.clear()
+    with pytest.raises(NoAnswerError, match="no reply within"):
+        Lossy().command({"piccolo0.led": 1}, seconds=0.01)
+    assert sent == [7]
 
 
 def channel(kind: str, scale: float = 1) -> Channel:

@@ -26,7 +26,8 @@ struct liveliness_change {
 /* The command that was put on the board and is not answered yet. */
 struct pending {
 	ecdaq_CommandV1 *command; /* NULL: none */
-	uint64_t sequence;        /* of its set on the board */
+	uint64_t sender;
+	uint64_t sequence; /* of its set on the board */
 	int64_t since_ns;
 	struct gate_item item[GATE_ITEMS];
 };
@@ -215,21 +216,33 @@ static void heartbeat(struct commands *c)
 
 /* --- replies --- */
 
-static void reply(struct commands *c, const struct topics *topics, const ecdaq_CommandV1 *command,
-		  uint64_t cycle, char *reason)
+static void send_reply(const struct commands *c, const struct topics *topics,
+		       const ecdaq_CommandV1 *command, const struct gate_answer *answer)
 {
+	char reason[GATE_REASON_BYTES];
 	ecdaq_ReplyV1 m = {
 		.commander = command->commander,
 		.id = command->id,
 		.session = c->session,
-		.is_accepted = reason[0] == '\0',
-		.cycle = cycle,
+		.is_accepted = answer->is_accepted,
+		.cycle = answer->cycle,
 		.reason = reason,
 	};
 
+	memcpy(reason, answer->reason, sizeof(reason));
 	(void)topics_write_now(topics->reply, &m);
-	c->counts.accepted += m.is_accepted;
-	c->counts.refused += !m.is_accepted;
+}
+
+static void reply(struct commands *c, const struct topics *topics, const ecdaq_CommandV1 *command,
+		  uint64_t sender, const struct gate_answer *answer)
+{
+	gate_note_answer(c->gate, sender, command->id, answer);
+	send_reply(c, topics, command, answer);
+	if (answer->is_accepted) {
+		c->counts.accepted++;
+	} else {
+		c->counts.refused++;
+	}
 }
 
 static void finish(struct commands *c)
@@ -243,16 +256,15 @@ static void check_pending(struct commands *c, const struct topics *topics, int64
 {
 	struct pending *p = &c->pending;
 	struct board *board = c->board.board;
-	char no_reason[1] = "";
-	char timed_out[] = "not taken by the master in time: reverted";
+	struct gate_answer answer = { .is_accepted = 1 };
 
 	if (p->command == NULL) {
 		return;
 	}
 	if (board != NULL &&
 	    atomic_load_explicit(&board->taken_sequence, memory_order_acquire) >= p->sequence) {
-		reply(c, topics, p->command,
-		      atomic_load_explicit(&board->taken_cycle, memory_order_relaxed), no_reason);
+		answer.cycle = atomic_load_explicit(&board->taken_cycle, memory_order_relaxed);
+		reply(c, topics, p->command, p->sender, &answer);
 		finish(c);
 		return;
 	}
@@ -267,7 +279,8 @@ static void check_pending(struct commands *c, const struct topics *topics, int64
 		}
 		board_commit(board);
 	}
-	reply(c, topics, p->command, 0, timed_out);
+	answer = (struct gate_answer){ .reason = "not taken by the master in time: reverted" };
+	reply(c, topics, p->command, p->sender, &answer);
 	finish(c);
 }
 
@@ -286,6 +299,7 @@ static void send_set(struct commands *c, ecdaq_CommandV1 *command, uint64_t send
 	}
 	p->sequence = board_commit(board);
 	p->command = command;
+	p->sender = sender;
 	p->since_ns = now_ns;
 }
 
@@ -326,16 +340,21 @@ static int take_command(struct commands *c, const struct topics *topics,
 {
 	ecdaq_CommandV1 *command;
 	uint64_t sender;
-	char reason[GATE_REASON_BYTES] = "";
+	const struct gate_answer *given;
+	struct gate_answer refusal = { .is_accepted = 0 };
 
 	if (!topics_take_command(topics, &command, &sender)) {
 		return 0;
 	}
-	if (check(c, command, sender, view, reason) == 0) {
+	given = gate_find_answer(c->gate, sender, command->id);
+	if (given != NULL) {
+		send_reply(c, topics, command, given);
+	} else if (check(c, command, sender, view, refusal.reason) == 0) {
 		send_set(c, command, sender, view->now_ns);
 		return 0;
+	} else {
+		reply(c, topics, command, sender, &refusal);
 	}
-	reply(c, topics, command, 0, reason);
 	ecdaq_CommandV1_free(command, DDS_FREE_ALL);
 	return 1;
 }
@@ -353,6 +372,7 @@ int commands_step(struct commands *commands, const struct topics *topics,
 		for (unsigned i = 0; i < BOARD_OUTPUTS; i++) {
 			gate_note_set(c->gate, i, 0);
 		}
+		gate_forget_answers(c->gate);
 		c->session = session;
 	}
 	for (int n = 0; c->pending.command == NULL && n < REFUSALS_PER_STEP; n++) {

@@ -17,8 +17,10 @@ struct commander {
 	uint64_t sender; /* 0: free */
 	uint64_t last_id;
 	int has_id;
-	int is_gone;   /* its entry may be reused */
-	double tokens; /* token bucket: commands allowed now */
+	int has_answer;            /* to last_id */
+	struct gate_answer answer; /* ditto */
+	int is_gone;               /* its entry may be reused */
+	double tokens;             /* token bucket: commands allowed now */
 	int64_t refilled_ns;
 };
 
@@ -131,6 +133,31 @@ uint64_t gate_setter(const struct gate *gate, unsigned output)
 	return gate->setter[output];
 }
 
+void gate_note_answer(struct gate *gate, uint64_t sender, uint64_t id,
+		      const struct gate_answer *answer)
+{
+	struct commander *c = sender == 0 ? NULL : find(gate, sender);
+
+	if (c != NULL && c->has_id && c->last_id == id) {
+		c->answer = *answer;
+		c->has_answer = 1;
+	}
+}
+
+const struct gate_answer *gate_find_answer(struct gate *gate, uint64_t sender, uint64_t id)
+{
+	struct commander *c = sender == 0 ? NULL : find(gate, sender);
+
+	return c != NULL && c->has_answer && c->last_id == id ? &c->answer : NULL;
+}
+
+void gate_forget_answers(struct gate *gate)
+{
+	for (size_t i = 0; i < GATE_COMMANDERS; i++) {
+		gate->commander[i].has_answer = 0;
+	}
+}
+
 /* Token bucket of one second of @rate. */
 static int exceeds_rate(struct commander *c, uint32_t rate, int64_t now_ns)
 {
@@ -159,6 +186,7 @@ static int check_order(struct commander *c, const struct gate_command *cmd,
 	}
 	c->has_id = 1;
 	c->last_id = cmd->id;
+	c->has_answer = 0;
 	if (cmd->session != 0 && cmd->session != view->table->meta.session) {
 		return refuse(reason, -ESTALE,
 			      "for session %" PRIu64 ", not the current one: stale", cmd->session);

@@ -37,6 +37,13 @@ struct gate_view {
 	int64_t now_ns; /* CLOCK_MONOTONIC */
 };
 
+/* What a command was answered. */
+struct gate_answer {
+	int is_accepted;
+	uint64_t cycle; /* whose frame carried it, if accepted */
+	char reason[GATE_REASON_BYTES];
+};
+
 /* A checked value: index of the output channel (base/board.h) and its bits in the image. */
 struct gate_item {
 	unsigned output;
@@ -52,11 +59,23 @@ void gate_destroy(struct gate *gate);
 /**
  * Check @cmd. 0 and @ret_items (GATE_ITEMS, @cmd->count of them); or -errno with the reason in one
  * line in @reason (GATE_REASON_BYTES), @ret_items undefined: -EPERM not allowed, an input or not
- * owner, -EINVAL malformed, -ENOENT no such channel, -ERANGE value, -EALREADY duplicate, -ESTALE
+ * owner, -EINVAL malformed, -ENOENT no such channel, -ERANGE value, -EALREADY repeated, -ESTALE
  * stale, -EAGAIN rate exceeded or bus not in OP, -EUSERS too many commanders.
  */
 int gate_check(struct gate *gate, const struct gate_command *cmd, const struct gate_view *view,
 	       struct gate_item *ret_items, char *reason);
+
+/**
+ * Note the answer to the last command of @sender that gate_check() has judged by its id; another
+ * @id is ignored. The same command, repeated, is to be answered by it and not executed again: a
+ * commander whose answer was lost cannot know what became of its command.
+ */
+void gate_note_answer(struct gate *gate, uint64_t sender, uint64_t id,
+		      const struct gate_answer *answer);
+/** The noted answer to this command; NULL: none. Valid until the next call for @gate. */
+const struct gate_answer *gate_find_answer(struct gate *gate, uint64_t sender, uint64_t id);
+/** Another run of the master: its cycles are not those of the answers. */
+void gate_forget_answers(struct gate *gate);
 
 /**
  * @sender is lost: it owns no outputs any more. Its ids are remembered (it may come back, and an

@@ -140,6 +140,37 @@ TEST(publish_gate, ids_go_up_for_each_sender_by_itself_also_after_it_was_lost)
 	CHECK_EQ(ask(s, 1, 6, "s.led", 1), 0);
 }
 
+TEST(publish_gate, a_repeated_command_has_the_answer_of_the_first_one)
+{
+	const struct gate_answer accepted = { .is_accepted = 1, .cycle = 1001 };
+	const struct gate_answer refused = { .reason = "for a reason" };
+	struct scene *s = scene();
+
+	CHECK(gate_find_answer(s->gate, 1, 5) == NULL);
+	CHECK_EQ(ask(s, 1, 5, "s.led", 1), 0);
+	CHECK(gate_find_answer(s->gate, 1, 5) == NULL);
+	gate_note_answer(s->gate, 1, 5, &accepted);
+	CHECK_EQ(gate_find_answer(s->gate, 1, 5)->cycle, 1001);
+	CHECK(gate_find_answer(s->gate, 1, 4) == NULL);
+	CHECK(gate_find_answer(s->gate, 2, 5) == NULL);
+	/* Also if it has been lost meanwhile. */
+	gate_remove(s->gate, 1);
+	CHECK(gate_find_answer(s->gate, 1, 5) != NULL);
+	/* The answer to a command that was not judged by its id is not noted: it may come again. */
+	gate_note_answer(s->gate, 1, 6, &refused);
+	CHECK(gate_find_answer(s->gate, 1, 6) == NULL);
+	CHECK_EQ(gate_find_answer(s->gate, 1, 5)->cycle, 1001);
+	/* The next command takes its place. */
+	CHECK_EQ(ask(s, 1, 6, "s.none", 1), -ENOENT);
+	CHECK(gate_find_answer(s->gate, 1, 5) == NULL);
+	CHECK(gate_find_answer(s->gate, 1, 6) == NULL);
+	gate_note_answer(s->gate, 1, 6, &refused);
+	CHECK_STR(gate_find_answer(s->gate, 1, 6)->reason, "for a reason");
+	gate_forget_answers(s->gate);
+	CHECK(gate_find_answer(s->gate, 1, 6) == NULL);
+	CHECK_EQ(ask(s, 1, 6, "s.led", 1), -EALREADY);
+}
+
 TEST(publish_gate, places_of_lost_commanders_go_to_new_ones)
 {
 	struct scene *s = scene();

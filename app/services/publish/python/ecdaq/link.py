@@ -48,6 +48,8 @@ from ecdaq.series import Gaps, Sampled
 State = TypeVar("State", ChannelsV1, IdlV1, StatusV1, TimeMapV1)
 ANY = ViewState.Any | InstanceState.Any | SampleState.Any
 TAKE_AT_ONCE = 4096
+# Below the lifespan of a command, which is 1 s.
+REPEAT_S = 0.5
 
 
 @dataclass(frozen=True)
@@ -373,15 +375,27 @@ class Link:
     ) -> int:
         """Set outputs, all in one cycle or none. Returns the cycle whose frame carried them.
 
+        Without a reply the command is repeated: right after discovery, or on a lossy network, it or
+        its reply can be lost. The appliance executes it once.
+
         Values hold while this link is alive and the appliance receives its liveliness; then outputs
         with a timeout go fail-safe. Raises RefusedError with the reason if the command is rejected.
         """
-        number = self.send(values, raw=raw, not_after_cycle=not_after_cycle, session=session)
+        number = None
         end = time.monotonic() + seconds
-        while (left := end - time.monotonic()) > 0:
-            for reply in self.replies(left):
-                if reply.id == number and reply.is_accepted:
-                    return reply.cycle
-                if reply.id == number:
-                    raise RefusedError(reply.reason)
+        while (now := time.monotonic()) < end:
+            number = self.send(
+                values,
+                raw=raw,
+                not_after_cycle=not_after_cycle,
+                session=session,
+                message_id=number,
+            )
+            repeat = min(end, now + REPEAT_S)
+            while (left := repeat - time.monotonic()) > 0:
+                for reply in self.replies(left):
+                    if reply.id == number and reply.is_accepted:
+                        return reply.cycle
+                    if reply.id == number:
+                        raise RefusedError(reply.reason)
         raise NoAnswerError(f"no reply within {seconds:g} s")
