@@ -24,8 +24,9 @@ int log_list(const char *dir, enum log_format format, FILE *out, FILE *err);
 /** Topics with their fields and counts, metadata, attachments of one file. */
 int log_info(const char *path, enum log_format format, FILE *out, FILE *err);
 /**
- * Read all of the files (or of the directories) at @paths: CRC of every chunk, and cycle numbers
- * without a gap inside of files and from one to the next. EXIT_CODE_OK: clean.
+ * Read all of the files (or of the directories) at @paths: all CRCs, schemas and channels in head,
+ * chunks and summary against each other, and cycle numbers without a gap inside of files and from
+ * one to the next. EXIT_CODE_OK: clean.
  */
 int log_check(const char *const *paths, size_t count, enum log_format format, FILE *out, FILE *err);
 /** Repair @path in place, or copy its undamaged part to @output if that is not NULL. */

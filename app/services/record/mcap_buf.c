@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/bytes.h"
+#include "base/utf8.h"
 
 void mcap_buf_done(struct mcap_buf *b)
 {
@@ -83,10 +84,25 @@ void mcap_buf_u64(struct mcap_buf *b, uint64_t v)
 
 void mcap_buf_string(struct mcap_buf *b, const char *text)
 {
-	size_t len = strlen(text);
+	size_t left = strlen(text);
+	size_t start = b->len;
 
-	mcap_buf_u32(b, (uint32_t)len);
-	mcap_buf_put(b, text, len);
+	mcap_buf_u32(b, 0);
+	while (left > 0) {
+		size_t n = utf8_len(text, left);
+
+		if (n > 0) {
+			mcap_buf_put(b, text, n);
+		} else {
+			mcap_buf_put(b, UTF8_REPLACEMENT, strlen(UTF8_REPLACEMENT));
+			n = 1;
+		}
+		text += n;
+		left -= n;
+	}
+	if (b->error == 0) {
+		put_le32(b->data + start, (uint32_t)(b->len - start - 4));
+	}
 }
 
 void mcap_buf_pairs(struct mcap_buf *b, const struct mcap_pair *pairs, size_t count)

@@ -28,6 +28,7 @@ void mcap_buf_u8(struct mcap_buf *b, uint8_t v);
 void mcap_buf_u16(struct mcap_buf *b, uint16_t v);
 void mcap_buf_u32(struct mcap_buf *b, uint32_t v);
 void mcap_buf_u64(struct mcap_buf *b, uint64_t v);
+/** With its length before it; U+FFFD for what is not UTF-8. */
 void mcap_buf_string(struct mcap_buf *b, const char *text);
 void mcap_buf_pairs(struct mcap_buf *b, const struct mcap_pair *pairs, size_t count);
 

@@ -3,16 +3,17 @@
 
 #include <errno.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/bytes.h"
 
 int mcap_index_init(struct mcap_index *ix)
 {
 	*ix = (struct mcap_index){ .start_ns = UINT64_MAX };
-	ix->has_schema = calloc(MCAP_CHANNEL_IDS, 1);
-	ix->has_channel = calloc(MCAP_CHANNEL_IDS, 1);
+	ix->schema_at = calloc(MCAP_CHANNEL_IDS, sizeof(ix->schema_at[0]));
+	ix->channel_at = calloc(MCAP_CHANNEL_IDS, sizeof(ix->channel_at[0]));
 	ix->channel_messages = calloc(MCAP_CHANNEL_IDS, sizeof(ix->channel_messages[0]));
-	if (ix->has_schema == NULL || ix->has_channel == NULL || ix->channel_messages == NULL) {
+	if (ix->schema_at == NULL || ix->channel_at == NULL || ix->channel_messages == NULL) {
 		mcap_index_done(ix);
 		return -ENOMEM;
 	}
@@ -26,42 +27,65 @@ void mcap_index_done(struct mcap_index *ix)
 	mcap_buf_done(&ix->chunks);
 	mcap_buf_done(&ix->attachments);
 	mcap_buf_done(&ix->metadata);
-	free(ix->has_schema);
-	free(ix->has_channel);
+	free(ix->schema_at);
+	free(ix->channel_at);
 	free(ix->channel_messages);
-	*ix = (struct mcap_index){ .has_schema = NULL };
+	*ix = (struct mcap_index){ .schema_at = NULL };
 }
 
-int mcap_index_schema(struct mcap_index *ix, const uint8_t *record, size_t record_len)
+int mcap_index_define(struct mcap_index *ix, const uint8_t *record, size_t record_len)
 {
+	int is_schema = record[0] == MCAP_OP_SCHEMA;
+	struct mcap_buf *b = is_schema ? &ix->schemas : &ix->channels;
+	uint32_t *at = is_schema ? ix->schema_at : ix->channel_at;
 	uint16_t id;
 
-	if (record_len < MCAP_HEAD_BYTES + 2) {
+	if (record_len < MCAP_HEAD_BYTES + 4) { /* a channel: its id and its schema's */
 		return -EBADMSG;
 	}
-	id = get_le16(record + MCAP_HEAD_BYTES);
-	if (!ix->has_schema[id]) {
-		ix->has_schema[id] = 1;
-		ix->schema_count++;
-		mcap_buf_put(&ix->schemas, record, record_len);
+	if (b->len > UINT32_MAX - MCAP_LIMIT_RECORD_BYTES) {
+		return -ENOMEM;
 	}
-	return ix->schemas.error;
+	id = get_le16(record + MCAP_HEAD_BYTES);
+	if (at[id] == 0) {
+		at[id] = (uint32_t)b->len + 1;
+		mcap_buf_put(b, record, record_len);
+		ix->schema_count += record[0] == MCAP_OP_SCHEMA;
+		ix->channel_count += record[0] == MCAP_OP_CHANNEL;
+	}
+	return b->error;
 }
 
-int mcap_index_channel(struct mcap_index *ix, const uint8_t *record, size_t record_len)
+int mcap_index_contradicts(const struct mcap_index *ix, const uint8_t *record, size_t record_len)
 {
-	uint16_t id;
+	int is_schema = record[0] == MCAP_OP_SCHEMA;
+	const struct mcap_buf *b = is_schema ? &ix->schemas : &ix->channels;
+	const uint32_t *at = is_schema ? ix->schema_at : ix->channel_at;
+	uint32_t place = at[get_le16(record + MCAP_HEAD_BYTES)];
 
-	if (record_len < MCAP_HEAD_BYTES + 2) {
-		return -EBADMSG;
-	}
-	id = get_le16(record + MCAP_HEAD_BYTES);
-	if (!ix->has_channel[id]) {
-		ix->has_channel[id] = 1;
-		ix->channel_count++;
-		mcap_buf_put(&ix->channels, record, record_len);
-	}
-	return ix->channels.error;
+	/* The head has the length: as long as it is the same, so is the rest of the comparison. */
+	return place != 0 && (memcmp(b->data + place - 1, record, MCAP_HEAD_BYTES) != 0 ||
+			      memcmp(b->data + place - 1, record, record_len) != 0);
+}
+
+int mcap_index_has_schema_of(const struct mcap_index *ix, const uint8_t *channel_record)
+{
+	uint16_t schema_id = get_le16(channel_record + MCAP_HEAD_BYTES + 2);
+
+	return schema_id == 0 || ix->schema_at[schema_id] != 0;
+}
+
+int mcap_index_can_read(const struct mcap_index *ix, uint16_t id)
+{
+	uint32_t place = ix->channel_at[id];
+
+	return place != 0 && mcap_index_has_schema_of(ix, ix->channels.data + place - 1);
+}
+
+void mcap_index_count(struct mcap_index *ix, uint16_t id, uint64_t messages)
+{
+	ix->channel_messages[id] += messages;
+	ix->channel_end = id >= ix->channel_end ? id + 1u : ix->channel_end;
 }
 
 static void count_chunk(struct mcap_index *ix, const struct mcap_chunk_index *messages)
@@ -74,7 +98,7 @@ static void count_chunk(struct mcap_index *ix, const struct mcap_chunk_index *me
 		return;
 	}
 	for (size_t i = 0; i < count; i++) {
-		ix->channel_messages[ch[i].id] += ch[i].messages;
+		mcap_index_count(ix, ch[i].id, ch[i].messages);
 	}
 	ix->messages += mcap_chunk_index_messages(messages);
 	if (mcap_chunk_index_start_ns(messages) < ix->start_ns) {

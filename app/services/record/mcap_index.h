@@ -16,9 +16,10 @@ struct mcap_index {
 	struct mcap_buf chunks;      /* chunk index records */
 	struct mcap_buf attachments; /* attachment index records */
 	struct mcap_buf metadata;    /* metadata index records */
-	uint8_t *has_schema;         /* by id */
-	uint8_t *has_channel;
-	uint64_t *channel_messages; /* by id */
+	uint32_t *schema_at;         /* by id: 1 + place of its record in schemas; 0: none */
+	uint32_t *channel_at;        /* the same */
+	uint64_t *channel_messages;  /* by id */
+	uint32_t channel_end;        /* no channel from this id on has messages */
 	uint64_t messages;
 	uint64_t start_ns;
 	uint64_t end_ns;
@@ -42,13 +43,20 @@ struct mcap_chunk_place {
 int mcap_index_init(struct mcap_index *ix);
 void mcap_index_done(struct mcap_index *ix);
 
-/** Note a schema or channel record (whole, head included); a repeated id is noted once. 0,
+/** Note a schema or channel record (whole, head included); of a repeated id the first counts. 0,
  * -EBADMSG, -ENOMEM. */
-int mcap_index_schema(struct mcap_index *ix, const uint8_t *record, size_t record_len);
-int mcap_index_channel(struct mcap_index *ix, const uint8_t *record, size_t record_len);
+int mcap_index_define(struct mcap_index *ix, const uint8_t *record, size_t record_len);
+/** 1 if a record with the kind and id of this schema or channel was noted, but with other bytes. */
+int mcap_index_contradicts(const struct mcap_index *ix, const uint8_t *record, size_t record_len);
+/** 1 if channel @id was noted, and the schema that it names. */
+int mcap_index_can_read(const struct mcap_index *ix, uint16_t id);
+/** 1 if this channel record names no schema, or one that was noted. */
+int mcap_index_has_schema_of(const struct mcap_index *ix, const uint8_t *channel_record);
 /** Note the chunk at @place whose messages @messages was built from. */
 int mcap_index_chunk(struct mcap_index *ix, const struct mcap_chunk_place *place,
 		     const struct mcap_chunk_index *messages);
+/** Count messages of channel @id that are in no chunk. */
+void mcap_index_count(struct mcap_index *ix, uint16_t id, uint64_t messages);
 /** Note a metadata or attachment record (whole) at @offset. */
 int mcap_index_metadata(struct mcap_index *ix, uint64_t offset, const uint8_t *record,
 			size_t record_len);

@@ -8,6 +8,7 @@
 #include <zlib.h>
 
 #include "base/bytes.h"
+#include "base/utf8.h"
 #include "record/mcap.h"
 
 /* A place in a record; what does not fit sets error and reads as zero. */
@@ -51,12 +52,28 @@ static uint64_t take_u64(struct cursor *c)
 	return p != NULL ? get_le64(p) : 0;
 }
 
+static int is_utf8(const uint8_t *p, size_t len)
+{
+	const char *text = (const char *)p;
+	size_t n = 1;
+
+	for (; len > 0 && n > 0; text += n, len -= n) {
+		n = utf8_len(text, len);
+	}
+	return n > 0;
+}
+
+/* Text is UTF-8 by the specification; readers in other languages refuse a file that has other. */
 static struct mcap_text take_text(struct cursor *c)
 {
 	uint32_t len = take_u32(c);
 	const uint8_t *p = take(c, len);
 
-	return (struct mcap_text){ p != NULL ? (const char *)p : "", p != NULL ? len : 0 };
+	if (p == NULL || !is_utf8(p, len)) {
+		c->error = -EBADMSG;
+		return (struct mcap_text){ "", 0 };
+	}
+	return (struct mcap_text){ (const char *)p, len };
 }
 
 /* An array of bytes with its length before it. */
@@ -181,6 +198,9 @@ int mcap_parse_record(struct mcap_item *item)
 	case MCAP_OP_MESSAGE_INDEX:
 		item->kind = MCAP_ITEM_MESSAGE_INDEX;
 		item->id = take_u16(&c);
+		if (take_u32(&c) != c.left) {
+			return -EBADMSG;
+		}
 		break;
 	case MCAP_OP_ATTACHMENT:
 		item->kind = MCAP_ITEM_ATTACHMENT;
@@ -196,6 +216,10 @@ int mcap_parse_record(struct mcap_item *item)
 		break;
 	case MCAP_OP_DATA_END:
 		item->kind = MCAP_ITEM_DATA_END;
+		item->crc = take_u32(&c);
+		if (c.left > 0) { /* a record that ends the section must not be a damaged other */
+			return -EBADMSG;
+		}
 		break;
 	default:
 		item->kind = MCAP_ITEM_OTHER;

@@ -18,7 +18,7 @@ enum mcap_item_kind {
 	MCAP_ITEM_STATISTICS,    /* log_time_ns, publish_time_ns: of first and last message; data:
 				    counts */
 	MCAP_ITEM_OTHER,         /* a record that this reader has no use for */
-	MCAP_ITEM_DATA_END,      /* the last item of a file that was closed */
+	MCAP_ITEM_DATA_END,      /* the last item of a file that was closed; crc: 0: none */
 	MCAP_ITEM_DAMAGE,        /* reason; the reader continues after it if !is_final */
 };
 
@@ -39,6 +39,7 @@ struct mcap_item {
 	size_t record_len;
 	uint16_t id;
 	uint16_t schema_id;
+	uint32_t crc;
 	uint32_t sequence;
 	uint64_t log_time_ns;
 	uint64_t publish_time_ns;

@@ -25,11 +25,110 @@ struct mcap_reader {
 	size_t inner_len;
 	size_t inner_offset;
 	uint64_t chunk_offset;
+	uint64_t sound_end;  /* end of the newest top-level record whose length is believed */
+	unsigned searches;   /* for a record where none was */
+	uint32_t data_crc;   /* of all bytes before the end of the newest top-level record */
+	int has_damage;      /* handed out */
+	int has_bad_magic;   /* to be handed out as damage */
+	int has_pending_end; /* the data end in record, after its CRC was handed out as damage */
 };
+
+enum {
+	SEARCH_BLOCK_BYTES = 65536,
+	SEARCH_NAME_BYTES = 256,
+	SEARCHES_BACK = 100 /* to before the place of the damage: bounds the work on any file */
+};
+/* From the start of a record to the last of the lengths that has_sound_lengths() looks at. */
+enum { SEARCH_HEAD_BYTES = MCAP_HEAD_BYTES + 16 + 2 * (4 + SEARCH_NAME_BYTES) + 8 };
+
+/* A text of at most SEARCH_NAME_BYTES at *@at: moved behind it. 0 if there is none. */
+static int skip_name(const uint8_t *record, size_t have, size_t *at)
+{
+	uint32_t len = have - *at >= 4 ? get_le32(record + *at) : UINT32_MAX;
+
+	if (len > SEARCH_NAME_BYTES || len + 4 > have - *at) {
+		return 0;
+	}
+	*at += 4 + len;
+	return 1;
+}
+
+/* Do the lengths inside of what may be a record agree with that of the record? By accident they do
+ * in one of 2^32 places at most. @have bytes of it are there, at least a head. */
+static int has_sound_lengths(const uint8_t *record, size_t have)
+{
+	uint64_t content_len = get_le64(record + 1);
+	size_t at = MCAP_HEAD_BYTES;
+	int is_sound = 1;
+
+	switch (record[0]) {
+	case MCAP_OP_CHUNK:
+		at += 28; /* times, size, CRC */
+		is_sound = have >= at && skip_name(record, have, &at) && have - at >= 8 &&
+			   get_le64(record + at) > 0;
+		return is_sound &&
+		       get_le64(record + at) == content_len - (at + 8 - MCAP_HEAD_BYTES);
+	case MCAP_OP_METADATA:
+		is_sound =
+			skip_name(record, have, &at) && have - at >= 4 && at > MCAP_HEAD_BYTES + 4;
+		return is_sound &&
+		       get_le32(record + at) == content_len - (at + 4 - MCAP_HEAD_BYTES);
+	case MCAP_OP_ATTACHMENT:
+		at += 16; /* times */
+		is_sound = have >= at && skip_name(record, have, &at) &&
+			   skip_name(record, have, &at) && have - at >= 8;
+		return is_sound &&
+		       get_le64(record + at) == content_len - (at + 8 + 4 - MCAP_HEAD_BYTES);
+	default:
+		return 0;
+	}
+}
+
+/* The next place from @from on where a record seems to start. 0, -ENOENT, -errno of the I/O. */
+static int find_record(const struct mcap_source *source, uint64_t from, uint64_t *ret_offset)
+{
+	uint8_t block[SEARCH_BLOCK_BYTES];
+
+	while (source->bytes > from && source->bytes - from >= MCAP_HEAD_BYTES) {
+		uint64_t left = source->bytes - from;
+		size_t n = left < sizeof(block) ? (size_t)left : sizeof(block);
+		size_t places = n == left ? n - MCAP_HEAD_BYTES : n - SEARCH_HEAD_BYTES;
+		int err = source->read_at(source->ctx, from, block, n);
+
+		if (err < 0) {
+			return err;
+		}
+		for (size_t i = 0; i <= places; i++) {
+			uint64_t content_len = get_le64(block + i + 1);
+
+			if (content_len <= MCAP_LIMIT_RECORD_BYTES &&
+			    content_len <= left - i - MCAP_HEAD_BYTES &&
+			    has_sound_lengths(block + i, n - i)) {
+				*ret_offset = from + i;
+				return 0;
+			}
+		}
+		from += n == left ? n : places + 1;
+	}
+	return -ENOENT;
+}
+
+/* A file whose first bytes are destroyed is still one. */
+static int find_start(const struct mcap_source *source, uint64_t *ret_offset)
+{
+	struct mcap_source start = *source;
+	int err;
+
+	start.bytes = start.bytes < MCAP_LIMIT_RECORD_BYTES ? start.bytes : MCAP_LIMIT_RECORD_BYTES;
+	err = find_record(&start, 0, ret_offset);
+	return err == -ENOENT ? -EPROTO : err;
+}
 
 int mcap_reader_create(const struct mcap_source *source, struct mcap_reader **ret_reader)
 {
 	uint8_t magic[MCAP_MAGIC_BYTES];
+	uint64_t offset = MCAP_MAGIC_BYTES;
+	int has_bad_magic;
 	size_t have = source->bytes < sizeof(magic) ? (size_t)source->bytes : sizeof(magic);
 	struct mcap_reader *r;
 	int err = have > 0 ? source->read_at(source->ctx, 0, magic, have) : 0;
@@ -37,8 +136,10 @@ int mcap_reader_create(const struct mcap_source *source, struct mcap_reader **re
 	if (err < 0) {
 		return err;
 	}
-	if (memcmp(magic, MCAP_MAGIC, have) != 0) {
-		return -EPROTO;
+	has_bad_magic = memcmp(magic, MCAP_MAGIC, have) != 0;
+	err = has_bad_magic ? find_start(source, &offset) : 0;
+	if (err < 0) {
+		return err;
 	}
 	if (have < sizeof(magic)) {
 		return -ENODATA;
@@ -48,7 +149,10 @@ int mcap_reader_create(const struct mcap_source *source, struct mcap_reader **re
 		return -ENOMEM;
 	}
 	r->source = *source;
-	r->offset = MCAP_MAGIC_BYTES;
+	r->offset = offset;
+	r->sound_end = offset;
+	r->has_bad_magic = has_bad_magic;
+	r->data_crc = (uint32_t)crc32(0, magic, sizeof(magic));
 	r->zstd = ZSTD_createDCtx();
 	if (r->zstd == NULL) {
 		mcap_reader_destroy(r);
@@ -83,6 +187,7 @@ int mcap_reader_create_summary(const struct mcap_source *source, struct mcap_rea
 		return err;
 	}
 	r->is_summary = 1;
+	r->has_bad_magic = 0;
 	*ret_reader = r;
 	return 0;
 }
@@ -107,6 +212,7 @@ static int damage(struct mcap_reader *r, uint64_t offset, const char *reason,
 					.offset = offset,
 					.reason = reason,
 					.is_final = is_final == FINAL };
+	r->has_damage = 1;
 	if (is_final == FINAL) {
 		r->has_ended = 1;
 	}
@@ -202,6 +308,21 @@ static int next_inner(struct mcap_reader *r, struct mcap_item *ret_item)
 	return 1;
 }
 
+/* What is at r->offset is no record: go on where the next one starts. 2, or -errno. */
+static int search_on(struct mcap_reader *r, const char *reason, struct mcap_item *ret_item)
+{
+	uint64_t offset = r->offset;
+	/* The length of the record before may be what is wrong, if that was damaged. */
+	uint64_t from = r->searches++ < SEARCHES_BACK ? r->sound_end : offset;
+	int err = r->is_summary ? -ENOENT : find_record(&r->source, from + 1, &r->offset);
+
+	if (err < 0 && err != -ENOENT) {
+		return err;
+	}
+	damage(r, offset, reason, err == 0 ? GOES_ON : FINAL, ret_item);
+	return 2;
+}
+
 /* Load the record at r->offset. 1, 0 at the end of the file, -errno; or damage as an item: 2. */
 static int load_record(struct mcap_reader *r, struct mcap_item *ret_item)
 {
@@ -215,8 +336,7 @@ static int load_record(struct mcap_reader *r, struct mcap_item *ret_item)
 		return 0;
 	}
 	if (left < sizeof(head)) {
-		damage(r, offset, "file ends within a record", FINAL, ret_item);
-		return 2;
+		return search_on(r, "file ends within a record", ret_item);
 	}
 	err = r->source.read_at(r->source.ctx, offset, head, sizeof(head));
 	if (err < 0) {
@@ -224,12 +344,10 @@ static int load_record(struct mcap_reader *r, struct mcap_item *ret_item)
 	}
 	content_len = get_le64(head + 1);
 	if (head[0] == 0 || (head[0] > MCAP_OP_DATA_END && head[0] < MCAP_OP_PRIVATE)) {
-		damage(r, offset, "no record where one should start", FINAL, ret_item);
-		return 2;
+		return search_on(r, "no record where one should start", ret_item);
 	}
 	if (content_len > left - sizeof(head)) {
-		damage(r, offset, "file ends within a record", FINAL, ret_item);
-		return 2;
+		return search_on(r, "file ends within a record", ret_item);
 	}
 	r->offset += sizeof(head) + content_len;
 	if (content_len > MCAP_LIMIT_RECORD_BYTES) {
@@ -257,11 +375,48 @@ static int belongs_to_summary(uint8_t opcode)
 	       opcode == MCAP_OP_METADATA_INDEX || opcode == MCAP_OP_SUMMARY_OFFSET;
 }
 
+/* What a top-level record that was loaded is, beyond its bytes. */
+static void take_record(struct mcap_reader *r, struct mcap_item *item)
+{
+	if (has_sound_lengths(item->record, item->record_len)) {
+		r->sound_end = r->offset;
+	}
+	if (mcap_parse_record(item) < 0) {
+		damage(r, item->offset, "record is malformed", GOES_ON, item);
+		return;
+	}
+	if (!r->is_summary && belongs_to_summary(item->record[0])) {
+		damage(r, item->offset, "record of the summary in the data", GOES_ON, item);
+		return;
+	}
+	if (item->kind == MCAP_ITEM_CHUNK) {
+		take_chunk(r, item);
+	}
+	if (item->kind == MCAP_ITEM_DATA_END) {
+		if (item->crc != 0 && item->crc != r->data_crc && !r->has_damage) {
+			damage(r, item->offset,
+			       "wrong CRC of the data section: head or metadata are damaged",
+			       GOES_ON, item);
+			r->has_pending_end = 1;
+			return;
+		}
+	} else if (!r->is_summary && item->record != NULL) {
+		r->data_crc = (uint32_t)crc32(r->data_crc, item->record, (uInt)item->record_len);
+	}
+	if (item->kind != MCAP_ITEM_OTHER && item->kind != MCAP_ITEM_DAMAGE) {
+		r->sound_end = r->offset;
+	}
+}
+
 int mcap_reader_next(struct mcap_reader *r, struct mcap_item *ret_item)
 {
 	struct mcap_item item = { .record = NULL };
 	int got;
 
+	if (r->has_bad_magic) {
+		r->has_bad_magic = 0;
+		return damage(r, 0, "does not start as an MCAP file", GOES_ON, ret_item);
+	}
 	if (r->inner != NULL && next_inner(r, &item) > 0) {
 		*ret_item = item;
 		return 1;
@@ -269,18 +424,19 @@ int mcap_reader_next(struct mcap_reader *r, struct mcap_item *ret_item)
 	if (r->has_ended) {
 		return 0;
 	}
-	got = load_record(r, &item);
-	if (got <= 0) {
-		return got;
-	}
-	if (got == 1 && mcap_parse_record(&item) < 0) {
-		damage(r, item.offset, "record is malformed", GOES_ON, &item);
-	}
-	if (item.record != NULL && !r->is_summary && belongs_to_summary(item.record[0])) {
-		damage(r, item.offset, "record of the summary in the data", GOES_ON, &item);
-	}
-	if (item.kind == MCAP_ITEM_CHUNK && item.record != NULL) {
-		take_chunk(r, &item);
+	if (r->has_pending_end) {
+		item = (struct mcap_item){ .offset = r->offset - r->record.len,
+					   .record = r->record.data,
+					   .record_len = r->record.len,
+					   .kind = MCAP_ITEM_DATA_END };
+	} else {
+		got = load_record(r, &item);
+		if (got <= 0) {
+			return got;
+		}
+		if (got == 1) {
+			take_record(r, &item);
+		}
 	}
 	if (item.kind == MCAP_ITEM_DATA_END ||
 	    (item.record != NULL && item.record[0] == MCAP_OP_FOOTER)) {
@@ -288,6 +444,11 @@ int mcap_reader_next(struct mcap_reader *r, struct mcap_item *ret_item)
 	}
 	*ret_item = item;
 	return 1;
+}
+
+uint32_t mcap_reader_data_crc(const struct mcap_reader *r)
+{
+	return r->data_crc;
 }
 
 static int check_summary(const struct mcap_source *source, uint64_t start, uint32_t wanted,

@@ -2,7 +2,9 @@
 /*
  * Reads the data section of an MCAP file from front to back, in bounded memory, whatever the bytes
  * are. A chunk is handed out only after its CRC was checked, then what is inside it, record by
- * record. Context of all functions: blocking.
+ * record. Where no record starts, the next chunk, metadata or attachment whose inner lengths agree
+ * is searched for. If nothing else was damaged and the CRC of the whole section is wrong, that is
+ * damage before the data end. Context of all functions: blocking.
  */
 #ifndef RECORD_MCAP_READER_H
 #define RECORD_MCAP_READER_H
@@ -15,8 +17,8 @@
 
 struct mcap_reader;
 
-/** 0; -EPROTO: does not start as an MCAP file; -ENODATA: ends within its magic; or -errno. @source
- * is copied. */
+/** 0; -EPROTO: does not start as an MCAP file, and nothing in its first MCAP_LIMIT_RECORD_BYTES
+ * looks like a chunk; -ENODATA: ends within its magic; or -errno. @source is copied. */
 int mcap_reader_create(const struct mcap_source *source, struct mcap_reader **ret_reader);
 /** The same for the summary section of a closed file; -ENODATA where there is none, -EBADMSG: its
  * CRC is wrong. */
@@ -25,6 +27,10 @@ void mcap_reader_destroy(struct mcap_reader *r);
 
 /** The next item: 1; 0 at the end of the section or of the file; -errno of the I/O, -ENOMEM. */
 int mcap_reader_next(struct mcap_reader *r, struct mcap_item *ret_item);
+
+/** CRC of all bytes from the start of the file to the end of the newest top-level record (a data
+ * end is not counted in). Meaningful as long as there was no damage. */
+uint32_t mcap_reader_data_crc(const struct mcap_reader *r);
 
 enum mcap_ending {
 	MCAP_ENDING_GOOD,    /* footer and magic are there and the summary's CRC is right */

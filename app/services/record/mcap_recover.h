@@ -2,7 +2,8 @@
 /*
  * Repairs MCAP files. A file that only lost its end (power cut, killed writer) is repaired in
  * place: cut to its last whole record, index of the last chunk completed, summary written. A file
- * that is damaged before its end is copied, damaged records left out. Context of all functions:
+ * that is damaged before its end is copied: damaged records and messages of unknown channels are
+ * left out, and schemas and channels are those of mcap_definitions.h. Context of all functions:
  * blocking.
  */
 #ifndef RECORD_MCAP_RECOVER_H
@@ -50,7 +51,9 @@ int mcap_scan_is_whole(const struct mcap_scan *scan);
 int mcap_scan_resume(struct mcap_scan *scan, const struct mcap_io *io,
 		     struct mcap_writer **ret_writer);
 
-/** Copy what is whole in @source to a fresh writer, which the caller then finishes. 0 or -errno. */
-int mcap_copy_whole(const struct mcap_source *source, struct mcap_writer *w);
+/** Copy what is whole in @source, which @scan is of, to a fresh writer, which the caller then
+ * finishes. 0; -ENODATA: there is nothing whole; or -errno. */
+int mcap_copy_whole(const struct mcap_source *source, const struct mcap_scan *scan,
+		    struct mcap_writer *w);
 
 #endif

@@ -27,7 +27,7 @@ static void put_statistics(const struct mcap_index *ix, struct mcap_buf *out)
 	mcap_buf_u64(out, ix->messages > 0 ? ix->end_ns : 0);
 	counts = out->len;
 	mcap_buf_u32(out, 0);
-	for (uint32_t id = 0; id < MCAP_CHANNEL_IDS; id++) {
+	for (uint32_t id = 0; id < ix->channel_end; id++) {
 		if (ix->channel_messages[id] > 0) {
 			mcap_buf_u16(out, (uint16_t)id);
 			mcap_buf_u64(out, ix->channel_messages[id]);
@@ -70,7 +70,8 @@ static const struct mcap_buf *group_records(const struct mcap_index *ix, enum mc
 	}
 }
 
-void mcap_summary_put(const struct mcap_index *ix, uint64_t offset, struct mcap_buf *out)
+void mcap_summary_put(const struct mcap_index *ix, uint64_t offset, uint32_t data_crc,
+		      struct mcap_buf *out)
 {
 	static const enum mcap_opcode order[GROUPS] = {
 		MCAP_OP_SCHEMA,      MCAP_OP_CHANNEL,          MCAP_OP_STATISTICS,
@@ -83,7 +84,7 @@ void mcap_summary_put(const struct mcap_index *ix, uint64_t offset, struct mcap_
 	size_t footer;
 
 	mcap_buf_begin(out, MCAP_OP_DATA_END);
-	mcap_buf_u32(out, 0); /* no CRC of the data section: each chunk has its own */
+	mcap_buf_u32(out, data_crc);
 	mcap_buf_end(out, base);
 	summary_start = out->len;
 	for (size_t i = 0; i < GROUPS; i++) {

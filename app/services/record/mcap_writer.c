@@ -21,6 +21,9 @@ struct mcap_writer {
 	struct mcap_buf out;   /* the record being written */
 	ZSTD_CCtx *zstd;       /* NULL: uncompressed */
 	uint64_t offset;       /* end of the last whole record in the file */
+	uint32_t data_crc;     /* of all bytes before offset */
+	uint64_t repeat_at;    /* definitions are repeated in a chunk that begins here or later */
+	size_t repeated_len;   /* of definitions in the open chunk */
 	uint16_t next_schema;
 	uint32_t next_channel;
 	int is_torn; /* there may be bytes after offset: truncate before writing */
@@ -99,6 +102,7 @@ static int write_out(struct mcap_writer *w)
 		return r;
 	}
 	w->offset += w->out.len;
+	w->data_crc = (uint32_t)crc32(w->data_crc, w->out.data, (uInt)w->out.len);
 	return 0;
 }
 
@@ -113,9 +117,8 @@ static int put_record(struct mcap_writer *w)
 	}
 	switch (w->out.data[0]) {
 	case MCAP_OP_SCHEMA:
-		return mcap_index_schema(&w->index, w->out.data, w->out.len);
 	case MCAP_OP_CHANNEL:
-		return mcap_index_channel(&w->index, w->out.data, w->out.len);
+		return mcap_index_define(&w->index, w->out.data, w->out.len);
 	case MCAP_OP_ATTACHMENT:
 		return mcap_index_attachment(&w->index, offset, w->out.data, w->out.len);
 	case MCAP_OP_METADATA:
@@ -138,12 +141,14 @@ int mcap_writer_begin(struct mcap_writer *w, const char *profile, const char *li
 	return write_out(w);
 }
 
-void mcap_writer_resume(struct mcap_writer *w, uint64_t offset, struct mcap_index *index)
+void mcap_writer_resume(struct mcap_writer *w, uint64_t offset, uint32_t data_crc,
+			struct mcap_index *index)
 {
 	mcap_index_done(&w->index);
 	w->index = *index;
-	*index = (struct mcap_index){ .has_schema = NULL };
+	*index = (struct mcap_index){ .schema_at = NULL };
 	w->offset = offset;
+	w->data_crc = data_crc;
 	w->is_torn = 1;
 }
 
@@ -189,7 +194,23 @@ int mcap_writer_channel(struct mcap_writer *w, const struct mcap_channel_spec *s
 
 size_t mcap_writer_room(const struct mcap_writer *w)
 {
-	return MCAP_LIMIT_CHUNK_BYTES - w->chunk.len;
+	return MCAP_LIMIT_CHUNK_BYTES - (w->chunk.len - w->repeated_len);
+}
+
+/* Begin the open chunk with all schemas and channels, if it is time. */
+static int repeat_definitions(struct mcap_writer *w)
+{
+	if (w->chunk.len > 0 || w->offset < w->repeat_at) {
+		return 0;
+	}
+	mcap_buf_put(&w->chunk, w->index.schemas.data, w->index.schemas.len);
+	mcap_buf_put(&w->chunk, w->index.channels.data, w->index.channels.len);
+	if (w->chunk.error < 0) {
+		mcap_buf_clear(&w->chunk);
+		return -ENOMEM;
+	}
+	w->repeated_len = w->chunk.len;
+	return 0;
 }
 
 int mcap_writer_message(struct mcap_writer *w, const struct mcap_message *m)
@@ -200,9 +221,13 @@ int mcap_writer_message(struct mcap_writer *w, const struct mcap_message *m)
 	if (whole > mcap_writer_room(w)) {
 		return -ENOBUFS;
 	}
-	at = mcap_buf_grow(&w->chunk, whole);
+	at = repeat_definitions(w) == 0 ? mcap_buf_grow(&w->chunk, whole) : NULL;
 	if (at == NULL) {
-		w->chunk.error = 0; /* what is in it is still good */
+		w->chunk.error = 0; /* the messages in it are still good */
+		if (w->chunk.len == w->repeated_len) {
+			w->chunk.len = 0;
+			w->repeated_len = 0;
+		}
 		return -ENOMEM;
 	}
 	at[0] = MCAP_OP_MESSAGE;
@@ -248,6 +273,10 @@ int mcap_writer_close_chunk(struct mcap_writer *w)
 		return r;
 	}
 	mcap_buf_clear(&w->chunk);
+	if (w->repeated_len > 0) {
+		w->repeat_at = w->offset + (uint64_t)MCAP_REPEAT_FACTOR * w->repeated_len;
+		w->repeated_len = 0;
+	}
 	return mcap_index_chunk(&w->index, &place, w->messages);
 }
 
@@ -294,12 +323,6 @@ int mcap_writer_attachment(struct mcap_writer *w, const char *name, const char *
 	return put_record(w);
 }
 
-int mcap_writer_note(struct mcap_writer *w, const uint8_t *record, size_t record_len)
-{
-	return record[0] == MCAP_OP_SCHEMA ? mcap_index_schema(&w->index, record, record_len)
-					   : mcap_index_channel(&w->index, record, record_len);
-}
-
 int mcap_writer_copy(struct mcap_writer *w, const uint8_t *record, size_t record_len)
 {
 	mcap_buf_clear(&w->out);
@@ -343,14 +366,16 @@ int mcap_writer_sync(struct mcap_writer *w)
 int mcap_writer_finish(struct mcap_writer *w)
 {
 	uint64_t data_end;
+	uint32_t data_crc;
 	int r = mcap_writer_close_chunk(w);
 
 	if (r < 0) {
 		return r;
 	}
 	data_end = w->offset;
+	data_crc = w->data_crc;
 	mcap_buf_clear(&w->out);
-	mcap_summary_put(&w->index, data_end, &w->out);
+	mcap_summary_put(&w->index, data_end, data_crc, &w->out);
 	r = write_out(w);
 	if (r < 0) {
 		return r;
@@ -358,6 +383,7 @@ int mcap_writer_finish(struct mcap_writer *w)
 	r = mcap_writer_sync(w);
 	if (r < 0) {
 		w->offset = data_end;
+		w->data_crc = data_crc;
 		w->is_torn = 1;
 		repair(w);
 	}

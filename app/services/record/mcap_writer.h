@@ -4,6 +4,12 @@
  * every other record goes out at once. A failed write leaves the file cut back to its last whole
  * record (or is cut before the next write) and the writer as it was: the caller may try again,
  * nothing in the chunk is lost. Context of all functions: blocking.
+ *
+ * Schemas and channels are in the head of the file, in the summary, and again in chunks: in the
+ * first one, then in one whenever the file has grown by MCAP_REPEAT_FACTOR times their size. So a
+ * destroyed head costs no message even where there is no summary, in our recovery and in others'
+ * that go from chunk to chunk; the price is less than 2 % of the file. Every sync would cost ten
+ * times as much in a slow recording, and the first chunk alone may be in the same bad block.
  */
 #ifndef RECORD_MCAP_WRITER_H
 #define RECORD_MCAP_WRITER_H
@@ -43,9 +49,10 @@ void mcap_writer_destroy(struct mcap_writer *w);
 
 /** Magic and header: first of all. 0 or -errno of the I/O. */
 int mcap_writer_begin(struct mcap_writer *w, const char *profile, const char *library);
-/** Continue a file that ends in a complete record at @offset and contains what @index lists; @index
- * is moved in. */
-void mcap_writer_resume(struct mcap_writer *w, uint64_t offset, struct mcap_index *index);
+/** Continue a file that ends in a complete record at @offset, has the CRC @data_crc up to there,
+ * and contains what @index lists; @index is moved in. */
+void mcap_writer_resume(struct mcap_writer *w, uint64_t offset, uint32_t data_crc,
+			struct mcap_index *index);
 
 /** Add a schema. Its id (from 1 on) or -errno. */
 int mcap_writer_schema(struct mcap_writer *w, const char *name, const char *encoding,
@@ -58,6 +65,7 @@ int mcap_writer_message(struct mcap_writer *w, const struct mcap_message *m);
 /** Bytes that messages can still take in the open chunk; each takes its data plus
  * MCAP_MESSAGE_COST_BYTES. */
 size_t mcap_writer_room(const struct mcap_writer *w);
+#define MCAP_REPEAT_FACTOR 64
 #define MCAP_MESSAGE_COST_BYTES ((size_t)MCAP_HEAD_BYTES + MCAP_MESSAGE_HEAD_BYTES)
 /** Write the open chunk and its message index; an empty one is nothing. 0 or -errno: it stays open.
  */
@@ -70,8 +78,6 @@ int mcap_writer_attachment(struct mcap_writer *w, const char *name, const char *
 
 /** Append @record as it is, and note it in the index: for copying what a reader found whole. */
 int mcap_writer_copy(struct mcap_writer *w, const uint8_t *record, size_t record_len);
-/** Note a schema or channel record inside a chunk that is copied. */
-int mcap_writer_note(struct mcap_writer *w, const uint8_t *record, size_t record_len);
 /** Append the chunk record @record with the index built from its content. */
 int mcap_writer_copy_chunk(struct mcap_writer *w, const uint8_t *record, size_t record_len,
 			   const char *compression, size_t uncompressed_len,

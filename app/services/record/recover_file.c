@@ -27,6 +27,7 @@ static int put_note(struct mcap_writer *w, const struct recover_outcome *o)
 		{ "chunks", chunks },
 		{ "lost_bytes", lost_bytes },
 		{ "damaged_records", damaged },
+		{ "first_damage", o->found.reason != NULL ? o->found.reason : "" },
 	};
 
 	snprintf(last, sizeof(last), "%" PRIu64, o->track.last_cycle);
@@ -107,7 +108,8 @@ int recover_in_place(const char *path, struct recover_outcome *ret_outcome)
 	return r;
 }
 
-static int copy_to(int *fd, const char *output, const struct recover_outcome *o)
+static int copy_to(int *fd, const struct mcap_scan *scan, const char *output,
+		   const struct recover_outcome *o)
 {
 	struct mcap_source source;
 	struct mcap_writer *w;
@@ -122,7 +124,7 @@ static int copy_to(int *fd, const char *output, const struct recover_outcome *o)
 	r = mcap_writer_create(&io, 0, &w);
 	if (r == 0) {
 		r = file_source(fd, &source);
-		r = r < 0 ? r : mcap_copy_whole(&source, w);
+		r = r < 0 ? r : mcap_copy_whole(&source, scan, w);
 		r = r < 0 ? r : note_and_finish(w, o);
 		mcap_writer_destroy(w);
 	}
@@ -147,8 +149,8 @@ int recover_copy(const char *path, const char *output, struct recover_outcome *r
 	}
 	r = look(&fd, &o, &scan);
 	if (r == 0) {
+		r = copy_to(&fd, scan, output, &o);
 		mcap_scan_destroy(scan);
-		r = copy_to(&fd, output, &o);
 	}
 	close(fd);
 	if (r == 0) {

@@ -132,7 +132,7 @@ static void repair(struct bytes *b)
 	}
 	r = mcap_writer_create(&copy_io, 0, &w);
 	assert(r == 0);
-	if (mcap_copy_whole(&source, w) == 0) {
+	if (mcap_copy_whole(&source, scan, w) == 0) {
 		r = mcap_writer_finish(w);
 		assert(r == 0);
 		check_whole(&copy, mcap_writer_index(w)->messages);

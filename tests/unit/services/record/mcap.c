@@ -191,7 +191,9 @@ static struct sample_findings copy_and_read(struct memory_file *f)
 	struct sample_findings found = { .chunks = 0 };
 
 	CHECK_EQ(mcap_writer_create(&io, 0, &w), 0);
-	CHECK_EQ(mcap_copy_whole(&source, w), 0);
+	CHECK_EQ(mcap_scan_create(&source, NULL, &scan), 0);
+	CHECK_EQ(mcap_copy_whole(&source, scan, w), 0);
+	mcap_scan_destroy(scan);
 	CHECK_EQ(mcap_writer_finish(w), 0);
 	mcap_writer_destroy(w);
 	copied = memory_source(&copy, copy.len);
