@@ -76,6 +76,7 @@ enum exit_code verb_status(struct cli *cli, int argc, char **argv);
 enum exit_code verb_stop(struct cli *cli, int argc, char **argv);
 enum exit_code verb_sync0(struct cli *cli, int argc, char **argv);
 enum exit_code verb_top(struct cli *cli, int argc, char **argv);
+enum exit_code verb_topology(struct cli *cli, int argc, char **argv);
 enum exit_code verb_voe(struct cli *cli, int argc, char **argv);
 enum exit_code verb_watch(struct cli *cli, int argc, char **argv);
 

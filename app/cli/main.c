@@ -74,6 +74,12 @@ static const struct verb verbs[] = {
 	{ "top", "", "The same, live. Ends with q, Ctrl-C, or when ecdaqd ends.",
 	  "Where standard output is not a terminal it prints one line per interval.\n", verb_top },
 	{ "slaves", "", "The slaves: position, alias, AL state, name, device.", NULL, verb_slaves },
+	{ "topology", "[SLAVE...]", "The tree of ports, with states and delays.",
+	  "at: position and port of the slave before it. cable: propagation delay, one way. "
+	  "clock:\n"
+	  "delay behind the reference clock. With SLAVE: it, and what is behind it.\n"
+	  "ecdaq topology --dot | dot -Tsvg > bus.svg\n",
+	  verb_topology },
 	{ "channels", "", "The channel table: what the process image contains.", NULL,
 	  verb_channels },
 	{ "watch", "CHANNEL...", "Values of channels in every cycle.",

@@ -7,9 +7,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cli/hex.h"
 #include "reader/page.h"
 
 enum { PROBLEM_BYTES = 128 };
+
+#define ALIAS_PREFIX "alias:"
 
 enum exit_code source_fail_open(const struct cli *cli, const char *path, int err)
 {
@@ -217,6 +220,34 @@ struct slave_info source_slave(const struct status_page *page, uint32_t index)
 	return page->slave[index].info;
 }
 
+/* "alias:1001" */
+static enum exit_code find_alias(const struct cli *cli, const struct status_page *page,
+				 const char *text, uint16_t *ret_pos)
+{
+	const char *number = text + strlen(ALIAS_PREFIX);
+	uint32_t count = source_slave_count(page);
+	unsigned found = 0;
+	uint32_t alias;
+
+	if (hex_number(number, UINT16_MAX, &alias) < 0 || alias == 0) {
+		return cli_fail(cli, EXIT_CODE_FAILED, "%s: expected an alias, 1 to 65535", text);
+	}
+	for (uint32_t i = count; i-- > 0;) {
+		if (source_slave(page, i).alias == alias) {
+			*ret_pos = (uint16_t)i;
+			found++;
+		}
+	}
+	if (found == 0) {
+		return cli_fail(cli, EXIT_CODE_FAILED,
+				"%s: no slave has this alias (see ecdaq slaves)", text);
+	}
+	return found == 1 ? EXIT_CODE_OK
+			  : cli_fail(cli, EXIT_CODE_FAILED,
+				     "%s: %u slaves have this alias: use name or position", text,
+				     found);
+}
+
 enum exit_code source_find_slave(const struct cli *cli, const struct status_page *page,
 				 const char *text, uint16_t *ret_pos)
 {
@@ -230,6 +261,9 @@ enum exit_code source_find_slave(const struct cli *cli, const struct status_page
 			return EXIT_CODE_OK;
 		}
 	}
+	if (strncmp(text, ALIAS_PREFIX, strlen(ALIAS_PREFIX)) == 0) {
+		return find_alias(cli, page, text, ret_pos);
+	}
 	errno = 0;
 	pos = strtoul(text, &end, 10);
 	if (text[0] < '0' || text[0] > '9' || *end != '\0' || errno != 0) {
@@ -242,6 +276,31 @@ enum exit_code source_find_slave(const struct cli *cli, const struct status_page
 	}
 	*ret_pos = (uint16_t)pos;
 	return EXIT_CODE_OK;
+}
+
+enum exit_code source_each_slave(const struct cli *cli, const struct status_page *page,
+				 const struct args *args,
+				 enum exit_code (*run)(void *ctx, uint16_t pos), void *ctx)
+{
+	int is_all = args->operand_count == 0;
+	uint32_t count = is_all ? source_slave_count(page) : (uint32_t)args->operand_count;
+	enum exit_code first = EXIT_CODE_OK;
+
+	for (uint32_t i = 0; i < count; i++) {
+		uint16_t pos = (uint16_t)i;
+		enum exit_code result =
+			is_all ? EXIT_CODE_OK
+			       : source_find_slave(cli, page, args->operands[i], &pos);
+
+		if (result == EXIT_CODE_OK) {
+			result = run(ctx, pos);
+		}
+		first = first == EXIT_CODE_OK ? result : first;
+		if (result == EXIT_CODE_NO_DAEMON || result == EXIT_CODE_PERMISSION) {
+			break;
+		}
+	}
+	return first;
 }
 
 enum exit_code source_slave_pos(struct cli *cli, const char *text, uint16_t *ret_pos)

@@ -16,6 +16,31 @@
 #include "wire/al.h"
 #include "wire/sii.h"
 
+/* Of slave 0: mailboxes, outputs at logical 0, inputs at 18, one that is off. */
+static void make_mapping(struct fake *f)
+{
+	static const struct {
+		uint16_t at;
+		uint8_t bytes[16];
+	} registers[] = {
+		{ 0x0004, { 3, 4 } },
+		{ 0x0600, { 0, 0, 0, 0, 9, 0, 0, 7, 0x00, 0x11, 0, 2, 1 } },
+		{ 0x0610, { 18, 0, 0, 0, 13, 0, 0, 7, 0x80, 0x11, 0, 1, 1 } },
+		{ 0x0620, { 31, 0, 0, 0, 13, 0, 0, 7, 0x80, 0x11, 0, 1, 0 } },
+		{ 0x0800, { 0x00, 0x10, 0x80, 0, 0x26, 0, 1 } },
+		{ 0x0808, { 0x80, 0x10, 0x80, 0, 0x22, 0, 1 } },
+		{ 0x0810, { 0x00, 0x11, 9, 0, 0x64, 0, 1 } },
+		{ 0x0818, { 0x80, 0x11, 13, 0, 0x20, 0, 0 } },
+	};
+
+	for (size_t i = 0; i < sizeof(registers) / sizeof(registers[0]); i++) {
+		memcpy(f->reg + registers[i].at, registers[i].bytes,
+		       registers[i].at == 0x0004  ? 2
+		       : registers[i].at < 0x0800 ? 16
+						  : 8);
+	}
+}
+
 void fake_listen(struct fake *f)
 {
 	struct sockaddr_un address = { .sun_family = AF_UNIX };
@@ -23,6 +48,7 @@ void fake_listen(struct fake *f)
 	f->listener = -1;
 	f->reg[0x0130] = AL_OP;
 	f->reg[0x0301] = 7;
+	make_mapping(f);
 	for (unsigned i = 0; i < SII_BYTES; i++) {
 		f->sii[i] = (uint8_t)(i * 5 + i / 256);
 	}
@@ -241,7 +267,7 @@ static void answer_sii(struct fake *f, const struct admin_request *rq, struct ad
 	}
 }
 
-static void answer_diagnosis(const struct fake *f, const struct admin_request *rq,
+static void answer_diagnosis(struct fake *f, const struct admin_request *rq,
 			     struct admin_reply *reply)
 {
 	struct admin_diagnosis found = { .port[0] = { .is_link = 1,
@@ -262,7 +288,29 @@ static void answer_diagnosis(const struct fake *f, const struct admin_request *r
 		refuse(reply, -EIO, "slave 1: no frame came back");
 		return;
 	}
+	if (f->is_noisy) {
+		f->noise = (uint8_t)(f->noise < 250 ? f->noise + 2 : 2);
+		found.port[1] = (struct admin_port){ .is_link = 1,
+						     .is_communicating = 1,
+						     .rx_errors = f->noise };
+	}
 	give(reply, &found, sizeof(found));
+}
+
+/* What is about one slave's objects. */
+static void answer_coe(struct fake *f, const struct admin_request *rq, struct admin_reply *reply)
+{
+	if (rq->verb == ADMIN_SDO_READ) {
+		answer_read(f, rq, reply);
+	} else if (rq->verb == ADMIN_SDO_WRITE) {
+		answer_write(f, rq, reply);
+	} else if (rq->verb == ADMIN_SDO_LIST) {
+		answer_list(reply);
+	} else if (rq->verb == ADMIN_SDO_OBJECT) {
+		answer_object(rq, reply);
+	} else {
+		answer_entry(rq, reply);
+	}
 }
 
 static void answer(struct fake *f, const struct admin_request *rq, struct admin_reply *reply)
@@ -278,12 +326,6 @@ static void answer(struct fake *f, const struct admin_request *rq, struct admin_
 		break;
 	case ADMIN_ONESHOT:
 		answer_oneshot(f, rq, reply);
-		break;
-	case ADMIN_SDO_READ:
-		answer_read(f, rq, reply);
-		break;
-	case ADMIN_SDO_WRITE:
-		answer_write(f, rq, reply);
 		break;
 	case ADMIN_STOP:
 		f->is_stopped = 1;
@@ -312,14 +354,12 @@ static void answer(struct fake *f, const struct admin_request *rq, struct admin_
 	case ADMIN_ERRORS_RESET:
 		f->reg[0x0301] = 0;
 		break;
+	case ADMIN_SDO_READ:
+	case ADMIN_SDO_WRITE:
 	case ADMIN_SDO_LIST:
-		answer_list(reply);
-		break;
 	case ADMIN_SDO_OBJECT:
-		answer_object(rq, reply);
-		break;
 	case ADMIN_SDO_ENTRY:
-		answer_entry(rq, reply);
+		answer_coe(f, rq, reply);
 		break;
 	case ADMIN_SOE_READ:
 	case ADMIN_SOE_WRITE:

@@ -6,10 +6,10 @@
  * input, by `ecdaq stop`, or by SIGKILL.
  *
  * usage: test_fake_daemon RUN_DIR [SPEED=N] [JUMP=1] [RECORDER=0] [ADMIN=mute|garbage|none]
- * [MODE=octal] [SLAVES=N] [FAULTS=N] [BEYOND=N] [DEGRADED=BITS] JUMP: every hundredth cycle number
- * is followed by a gap of five. Each 64th frame is lost. The admin socket: piccolo1.led belongs to
- * the control program; objects 0x1018:1, 0x1008:0, 0x8000:2 exist, 0x8000:1 cannot be written now;
- * a one-shot time must be in the future.
+ * [MODE=octal] [SLAVES=N] [BRANCHES=1] [BITS=1] [NOISY=1] [ALIAS=N] [FAULTS=N] [BEYOND=N]
+ * [DEGRADED=BITS] JUMP: every hundredth cycle number is followed by a gap of five. Each 64th frame
+ * is lost. The admin socket: piccolo1.led belongs to the control program; objects 0x1018:1,
+ * 0x1008:0, 0x8000:2 exist, 0x8000:1 cannot be written now; a one-shot time must be in the future.
  */
 #include <errno.h>
 #include <math.h>
@@ -118,6 +118,15 @@ static void parse(struct fake *f, int argc, char **argv)
 			f->slaves = (unsigned)strtoul(value, NULL, 10);
 		} else if (strcmp(argv[i], "LONG") == 0) {
 			f->has_long_names = value[0] == '1';
+		} else if (strcmp(argv[i], "BRANCHES") == 0) {
+			f->has_branches = value[0] == '1';
+			f->slaves = 5;
+		} else if (strcmp(argv[i], "ALIAS") == 0) {
+			f->alias = (unsigned)strtoul(value, NULL, 10);
+		} else if (strcmp(argv[i], "BITS") == 0) {
+			f->has_bits = value[0] == '1';
+		} else if (strcmp(argv[i], "NOISY") == 0) {
+			f->is_noisy = value[0] == '1';
 		} else if (strcmp(argv[i], "BEYOND") == 0) {
 			f->beyond = strtol(value, NULL, 10);
 		} else if (strcmp(argv[i], "FAULTS") == 0) {

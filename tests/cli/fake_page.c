@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "base/slave_place.h"
 #include "base/sync0.h"
 #include "fake.h"
 #include "wire/al.h"
@@ -31,6 +32,32 @@ void fake_die(const char *what, int err)
 {
 	fprintf(stderr, "test_fake_daemon: %s: %s\n", what, strerror(err));
 	exit(1);
+}
+
+/* 11 bits and 13 across a byte's border, 8 without a channel; names that C makes the same; one
+ * channel over another. */
+static void make_bits(struct channel *ch)
+{
+	ch[2].bit_len = 11;
+	ch[3].type = CHANNEL_INT;
+	ch[3].bit_len = 13;
+	ch[3].bit_offset -= 5;
+	ch[4].type = CHANNEL_FLOAT;
+	snprintf(ch[2].name, sizeof(ch[2].name), "piccolo0.a b");
+	snprintf(ch[3].name, sizeof(ch[3].name), "piccolo0.a-b");
+	ch[ENTRIES + 5].bit_offset = ch[ENTRIES + 4].bit_offset + 3;
+}
+
+static void describe_more(struct fake *f)
+{
+	struct channel *adc = &f->meta.channel[2];
+
+	if (f->has_bits) {
+		make_bits(f->meta.channel);
+	}
+	/* The first in volts, the second in counts. */
+	adc->scale = 3.3 / 4096;
+	snprintf(adc->unit, sizeof(adc->unit), "V");
 }
 
 void fake_describe(struct fake *f)
@@ -68,6 +95,9 @@ void fake_describe(struct fake *f)
 			.revision = 0x0258008d,
 			.slave_pos = (uint16_t)s,
 			.station_addr = (uint16_t)(0x1001 + s),
+			.alias = (uint16_t)(f->alias > 0 ? f->alias
+					    : s == 1     ? 1001
+							 : 0),
 			.has_dc = 1,
 			.is_dc_reference = s == 0,
 			.dc_delay_ns = (int32_t)s * 310,
@@ -96,9 +126,7 @@ void fake_describe(struct fake *f)
 			snprintf(ch->name, sizeof(ch->name), "piccolo%u.%s", s, entries[e].name);
 		}
 	}
-	/* The first in volts, the second in counts. */
-	f->meta.channel[2].scale = 3.3 / 4096;
-	snprintf(f->meta.channel[2].unit, sizeof(f->meta.channel[2].unit), "V");
+	describe_more(f);
 }
 
 static void describe_control(struct control_status *control, unsigned calls)
@@ -118,6 +146,27 @@ static void describe_control(struct control_status *control, unsigned calls)
 	for (unsigned i = 0; i < calls; i++) {
 		histogram_add(&control->time, i < 2 ? 300000 : 5000);
 	}
+}
+
+/* A line; or two and two slaves behind ports 3 and 1 of the first. */
+static void show_place(const struct fake *f, unsigned pos)
+{
+	struct slave_status *slave = &f->page->slave[pos];
+	struct slave_place place = {
+		.is_known = 1,
+		.parent = (int)pos - 1,
+		.parent_port = pos > 0,
+		.open_ports = pos + 1 < f->slaves ? 3 : 1,
+	};
+
+	if (f->has_branches) {
+		snprintf(slave->info.name, sizeof(slave->info.name), "piccolo%u", pos);
+		place.parent = pos == 3 ? 0 : place.parent;
+		place.parent_port = pos == 1 ? 3 : place.parent_port;
+		place.open_ports = pos == 0 ? 0xb : pos % 2 == 1 ? 3 : 1;
+	}
+	slave->place = slave_place_pack(&place);
+	slave->cable_ns = pos == 0 ? -1 : 310;
 }
 
 void fake_make_status(struct fake *f)
@@ -161,6 +210,9 @@ void fake_make_status(struct fake *f)
 		memset(name, 'n', sizeof(page->slave[s].info.name) - 1);
 		page->slave[s].al_state = AL_SAFEOP | AL_ERROR;
 		page->slave[s].al_status_code = 0x002d;
+	}
+	for (unsigned s = 0; s < f->slaves && s < LIMIT_SLAVES; s++) {
+		show_place(f, s);
 	}
 	describe_control(&page->control, f->control);
 	page->slave[1].dc_diff_ns = -7;

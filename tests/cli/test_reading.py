@@ -143,7 +143,7 @@ def test_status_works_after_the_end_and_is_marked(
 def test_slaves_lists_them(daemon: Fake) -> None:
     lines = works(daemon("slaves")).splitlines()
     assert len(lines) == 2
-    assert re.match(r" 1  0:1  OP +\+ +piccolo1 +FB1111-Piccolo \?$", lines[1])
+    assert re.match(r" 1  1001:1  OP +\+ +piccolo1 +FB1111-Piccolo \?$", lines[1])
     assert "product          0x04570862" in works(daemon("slaves", "-v"))
     slaves = json_of(daemon("slaves", "--json"))
     assert [s["product"] for s in slaves] == [0x04570862, 0x04570862]

@@ -118,6 +118,8 @@ struct slave_status {
 	_Atomic uint32_t output_sync_type;    /* 0x1C32:01; 0: free run, or no such object */
 	_Atomic uint32_t input_sync_type;     /* 0x1C33:01 */
 	_Atomic uint32_t minimum_cycle_ns;    /* 0x1C32:05, 0x1C33:05, the larger; 0: not given */
+	_Atomic uint32_t place;               /* base/slave_place.h; 0: not known */
+	_Atomic int32_t cable_ns;             /* one way, from the slave before it; -1: not known */
 };
 
 struct status_page {

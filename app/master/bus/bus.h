@@ -146,6 +146,9 @@ void bus_clear_alarms(struct bus *bus);
 /* --- what was found; valid after bus_map() (slaves: after bus_scan()) --- */
 
 const struct slave_info *bus_slaves(const struct bus *bus, size_t *ret_count);
+/** Write to @page (its slave[] entries) where each slave is in the tree of ports, and the delays of
+ * the cables once bus_dc_setup() has measured them. */
+void bus_show_places(const struct bus *bus, struct status_page *page);
 const struct channel *bus_channels(const struct bus *bus, size_t *ret_count);
 const struct exchange_plan *bus_plan(const struct bus *bus);
 /** What the cyclic frames need of the period; valid after bus_dc_setup(). */

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "base/bytes.h"
+#include "base/slave_place.h"
 #include "bus/bus_internal.h"
 #include "bus/registers.h"
 
@@ -125,6 +126,45 @@ static int solve(struct bus *bus)
 				"port, or a slave added or removed during the scan");
 	}
 	return 0;
+}
+
+/* 1 if its receive times were latched; a port that is closed has none. */
+static int is_latched(const struct dc_node *n)
+{
+	uint32_t any = 0;
+
+	for (unsigned i = 0; i < DC_PORTS; i++) {
+		any |= n->time_ns[i];
+	}
+	return n->kind != CLOCK_NONE && any != 0;
+}
+
+void bus_show_places(const struct bus *bus, struct status_page *page)
+{
+	struct dc_node node[LIMIT_SLAVES];
+	int r;
+
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		node[i] = bus->slave[i].clock;
+	}
+	r = dc_topology_solve(node, bus->slave_count);
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		const struct dc_node *n = &node[i];
+		const struct slave_place place = {
+			.is_known = r != -EPROTO,
+			.parent = n->parent,
+			.parent_port = n->parent_port,
+			.entry_port = n->entry_port,
+			.open_ports = n->ports,
+		};
+		int is_measured = r != -EPROTO && n->parent >= 0 && is_latched(&node[n->parent]);
+
+		atomic_store_explicit(&page->slave[i].place, slave_place_pack(&place),
+				      memory_order_relaxed);
+		atomic_store_explicit(&page->slave[i].cable_ns,
+				      is_measured ? (int32_t)n->cable_ns : -1,
+				      memory_order_relaxed);
+	}
 }
 
 static int set_clocks(struct bus *bus)

@@ -87,6 +87,7 @@ static int find_parents(struct dc_node *node, size_t count)
 		struct dc_node *n = &node[i];
 
 		n->entry_port = find_entry_port(n);
+		n->cable_ns = -1;
 		while (depth > 0 && free_port[depth - 1] == node[stack[depth - 1]].entry_port) {
 			depth--;
 		}
@@ -171,6 +172,10 @@ static void solve_branch(struct dc_node *node, size_t count, size_t parent, uint
 	for (size_t i = 0; i < tour.met_count; i++) {
 		struct dc_node *n = &node[tour.met[i]];
 
+		/* Slaves without clocks between: how it is shared among the cables is not known. */
+		if (n->parent == (int)parent) {
+			n->cable_ns = wire_ns / (int64_t)tour.hops;
+		}
 		n->arrival_ns = start_ns + loops_ns +
 				wire_ns * (int64_t)tour.hops_before[i] / (int64_t)tour.hops;
 		loops_ns += loop_ns(n);

@@ -26,6 +26,7 @@ struct dc_node {
 	int parent; /* position; -1: the master */
 	uint8_t entry_port;
 	uint8_t parent_port;
+	int64_t cable_ns;   /* one way, from the parent; -1: one of the two has no receive times */
 	int64_t arrival_ns; /* after the frame came to the first clock */
 	int64_t delay_ns;   /* after it came to the reference clock; 0 on the reference */
 };

@@ -100,6 +100,7 @@ static void show_slaves(struct session *s)
 	for (size_t i = 0; i < count && i < LIMIT_SLAVES; i++) {
 		s->run.page->slave[i].info = slaves[i];
 	}
+	bus_show_places(s->bus, s->run.page);
 	atomic_store_explicit(&s->run.page->slave_count, (uint32_t)count, memory_order_release);
 }
 

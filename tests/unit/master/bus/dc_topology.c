@@ -27,6 +27,9 @@ TEST(dc_topology, captured_bus_gives_the_delays_seen)
 	CHECK_EQ(n[2].delay_ns, 300);
 	CHECK_EQ(n[2].parent, 1);
 	CHECK_EQ(n[2].parent_port, 1);
+	CHECK_EQ(n[0].cable_ns, -1);
+	CHECK_EQ(n[1].cable_ns, 145);
+	CHECK_EQ(n[2].cable_ns, 155);
 }
 
 /* T13 */
@@ -57,6 +60,8 @@ TEST(dc_topology, slave_without_clock_between_is_stepped_over)
 	CHECK_EQ(dc_topology_solve(n, 3), 0);
 	CHECK_EQ(n[1].delay_ns, 0);
 	CHECK_EQ(n[2].delay_ns, 450);
+	CHECK_EQ(n[1].cable_ns, -1);
+	CHECK_EQ(n[2].cable_ns, -1);
 }
 
 TEST(dc_topology, slave_with_receive_times_only_is_never_the_reference)
