@@ -57,6 +57,8 @@ enum exit_code verb_aoe(struct cli *cli, int argc, char **argv);
 enum exit_code verb_channels(struct cli *cli, int argc, char **argv);
 enum exit_code verb_clear(struct cli *cli, int argc, char **argv);
 enum exit_code verb_crc(struct cli *cli, int argc, char **argv);
+enum exit_code verb_cstruct(struct cli *cli, int argc, char **argv);
+enum exit_code verb_data(struct cli *cli, int argc, char **argv);
 enum exit_code verb_doctor(struct cli *cli, int argc, char **argv);
 enum exit_code verb_eoe(struct cli *cli, int argc, char **argv);
 enum exit_code verb_events(struct cli *cli, int argc, char **argv);

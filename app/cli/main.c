@@ -82,6 +82,12 @@ static const struct verb verbs[] = {
 	  verb_topology },
 	{ "channels", "", "The channel table: what the process image contains.", NULL,
 	  verb_channels },
+	{ "data", "[SLAVE...]", "The process image as bytes, as the newest cycle had it.",
+	  "ecdaq data --inputs --output inputs.bin\n\n"
+	  "Of a SLAVE: the bytes that its channels cover.\n",
+	  verb_data },
+	{ "cstruct", "", "The process image as a C header, for gcc and clang.",
+	  "ecdaq cstruct --output image.h\n", verb_cstruct },
 	{ "watch", "CHANNEL...", "Values of channels in every cycle.",
 	  "CHANNEL may contain * and ?: 'piccolo*.adc'. A value that is not good is marked !.\n",
 	  verb_watch },
