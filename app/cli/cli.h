@@ -60,6 +60,7 @@ enum exit_code verb_crc(struct cli *cli, int argc, char **argv);
 enum exit_code verb_cstruct(struct cli *cli, int argc, char **argv);
 enum exit_code verb_data(struct cli *cli, int argc, char **argv);
 enum exit_code verb_doctor(struct cli *cli, int argc, char **argv);
+enum exit_code verb_domains(struct cli *cli, int argc, char **argv);
 enum exit_code verb_eoe(struct cli *cli, int argc, char **argv);
 enum exit_code verb_events(struct cli *cli, int argc, char **argv);
 enum exit_code verb_firmware(struct cli *cli, int argc, char **argv);

@@ -170,6 +170,10 @@ static const struct verb verbs[] = {
 	  verb_firmware },
 	{ "crc", "[SLAVE...]", "Error counters in the registers of the slaves, port by port.",
 	  "Each stops at 255. Their sums since the start of ecdaqd: ecdaq slaves -v.\n", verb_crc },
+	{ "domains", "[SLAVE...]", "The cyclic frames: datagrams, FMMUs, working counters.",
+	  "expected: with all slaves in OP. measured: in the newest frame that came back. Of each\n"
+	  "slave its SyncManagers and active FMMUs, as they are now, and what it adds.\n",
+	  verb_domains },
 	{ "events", "", "What happened, oldest first.", NULL, verb_events },
 	{ "sync0", "[calibrate]", "Results of ecdaq-sync0: the SYNC0 pulses on GPIO lines.",
 	  "calibrate: the same signal is on the first two lines: measure the noise of this "

@@ -297,6 +297,25 @@ static void answer_diagnosis(struct fake *f, const struct admin_request *rq,
 	give(reply, &found, sizeof(found));
 }
 
+/* One LRW of the image, FRMW of the system time; slave 1 has not answered. */
+static void answer_datagrams(const struct fake *f, struct admin_reply *reply)
+{
+	static const struct admin_datagram list[] = {
+		{ .command = 12, .bytes = IMAGE_BYTES, .wkc_expected = 6, .wkc = 3 },
+		{ .command = 14,
+		  .bytes = 8,
+		  .address = UINT32_C(0x09101001),
+		  .wkc_expected = ADMIN_WKC_UNKNOWN,
+		  .wkc = 2 },
+	};
+
+	if (f->page->bus_state != BUS_OP) {
+		refuse(reply, -EAGAIN, "the process data are not mapped");
+	} else {
+		give(reply, list, sizeof(list));
+	}
+}
+
 /* What is about one slave's objects. */
 static void answer_coe(struct fake *f, const struct admin_request *rq, struct admin_reply *reply)
 {
@@ -353,6 +372,9 @@ static void answer(struct fake *f, const struct admin_request *rq, struct admin_
 		break;
 	case ADMIN_ERRORS_RESET:
 		f->reg[0x0301] = 0;
+		break;
+	case ADMIN_DATAGRAMS:
+		answer_datagrams(f, reply);
 		break;
 	case ADMIN_SDO_READ:
 	case ADMIN_SDO_WRITE:

@@ -63,6 +63,7 @@ COMMANDS = [
     ["sii", "alias", "0", "5"],
     ["foe", "read", "0", "a.bin"],
     ["crc", "0"],
+    ["domains", "0"],
 ]
 
 

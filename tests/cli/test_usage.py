@@ -31,6 +31,7 @@ VERBS = {
     "foe": "read|write SLAVE NAME|FILE",
     "firmware": "SLAVE FILE",
     "crc": "[SLAVE...]",
+    "domains": "[SLAVE...]",
     "events": "",
     "sync0": "[calibrate]",
     "histogram": "wake|",
@@ -61,6 +62,7 @@ READING = [
     ["reg", "read", "0", "0x0130"],
     ["sii", "read", "0"],
     ["crc", "0"],
+    ["domains", "0"],
 ]
 
 

@@ -52,7 +52,10 @@ MODULES: dict[str, dict[str, set[str]]] = {
         "sync0": READERS,
     },
     "cli": {
-        "cli": READERS | {"wire/al.h", "wire/sii.h"} | {"wire/aoe.h", "wire/eoe.h", "wire/soe.h"}
+        "cli": READERS
+        | {"wire/al.h", "wire/sii.h"}
+        | {"wire/aoe.h", "wire/eoe.h", "wire/soe.h"}
+        | {"wire/datagram.h", "wire/fmmu.h"}
     },
     "sim": {
         "firmware": {"base", "wire"},

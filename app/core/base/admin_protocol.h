@@ -68,6 +68,8 @@ enum admin_verb {
 	ADMIN_AOE_WRITE = 29,    /* the same, data */
 	ADMIN_VOE = 30, /* slave_pos, argument[0]: vendor, [1]: vendor's type, [2] 1: no answer is
 			   waited for, data; data: the answer's type (2 bytes), then its data */
+	/* --- the cyclic frames --- */
+	ADMIN_DATAGRAMS = 31, /* data: struct admin_datagram, one each of the cyclic frames */
 };
 
 /* Every slave with a one-shot output, all in one cycle or none. */
@@ -187,6 +189,19 @@ struct admin_diagnosis {
 	uint8_t expirations_pdi;
 };
 
+#define ADMIN_WKC_UNKNOWN UINT16_C(0xffff)
+
+/* Answer of ADMIN_DATAGRAMS: one of them for each, in the order in which they are sent. */
+struct admin_datagram {
+	uint8_t command; /* enum ecat_cmd of wire/datagram.h */
+	uint8_t frame;
+	uint16_t bytes;
+	uint32_t address;      /* logical; else the register << 16 and the station address */
+	uint16_t wkc_expected; /* with all slaves in OP; ADMIN_WKC_UNKNOWN: any */
+	uint16_t wkc;          /* as it came back last; ADMIN_WKC_UNKNOWN: it did not */
+};
+
+static_assert(sizeof(struct admin_datagram) == 12, "both ends agree");
 static_assert(sizeof(struct admin_diagnosis) <= ADMIN_DATA_BYTES, "it is one message");
 static_assert(sizeof(struct admin_sdo_object) == 70, "both ends agree");
 static_assert(sizeof(struct admin_sdo_entry) == 74, "both ends agree");

@@ -372,7 +372,8 @@ static void report_sdo(const struct admin_target *t, struct admin_pending *pendi
 /* It changes something, which is an event. */
 static int is_command(enum admin_verb verb)
 {
-	return verb != ADMIN_REGISTER_READ && verb != ADMIN_SII_READ && verb != ADMIN_DIAGNOSIS;
+	return verb != ADMIN_REGISTER_READ && verb != ADMIN_SII_READ && verb != ADMIN_DIAGNOSIS &&
+	       verb != ADMIN_DATAGRAMS;
 }
 
 int admin_command_takes_frame(enum admin_verb verb)
@@ -385,7 +386,8 @@ int admin_command_takes_frame(enum admin_verb verb)
 static void run_on_bus(const struct admin_target *t, struct admin_pending *pending)
 {
 	const struct admin_request *rq = &pending->request;
-	int is_all = rq->verb == ADMIN_RESCAN || rq->slave_pos == ADMIN_ALL_SLAVES;
+	int is_all = rq->verb == ADMIN_RESCAN || rq->verb == ADMIN_DATAGRAMS ||
+		     rq->slave_pos == ADMIN_ALL_SLAVES;
 
 	if (t->bus_request == NULL) {
 		admin_pending_refuse(pending, -EBUSY, "the bus is being brought up");
@@ -469,6 +471,7 @@ void admin_command_run(const struct admin_target *target, struct admin_pending *
 	case ADMIN_SII_ALIAS:
 	case ADMIN_DIAGNOSIS:
 	case ADMIN_ERRORS_RESET:
+	case ADMIN_DATAGRAMS:
 		run_on_bus(target, pending);
 		return;
 	case ADMIN_CANCEL:

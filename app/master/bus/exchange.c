@@ -49,6 +49,8 @@ struct exchange {
 	_Atomic int is_reference_confirmed;               /* [service] sets, [cycle] takes */
 	_Atomic uint64_t mailbox_word[LIMIT_SLAVES / 64]; /* [cycle] */
 	_Atomic int64_t mailbox_sent_ns;                  /* [cycle] after the words; 0: none yet */
+	_Atomic uint16_t chunk_seen[LIMIT_CHUNKS];        /* [cycle] working counters */
+	_Atomic uint16_t seen[EXCHANGE_SEEN_KINDS];       /* [cycle] the same */
 	struct path_time path;
 	int64_t wire_ns;               /* of its frames */
 	struct exchange_result result; /* result being built; keeps the counts of a ride for the
@@ -95,6 +97,12 @@ int exchange_create(const struct exchange_plan *plan, struct line *line,
 	ex->line = line;
 	ex->transport = *line_transport(line);
 	ex->platform = *line_platform(line);
+	for (unsigned i = 0; i < LIMIT_CHUNKS; i++) {
+		atomic_init(&ex->chunk_seen[i], UINT16_MAX);
+	}
+	for (unsigned i = 0; i < EXCHANGE_SEEN_KINDS; i++) {
+		atomic_init(&ex->seen[i], UINT16_MAX);
+	}
 	ex->frame_count = exchange_frame_count(plan);
 	ex->frame = calloc(ex->frame_count, sizeof(ex->frame[0]));
 	if (ex->frame == NULL) {
@@ -181,11 +189,30 @@ static unsigned send_frames(struct exchange *ex, const uint8_t *image)
 
 /* --- back --- */
 
+static void note_wkc(struct exchange *ex, enum exchange_seen which, size_t datagram)
+{
+	if (datagram != 0) {
+		atomic_store_explicit(&ex->seen[which], exchange_wkc(ex->received, datagram),
+				      memory_order_relaxed);
+	}
+}
+
+uint16_t exchange_wkc_seen(const struct exchange *ex, enum exchange_seen which, unsigned chunk)
+{
+	if (which == EXCHANGE_SEEN_CHUNK) {
+		return chunk < LIMIT_CHUNKS
+			       ? atomic_load_explicit(&ex->chunk_seen[chunk], memory_order_relaxed)
+			       : UINT16_MAX;
+	}
+	return atomic_load_explicit(&ex->seen[which], memory_order_relaxed);
+}
+
 static void keep_inputs(struct exchange *ex, const struct exchange_part *part)
 {
 	uint16_t wkc = exchange_wkc(ex->received, part->at);
 	uint32_t skip = 0;
 
+	atomic_store_explicit(&ex->chunk_seen[part->chunk], wkc, memory_order_relaxed);
 	ex->result.wkc = (uint16_t)(ex->result.wkc + wkc);
 	if (wkc != ex->plan.chunk_wkc[part->chunk]) {
 		ex->result.status = EXCHANGE_WKC_LOW;
@@ -271,6 +298,10 @@ static void keep_frame(struct exchange *ex, unsigned number)
 	for (unsigned i = 0; i < ef->part_count; i++) {
 		keep_inputs(ex, &ef->part[i]);
 	}
+	note_wkc(ex, EXCHANGE_SEEN_DC, ef->dc);
+	note_wkc(ex, EXCHANGE_SEEN_AL, ef->al);
+	note_wkc(ex, EXCHANGE_SEEN_DIFF, ef->diff);
+	note_wkc(ex, EXCHANGE_SEEN_MAILBOXES, ef->mailboxes);
 	if (ef->dc != 0) {
 		keep_dc_time(ex, ef);
 	}

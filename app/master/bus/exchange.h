@@ -66,6 +66,21 @@ struct exchange_mailboxes {
  * Context: service thread. */
 int exchange_mailboxes(const struct exchange *ex, struct exchange_mailboxes *ret);
 
+/* The datagrams whose working counter exchange_wkc_seen() gives. */
+enum exchange_seen {
+	EXCHANGE_SEEN_NONE, /* a filler */
+	EXCHANGE_SEEN_CHUNK,
+	EXCHANGE_SEEN_DC,
+	EXCHANGE_SEEN_AL,
+	EXCHANGE_SEEN_DIFF,
+	EXCHANGE_SEEN_MAILBOXES,
+	EXCHANGE_SEEN_KINDS,
+};
+
+/** The working counter in the newest frame that came back, of process data chunk @chunk (of
+ * EXCHANGE_SEEN_CHUNK); 0xffff: none came yet. Context: any. */
+uint16_t exchange_wkc_seen(const struct exchange *ex, enum exchange_seen which, unsigned chunk);
+
 /** Everything is allocated here. Free with exchange_destroy(). */
 int exchange_create(const struct exchange_plan *plan, struct line *line,
 		    struct exchange **ret_exchange);

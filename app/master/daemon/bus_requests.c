@@ -247,7 +247,9 @@ void session_bus_request(void *ctx, struct admin_pending *pending)
 	int is_forced = pending->request.argument[1] != 0;
 
 	s->operator_at = session_now(s);
-	if (pending->request.verb == ADMIN_RESCAN) {
+	if (pending->request.verb == ADMIN_DATAGRAMS) {
+		session_list_datagrams(s, pending);
+	} else if (pending->request.verb == ADMIN_RESCAN) {
 		if (!is_forced && !s->is_held && s->bus != NULL) {
 			admin_pending_refuse(pending, -EPERM,
 					     "the bus is in operation, and a rescan stops it: "

@@ -338,6 +338,22 @@ static void take(void *ctx, struct admin_pending *pending)
 	admin_pending_complete(pending, 0);
 }
 
+TEST(admin, the_list_of_datagrams_needs_no_slave_and_is_no_event)
+{
+	struct fake fake;
+	struct admin_target target;
+	struct admin_request rq = fake_request(ADMIN_DATAGRAMS);
+
+	fake_init(&fake);
+	target = fake_target(&fake);
+	target.slave_count = 0;
+	target.bus_request = NULL; /* during a bring-up */
+	CHECK_EQ(start(&target, &rq)->reply.result, -EBUSY);
+	target.bus_request = take;
+	CHECK_EQ(start(&target, &rq)->reply.result, 0);
+	CHECK_EQ(fake.events, 0);
+}
+
 TEST(admin, requests_to_registers_and_eeproms_reach_the_bus_and_those_that_write_are_events)
 {
 	static const struct {

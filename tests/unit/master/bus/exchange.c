@@ -61,6 +61,44 @@ TEST(exchange, lost_frame_costs_the_deadline_and_leaves_the_image)
 	bench_destroy(b);
 }
 
+TEST(exchange, datagrams_are_listed_with_the_working_counters_that_came_back)
+{
+	struct exchange_plan plan = small_plan();
+	struct bench *b;
+	struct exchange_datagram list[8];
+
+	plan.monitor = 1;
+	b = bench_create(&plan);
+	CHECK_EQ(exchange_list(&plan, NULL, list, 8), 4);
+	CHECK_EQ(list[0].wkc_expected, 3);
+	CHECK_EQ(list[0].wkc, EXCHANGE_WKC_UNKNOWN);
+	CHECK_EQ(exchange_list(&plan, b->ex, list, 8), 4);
+	CHECK_EQ(list[0].wkc, EXCHANGE_WKC_UNKNOWN);
+	run(b);
+	b->lrw_wkc = 1;
+	CHECK_EQ(run(b).status, EXCHANGE_WKC_LOW);
+	CHECK_EQ(exchange_list(&plan, b->ex, list, 8), 4);
+	CHECK_EQ(list[0].command, ECAT_CMD_LRW);
+	CHECK_EQ(list[0].address, plan.logical_start);
+	CHECK_EQ(list[0].bytes, 28);
+	CHECK_EQ(list[0].wkc, 1);
+	CHECK_EQ(list[1].command, ECAT_CMD_FRMW);
+	CHECK_EQ(list[1].address, UINT32_C(0x0910) << 16 | DC_REF);
+	CHECK_EQ(list[1].wkc_expected, EXCHANGE_WKC_UNKNOWN);
+	CHECK_EQ(list[1].wkc, b->dc_wkc);
+	CHECK_EQ(list[2].command, ECAT_CMD_BRD);
+	CHECK_EQ(list[2].wkc_expected, 1);
+	CHECK_EQ(list[2].wkc, 2);
+	CHECK_EQ(list[3].address >> 16, 0x092c);
+	CHECK_EQ(exchange_list(&plan, b->ex, list, 3), -E2BIG);
+	b->wire.drop = 1;
+	b->lrw_wkc = 3;
+	CHECK_EQ(run(b).status, EXCHANGE_NO_FRAME);
+	CHECK_EQ(exchange_list(&plan, b->ex, list, 8), 4);
+	CHECK_EQ(list[0].wkc, 1);
+	bench_destroy(b);
+}
+
 TEST(exchange, frame_that_comes_a_cycle_late_is_counted_and_never_taken)
 {
 	struct exchange_plan plan = small_plan();

@@ -4,6 +4,7 @@
 #define TESTS_UNIT_BUS_EXCHANGE_BENCH_H
 
 #include "bus/exchange.h"
+#include "bus/exchange_list.h"
 #include "harness/test.h"
 #include "unit/master/link/fake_wire.h"
 #include "wire/al.h"
