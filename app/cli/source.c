@@ -135,7 +135,7 @@ static int open_samples(struct cli *cli, struct samples *ret_samples,
 	}
 	if (reader_next(samples.reader, &lost) != READER_BEGUN) {
 		r = reader_error(samples.reader);
-		if (r == -EPROTONOSUPPORT) {
+		if (r == -EPROTONOSUPPORT || r == -E2BIG) {
 			snprintf(ret_problem, PROBLEM_BYTES, "%s", reader_problem(samples.reader));
 		}
 		samples_close(&samples);

@@ -237,3 +237,37 @@ def test_a_folder_that_may_not_be_written_is_reported(bench: Bench) -> None:
     )  # fmt: skip
     assert ended.returncode == 4
     assert ended.stderr == f"ecdaq-record: {folder}: Permission denied\n"
+
+
+def test_values_of_a_sample_that_is_not_good_are_not_exported(bench: Bench) -> None:
+    bench.produce("--cycles", "20", "--bad", "5").wait(60)
+    bench.record_all()
+    rows = list(csv.DictReader(io.StringIO(bench.log("export", bench.folder).stdout)))
+    bad = [row for row in rows if row["piccolo1.good"] == "0"]
+    assert [row["cycle"] for row in bad] == ["0", "5", "10", "15"]
+    assert {row[f"piccolo1.{name}"] for row in bad for name in ("adc", "counter", "led")} == {""}
+    assert all(row["piccolo0.adc"] != "" for row in rows)
+    assert all(row["piccolo1.adc"] != "" for row in rows if row not in bad)
+    lines = [
+        json.loads(line) for line in bench.log("export", bench.folder, "--json").stdout.splitlines()
+    ]
+    assert [line["cycle"] for line in lines if line["piccolo1.adc"] is None] == [0, 5, 10, 15]
+    raw = list(csv.DictReader(io.StringIO(bench.log("export", bench.folder, "--raw").stdout)))
+    assert all(row["piccolo1.adc"] != "" for row in raw)
+
+
+def test_once_does_not_wait_for_a_ring_that_it_can_never_read(bench: Bench) -> None:
+    (bench.run_dir / "samples").write_bytes(bytes(range(256)) * 64)
+    process = bench.record("--once")
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert said.count("not a sample ring, or damaged") == 1
+
+
+def test_no_two_metadata_records_have_one_name(bench: Bench) -> None:
+    bench.produce("--cycles", "100").wait(60)
+    bench.record_all()
+    with bench.files()[0].open("rb") as file:
+        names = [record.name for record in make_reader(file).iter_metadata()]
+    assert len(names) == len(set(names))
+    assert {"ecdaq.timemap", "ecdaq.timemap_end"} <= set(names)

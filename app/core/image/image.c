@@ -131,6 +131,14 @@ int image_physical_to_raw(const struct channel *ch, double physical, uint64_t *r
 	if (isnan(value)) {
 		return -EINVAL;
 	}
+	if (ch->type == CHANNEL_BOOL) {
+		/* Only what scale and offset lose in a double is rounded. */
+		if (!(fabs(value) < 1e-9) && !(fabs(value - 1) < 1e-9)) {
+			return -EINVAL;
+		}
+		*ret_raw = value > 0.5;
+		return 0;
+	}
 	if (ch->type == CHANNEL_FLOAT) {
 		*ret_raw = float_to_raw(ch, value);
 		return 0;

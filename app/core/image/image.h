@@ -25,7 +25,8 @@ double image_get_physical(const uint8_t *image, const struct channel *ch);
 
 /**
  * The raw bits for @physical, rounded to nearest. 0; -ERANGE if the type cannot hold it; -EINVAL
- * for a NaN (ret untouched on failure).
+ * for a NaN, and for a BOOL that is neither 0 nor 1 (as raw): it is neither rounded nor limited
+ * (ret untouched on failure).
  */
 int image_physical_to_raw(const struct channel *ch, double physical, uint64_t *ret_raw);
 

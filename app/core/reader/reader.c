@@ -186,6 +186,7 @@ const char *reader_problem(const struct reader *r)
 const char *reader_error_to_str(int error)
 {
 	return error == -EPROTO  ? "not a sample ring, or damaged"
+	       : error == -E2BIG ? "more slaves, channels or process data than this program reads"
 	       : error == -EIO   ? "truncated or overwritten while it was read"
 	       : error == -EPIPE ? "its ecdaqd ended without closing it"
 				 : strerror(-error);

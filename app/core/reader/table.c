@@ -20,12 +20,16 @@ struct storage {
 	struct channel channels[];
 };
 
-static int head_is_consistent(const struct sample_meta *meta, size_t meta_bytes)
+static int is_within_limits(const struct sample_meta *meta)
 {
 	return meta->slave_count <= LIMIT_SLAVES && meta->channel_count <= LIMIT_CHANNELS &&
-	       meta->image_bytes <= LIMIT_IMAGE_BYTES && meta->output_bytes <= meta->image_bytes &&
-	       meta->period_ns > 0 && meta->period_ns < (uint64_t)NS_PER_S &&
-	       meta->tai_offset_s >= -TAI_OFFSET_LIMIT_S &&
+	       meta->image_bytes <= LIMIT_IMAGE_BYTES;
+}
+
+static int head_is_consistent(const struct sample_meta *meta, size_t meta_bytes)
+{
+	return meta->output_bytes <= meta->image_bytes && meta->period_ns > 0 &&
+	       meta->period_ns < (uint64_t)NS_PER_S && meta->tai_offset_s >= -TAI_OFFSET_LIMIT_S &&
 	       meta->tai_offset_s <= TAI_OFFSET_LIMIT_S &&
 	       meta_bytes >= sizeof(*meta) + meta->slave_count * sizeof(struct slave_info) +
 				     meta->channel_count * sizeof(struct channel);
@@ -102,6 +106,9 @@ int channel_table_create(const void *meta, size_t meta_bytes, struct channel_tab
 	memcpy(&head, meta, sizeof(head));
 	if (head.version != SAMPLE_VERSION) {
 		return -EPROTONOSUPPORT;
+	}
+	if (!is_within_limits(&head)) {
+		return -E2BIG;
 	}
 	if (!head_is_consistent(&head, meta_bytes)) {
 		return -EPROTO;

@@ -206,8 +206,8 @@ static inline int ecdaq_is_slave_good(const struct ecdaq_cycle *cy, unsigned sla
 
 /**
  * Set the output's physical value; it stays until it is set again. 0; 1: limited to what the
- * channel or outputs[].min and max allow; -EINVAL: not a number, the output is fail-safe from here
- * on.
+ * channel or outputs[].min and max allow; -EINVAL: not a number, or for a BOOL neither 0 nor 1, the
+ * output is fail-safe from here on.
  */
 static inline int ecdaq_set(const struct ecdaq_cycle *cy, struct ecdaq_output output,
 			    double physical)

@@ -46,6 +46,13 @@ static int configure(struct outputs *outputs, const struct cycle_spec *spec,
 		return refuse(error, error_bytes, spec->cfg, wanted,
 			      "the channel cannot hold its fail_safe value");
 	}
+	if ((isfinite(wanted->min) &&
+	     image_physical_to_raw(out->channel, wanted->min, &out->min_raw) == -EINVAL) ||
+	    (isfinite(wanted->max) &&
+	     image_physical_to_raw(out->channel, wanted->max, &out->max_raw) == -EINVAL)) {
+		return refuse(error, error_bytes, spec->cfg, wanted,
+			      "min and max of a BOOL are 0 and 1");
+	}
 	out->min = wanted->min;
 	out->max = wanted->max;
 	/* A limit the channel cannot reach is none. */

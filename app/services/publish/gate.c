@@ -205,6 +205,7 @@ static int check_item(const struct gate *gate, const struct gate_command *cmd, u
 	int index = image_channel_find(table->channels, table->meta.channel_count, cmd->channel[i]);
 	const struct channel *ch;
 	struct gate_item item;
+	char type[16];
 	int r;
 
 	if (index < 0) {
@@ -216,11 +217,16 @@ static int check_item(const struct gate *gate, const struct gate_command *cmd, u
 	if (item.output >= BOARD_OUTPUTS) {
 		return refuse(reason, -ENOENT, "%s: more than %d outputs", ch->name, BOARD_OUTPUTS);
 	}
-	if (cmd->is_raw) {
-		item.raw = cmd->raw[i];
-	} else if (image_physical_to_raw(ch, cmd->values[i], &item.raw) < 0) {
-		return refuse(reason, -ERANGE, "%s: %g is outside the range of the channel",
-			      ch->name, cmd->values[i]);
+	item.raw = cmd->is_raw ? cmd->raw[i] : 0;
+	r = cmd->is_raw ? 0 : image_physical_to_raw(ch, cmd->values[i], &item.raw);
+	if (r == -EINVAL) {
+		image_type_format(ch, type, sizeof(type));
+		return refuse(reason, r, "%s: %g is not a value of type %s", ch->name,
+			      cmd->values[i], type);
+	}
+	if (r < 0) {
+		return refuse(reason, r, "%s: %g is outside the range of the channel", ch->name,
+			      cmd->values[i]);
 	}
 	r = config_output_check(gate->cfg, ch, CONFIG_OWNER_REMOTE, item.raw, reason,
 				GATE_REASON_BYTES);

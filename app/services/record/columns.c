@@ -410,6 +410,15 @@ static void put_value(const struct columns *c, const struct column *col, FILE *o
 	}
 }
 
+/* A value of a slave that did not answer is an old one or none: the cell is empty. */
+static int has_value(const struct columns *c, const struct column *col)
+{
+	const struct topic *t = &c->topic[col->topic];
+
+	return t->is_fresh &&
+	       (c->is_raw || col->field == GOOD_FIELD || t->value[GOOD_FIELD].raw != 0);
+}
+
 static void put_json_row(const struct columns *c, FILE *out)
 {
 	fprintf(out, "{\"cycle\":%" PRIu64 ",\"utc_ns\":%" PRIu64, c->row.cycle, c->row.utc_ns);
@@ -421,7 +430,7 @@ static void put_json_row(const struct columns *c, FILE *out)
 		fputc(',', out);
 		json_put_text(out, c->column[i].name);
 		fputc(':', out);
-		if (c->topic[c->column[i].topic].is_fresh) {
+		if (has_value(c, &c->column[i])) {
 			put_value(c, &c->column[i], out);
 		} else {
 			fputs("null", out);
@@ -442,7 +451,7 @@ void columns_put_row(const struct columns *c, FILE *out)
 	}
 	for (size_t i = 0; i < c->column_count; i++) {
 		fputc(',', out);
-		if (c->topic[c->column[i].topic].is_fresh) {
+		if (has_value(c, &c->column[i])) {
 			put_value(c, &c->column[i], out);
 		}
 	}

@@ -98,6 +98,7 @@ static struct recorder_options recorder_options(const struct recording *pg)
 
 static int run(struct recorder *rec, int is_once)
 {
+	int ring_error = 0;
 	int r;
 
 	stop_catch(STOP_REPEAT_IGNORED, NULL);
@@ -105,7 +106,8 @@ static int run(struct recorder *rec, int is_once)
 	while (!stop_requested()) {
 		enum recorder_result result = recorder_step(rec);
 
-		if (result == RECORDER_ENDED && is_once) {
+		ring_error = is_once ? recorder_ring_error(rec) : 0;
+		if ((result == RECORDER_ENDED && is_once) || ring_error < 0) {
 			break;
 		}
 		stop_wait(result == RECORDER_IDLE ? IDLE_NS : 0);
@@ -114,7 +116,7 @@ static int run(struct recorder *rec, int is_once)
 	if (r < 0) {
 		error_print(program, "ended without recording all: %s", strerror(-r));
 	}
-	return r;
+	return r < 0 ? r : ring_error; /* which was told when it was found */
 }
 
 static enum exit_code code_of(int error)
@@ -146,7 +148,7 @@ static enum exit_code record(struct recording *pg, int is_once)
 	r = run(rec, is_once);
 	recorder_destroy(rec);
 	free(pg->config_text);
-	return r < 0 ? EXIT_CODE_FAILED : EXIT_CODE_OK;
+	return r < 0 ? code_of(r) : EXIT_CODE_OK;
 }
 
 int main(int argc, char **argv)

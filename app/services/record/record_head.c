@@ -196,7 +196,7 @@ static int put_session(struct mcap_writer *w, const struct record_file_spec *spe
 	return mcap_writer_metadata(w, "ecdaq.session", n.pair, n.count);
 }
 
-static int put_timemap(struct mcap_writer *w, const struct timemap_state *s)
+static int put_timemap(struct mcap_writer *w, const char *name, const struct timemap_state *s)
 {
 	struct numbers n = { .count = 0 };
 
@@ -207,7 +207,7 @@ static int put_timemap(struct mcap_writer *w, const struct timemap_state *s)
 	add_signed(&n, "step_ns", s->step_ns);
 	add_unsigned(&n, "steps", s->steps);
 	add_signed(&n, "tai_offset_s", s->tai_offset_s);
-	return mcap_writer_metadata(w, "ecdaq.timemap", n.pair, n.count);
+	return mcap_writer_metadata(w, name, n.pair, n.count);
 }
 
 static int put_config(struct mcap_writer *w, const struct record_file_spec *spec)
@@ -249,7 +249,7 @@ int record_head_put(struct mcap_writer *w, const struct record_file_spec *spec)
 	r = r < 0 ? r : put_session(w, spec);
 	r = r < 0 ? r : put_config(w, spec);
 	r = r < 0 ? r : put_json(w, spec->layout);
-	r = r < 0 ? r : put_timemap(w, spec->timemap);
+	r = r < 0 ? r : put_timemap(w, "ecdaq.timemap", spec->timemap);
 	return r < 0 ? r : put_idl(w, spec);
 }
 
@@ -257,7 +257,7 @@ int record_head_put_end(struct mcap_writer *w, const struct record_head_counts *
 			const struct record_file_end *end)
 {
 	struct numbers n = { .count = 0 };
-	int r = put_timemap(w, end->timemap);
+	int r = put_timemap(w, "ecdaq.timemap_end", end->timemap);
 
 	add_text(&n, "reason", end->reason);
 	add_unsigned(&n, "cycles", counts->cycles);

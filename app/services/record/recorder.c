@@ -178,6 +178,20 @@ static void note_ring_error(struct recorder *rec, int error, const char *problem
 	}
 }
 
+int recorder_ring_error(const struct recorder *rec)
+{
+	switch (-rec->ring_error) {
+	case EPROTO:
+	case EPROTONOSUPPORT:
+	case E2BIG:
+	case EACCES:
+	case EPERM:
+		return rec->ring_error;
+	default:
+		return 0;
+	}
+}
+
 /* Look for a session, ten times a second. */
 static void look_for_session(struct recorder *rec)
 {

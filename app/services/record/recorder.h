@@ -60,6 +60,10 @@ enum recorder_result {
 /** Do what there is to do, without waiting. */
 enum recorder_result recorder_step(struct recorder *rec);
 
+/** Why no session can be recorded though there is a ring, or the ring may not be read: a negative
+ * errno that waiting does not change; 0: none. */
+int recorder_ring_error(const struct recorder *rec);
+
 /** Record what is in the ring now, and finish the file. 0, or -errno: not all is recorded. */
 int recorder_finish(struct recorder *rec);
 

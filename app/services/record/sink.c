@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "record/clock_steps.h"
 #include "record/space.h"
 
 #define SINK_RETRY_NS NS_PER_S
@@ -30,6 +31,7 @@ struct sink {
 	const struct layout *layout; /* NULL between sessions */
 	struct timemap_state timemap;
 	int64_t now_ns; /* of the newest tick */
+	struct clock_steps steps;
 	int64_t file_opened_ns;
 	int64_t chunk_opened_ns; /* 0: the chunk is empty */
 	int64_t synced_ns;
@@ -54,6 +56,7 @@ static int close_chunk(struct sink *s);
 static int sync_file(struct sink *s);
 static int finish_file(struct sink *s, const char *reason);
 static int is_rotation_due(const struct sink *s);
+static int finish_after_step(struct sink *s);
 
 /* The newest cycle recorded; 0 before the first. */
 static uint64_t last_cycle(const struct store_state *state)
@@ -161,14 +164,11 @@ struct feed_mark sink_mark(const struct sink *s, enum sink_ring which)
 {
 	const struct store_state *resume = &s->resume;
 
-	switch (which) {
-	case SINK_EVENTS:
+	if (which == SINK_EVENTS) {
 		return (struct feed_mark){ resume->event_next, resume->event_mono_ns };
-	case SINK_SYNC0_EVENTS:
+	}
+	if (which == SINK_SYNC0_EVENTS) {
 		return (struct feed_mark){ resume->sync0_event_next, resume->sync0_event_mono_ns };
-	case SINK_SYNC0:
-	case SINK_RINGS:
-		break;
 	}
 	return (struct feed_mark){ resume->sync0_next, resume->sync0_mono_ns };
 }
@@ -282,6 +282,9 @@ static void tick_ready(struct sink *s)
 			keep_room(s, space_make(&s->space, s->file, s->space.chunk_bytes));
 		}
 	}
+	if (s->state == SINK_READY && clock_steps_is_due(&s->steps, s->now_ns)) {
+		(void)finish_after_step(s);
+	}
 	if (s->state == SINK_READY && s->file != NULL && is_rotation_due(s)) {
 		(void)finish_file(s, "rotated");
 	}
@@ -310,9 +313,7 @@ void sink_tick(struct sink *s, int64_t now_ns)
 	s->now_ns = now_ns;
 	if (s->state == SINK_READY) {
 		tick_ready(s);
-	} else if (now_ns - s->checked_ns < SINK_RETRY_NS) {
-		return;
-	} else {
+	} else if (now_ns - s->checked_ns >= SINK_RETRY_NS) {
 		s->checked_ns = now_ns;
 		if (s->state == SINK_FAILED || space_to_begin(&s->space) == 0) {
 			come_back(s);
@@ -347,8 +348,6 @@ void sink_get_status(struct sink *s, struct record_status *page)
 	set_u64(&page->files, s->files);
 	set_u64(&page->bytes_free, s->space.bytes_free);
 }
-
-/* --- the open file --- */
 
 /* Own events carry no ring sequence. */
 static int put_own_event(struct sink *s, const struct event *ev, int64_t utc_ns)
@@ -413,6 +412,7 @@ int sink_open_file(struct sink *s, uint64_t first_cycle, int64_t utc_ns)
 	s->head_bytes = record_file_bytes(s->file);
 	s->space.seen_bytes = s->head_bytes;
 	s->files++;
+	clock_steps_forget(&s->steps);
 	snprintf(s->path, sizeof(s->path), "%s", record_file_path(s->file));
 	s->file_opened_ns = s->now_ns;
 	s->synced_ns = s->now_ns;
@@ -484,11 +484,14 @@ static int is_rotation_due(const struct sink *s)
 	       record_file_is_full(s->file);
 }
 
-static void note_open(struct sink *s)
+/* Something was put into the open file, with result @r. */
+static int note_put(struct sink *s, int r)
 {
-	if (s->chunk_opened_ns == 0) {
-		s->chunk_opened_ns = s->now_ns;
+	if (r < 0) {
+		return fail(s, r, record_file_path(s->file));
 	}
+	s->chunk_opened_ns = s->chunk_opened_ns == 0 ? s->now_ns : s->chunk_opened_ns;
+	return 0;
 }
 
 int sink_sample(struct sink *s, const struct sample_header *header, const uint8_t *image,
@@ -497,10 +500,9 @@ int sink_sample(struct sink *s, const struct sample_header *header, const uint8_
 	int64_t period_ns = (int64_t)layout_meta(s->layout)->period_ns;
 	int r = record_file_sample(s->file, header, image, utc_ns > 0 ? (uint64_t)utc_ns : 0);
 
-	if (r < 0) {
-		return fail(s, r, record_file_path(s->file));
+	if (note_put(s, r) < 0) {
+		return r;
 	}
-	note_open(s);
 	if (s->resume.cycles++ == 0) {
 		s->resume.first_cycle = header->cycle;
 	}
@@ -520,10 +522,9 @@ int sink_event(struct sink *s, const struct messages_event *ev)
 {
 	int r = record_file_event(s->file, ev);
 
-	if (r < 0) {
-		return fail(s, r, record_file_path(s->file));
+	if (note_put(s, r) < 0) {
+		return r;
 	}
-	note_open(s);
 	if (ev->sequence != UINT64_MAX) {
 		s->resume.event_next = ev->sequence + 1;
 		s->resume.event_mono_ns = ev->event.mono_ns;
@@ -535,10 +536,9 @@ int sink_sync0(struct sink *s, const struct sync0_result *result, int64_t utc_ns
 {
 	int r = record_file_sync0(s->file, result, utc_ns);
 
-	if (r < 0) {
-		return fail(s, r, record_file_path(s->file));
+	if (note_put(s, r) < 0) {
+		return r;
 	}
-	note_open(s);
 	s->resume.sync0_next = sequence + 1;
 	s->resume.sync0_mono_ns = result->mono_ns;
 	return 0;
@@ -552,23 +552,29 @@ void sink_mark_sync0_event(struct sink *s, const struct event *ev, uint64_t sequ
 
 int sink_timemap(struct sink *s, const struct timemap_state *state)
 {
-	int r = 0;
+	uint64_t utc_ns = state->utc_ns > 0 ? (uint64_t)state->utc_ns : 0;
 
 	s->timemap = *state;
-	if (s->file != NULL) {
-		r = record_file_timemap(s->file, state,
-					state->utc_ns > 0 ? (uint64_t)state->utc_ns : 0);
-		note_open(s);
-	}
-	return r < 0 ? fail(s, r, record_file_path(s->file)) : 0;
+	return s->file == NULL ? 0 : note_put(s, record_file_timemap(s->file, state, utc_ns));
+}
+
+static int finish_after_step(struct sink *s)
+{
+	clock_steps_take(&s->steps, s->now_ns, s->message, sizeof(s->message));
+	s->opt.report(s->opt.report_ctx, s->message);
+	return s->file != NULL ? finish_file(s, "clock step") : 0;
 }
 
 int sink_clock_step(struct sink *s, const struct timemap_state *state)
 {
-	int r = s->file != NULL ? finish_file(s, "clock step") : 0;
+	int r;
 
+	clock_steps_note(&s->steps, state->step_ns);
+	if (s->file != NULL && !clock_steps_is_due(&s->steps, s->now_ns)) {
+		return sink_timemap(s, state);
+	}
+	r = finish_after_step(s);
 	s->timemap = *state;
-	report(s, "the host's clock took a step of %" PRId64 " ns: new file", state->step_ns);
 	return r;
 }
 

@@ -69,7 +69,8 @@ int sink_sync0(struct sink *s, const struct sync0_result *result, int64_t utc_ns
 	       uint64_t sequence);
 void sink_mark_sync0_event(struct sink *s, const struct event *ev, uint64_t sequence);
 int sink_timemap(struct sink *s, const struct timemap_state *state);
-/** UTC took a step: what follows goes to a new file, so that log times go up inside each. */
+/** UTC took a step: what follows goes to a new file, so that log times go up inside each; to the
+ * same one, in which log time waits, if a step made one less than CLOCK_STEPS_PERIOD_NS ago. */
 int sink_clock_step(struct sink *s, const struct timemap_state *state);
 
 /** Count a gap of this session. */

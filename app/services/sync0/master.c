@@ -61,7 +61,8 @@ int master_open(struct master *m)
 	if (reader_next(m->reader, &lost) != READER_BEGUN) {
 		int error = reader_error(m->reader);
 
-		return error == -EPROTO || error == -EPROTONOSUPPORT ? -EPROTO : 0;
+		return error == -EPROTO || error == -EPROTONOSUPPORT || error == -E2BIG ? -EPROTO
+											: 0;
 	}
 	/* The ring of a master that has gone says nothing of now. */
 	if (reader_is_orphaned(m->reader)) {

@@ -116,6 +116,27 @@ TEST(image, a_bool_takes_the_words_people_write)
 	CHECK_EQ(image_raw_parse(&ch, "False", &raw), 0);
 	CHECK_EQ(raw, 0);
 	CHECK_EQ(image_raw_parse(&ch, "2", &raw), -EINVAL);
+	CHECK_EQ(image_raw_parse(&ch, "0.4", &raw), -EINVAL);
+}
+
+TEST(image, a_bool_is_0_or_1_and_neither_rounded_nor_limited)
+{
+	const double wrong[] = { 0.4, 0.5, 0.6, 0.001, 0.999, 2, -1, -0.4, INFINITY, (double)NAN };
+	struct channel ch = make(CHANNEL_BOOL, 0, 1);
+	uint64_t raw = 9;
+
+	for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++) {
+		CHECK_EQ(image_physical_to_raw(&ch, wrong[i], &raw), -EINVAL);
+	}
+	CHECK_EQ(raw, 9);
+	CHECK_EQ(image_physical_to_raw(&ch, 1, &raw), 0);
+	CHECK_EQ(raw, 1);
+	CHECK_EQ(image_physical_to_raw(&ch, 0, &raw), 0);
+	CHECK_EQ(raw, 0);
+	ch.scale = 0.2; /* (0.3 - 0.1) / 0.2 is a little less than 1 in doubles */
+	ch.offset = 0.1;
+	CHECK_EQ(image_physical_to_raw(&ch, 0.3, &raw), 0);
+	CHECK_EQ(raw, 1);
 }
 
 TEST(image, a_scaled_value_goes_there_and_back)

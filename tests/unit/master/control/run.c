@@ -141,6 +141,32 @@ TEST(control, a_float_output_takes_no_infinity)
 	bench_done();
 }
 
+static int set_led_to_wanted(const struct ecdaq_cycle *cy, void *state)
+{
+	(void)state;
+	set_result = ecdaq_set(cy, led, wanted);
+	return ECDAQ_GO_ON;
+}
+
+TEST(control, a_bool_output_takes_0_and_1_only)
+{
+	static const double wrong[] = { 0.4, 0.6, 2, -1, INFINITY };
+
+	begin(set_led_to_wanted);
+	for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++) {
+		wanted = 1;
+		bench_run();
+		CHECK_EQ(set_result, 0);
+		check_output(BOARD_LED, 1, 1);
+		wanted = wrong[i];
+		bench_run();
+		CHECK_EQ(set_result, -EINVAL);
+		check_output(BOARD_LED, 0, 0);
+	}
+	CHECK_EQ(bench.status.limited, 0);
+	bench_done();
+}
+
 static int set_raw_and_release(const struct ecdaq_cycle *cy, void *state)
 {
 	(void)state;

@@ -108,9 +108,24 @@ TEST(publish_gate, values_out_of_range_and_nan_are_refused)
 
 	CHECK_EQ(ask(s, 1, 1, "s.volt", 5.001), -ERANGE);
 	CHECK_STR(s->reason, "s.volt: 5.001 is outside -5 to 5 (outputs[])");
-	CHECK_EQ(ask(s, 1, 2, "s.volt", (double)NAN), -ERANGE);
+	CHECK_EQ(ask(s, 1, 2, "s.volt", (double)NAN), -EINVAL);
 	CHECK_EQ(ask(s, 1, 3, "s.volt", 1e300), -ERANGE);
-	CHECK_EQ(ask(s, 1, 4, "s.led", 2), -ERANGE);
+}
+
+TEST(publish_gate, a_bool_output_takes_0_and_1_only)
+{
+	struct scene *s = scene();
+	static const double wrong[] = { 0.4, 0.6, 0.999, 2, -1, -0.1, 1e300 };
+
+	for (size_t i = 0; i < sizeof(wrong) / sizeof(wrong[0]); i++) {
+		CHECK_EQ(ask(s, 1, i + 1, "s.led", wrong[i]), -EINVAL);
+	}
+	CHECK_EQ(ask(s, 1, 20, "s.led", 0.4), -EINVAL);
+	CHECK_STR(s->reason, "s.led: 0.4 is not a value of type BOOL");
+	CHECK_EQ(ask(s, 1, 21, "s.led", 0), 0);
+	CHECK_EQ(s->item[0].raw, 0);
+	CHECK_EQ(ask(s, 1, 22, "s.led", 1), 0);
+	CHECK_EQ(s->item[0].raw, 1);
 }
 
 TEST(publish_gate, only_the_remote_owner_may_write_and_only_outputs)

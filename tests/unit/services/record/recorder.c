@@ -328,6 +328,7 @@ TEST(recorder, waits_for_a_ring_and_says_what_is_wrong_with_a_foreign_one)
 	bench_wait(&b, NS_PER_S);
 	CHECK_EQ(recorder_status(b.recorder)->state, RECORD_WAITING);
 	CHECK(strstr(b.said, "waiting for ") != NULL);
+	CHECK_EQ(recorder_ring_error(b.recorder), 0); /* it may come */
 	f = fopen(b.ring_path, "w");
 	CHECK(f != NULL);
 	for (int i = 0; i < 10000; i++) {
@@ -336,6 +337,7 @@ TEST(recorder, waits_for_a_ring_and_says_what_is_wrong_with_a_foreign_one)
 	fclose(f);
 	bench_wait(&b, NS_PER_S);
 	CHECK(strstr(b.said, "not a sample ring") != NULL);
+	CHECK_EQ(recorder_ring_error(b.recorder), -EPROTO); /* --once ends here */
 	bench_restart_master(&b, 300, 1);
 	bench_push(&b, 5, 5);
 	bench_wait(&b, NS_PER_S);
@@ -364,6 +366,30 @@ TEST(recorder, a_step_of_the_clock_begins_a_new_file_so_that_times_go_up_in_each
 	CHECK_EQ(t.cycles, 6000);
 	CHECK_EQ(t.gaps, 0);
 	CHECK(strstr(b.said, "took a step of -3600") != NULL);
+	bench_done(&b);
+}
+
+TEST(recorder, a_clock_that_does_not_stop_stepping_makes_a_file_in_10_s_and_loses_nothing)
+{
+	struct bench b = { .calls = 0 };
+	unsigned finished;
+	unsigned parts;
+	struct track t;
+
+	bench_init(&b, 100, 65536);
+	CHECK_EQ(bench_start(&b), 0);
+	for (uint64_t n = 0; n < 30; n++) {
+		b.tai_step_ns = n % 2 == 0 ? 0 : 3600 * NS_PER_S;
+		bench_push(&b, n * 1000, 1000);
+		bench_wait(&b, NS_PER_S);
+	}
+	CHECK_EQ(bench_stop(&b), 0);
+	t = bench_read(&b, &finished, &parts);
+	CHECK(finished >= 3 && finished <= 5);
+	CHECK_EQ(parts, 0);
+	CHECK_EQ(t.cycles, 30000);
+	CHECK_EQ(t.gaps, 0);
+	CHECK(strstr(b.said, "steps: new file") != NULL);
 	bench_done(&b);
 }
 
