@@ -8,6 +8,7 @@
 
 #include "base/clock.h"
 #include "ecdaq.h"
+#include "publish/dds_log.h"
 #include "publish/domain.h"
 #include "publish/gate.h"
 #include "ros2.h"
@@ -177,6 +178,7 @@ int topics_open(struct topics *topics, const struct config *cfg, const dds_liste
 		snprintf(error, error_bytes, "dds.peers: too many");
 		return -EIO;
 	}
+	dds_log_begin();
 	topics->domain = dds_create_domain(cfg->dds_domain, xml);
 	if (topics->domain < 0) {
 		return fail("domain", topics->domain, error, error_bytes);
@@ -193,6 +195,7 @@ void topics_close(struct topics *topics)
 {
 	if (topics->domain > 0) {
 		dds_delete(topics->domain);
+		dds_log_end();
 	}
 	memset(topics, 0, sizeof(*topics));
 }
@@ -230,6 +233,7 @@ int topics_take_command(const struct topics *topics, ecdaq_CommandV1 **ret_comma
 void topics_wait(const struct topics *topics, int64_t timeout_ns)
 {
 	(void)dds_waitset_wait(topics->waitset, NULL, 0, timeout_ns);
+	dds_log_tell();
 }
 
 uint32_t topics_reader_count(dds_entity_t writer)
