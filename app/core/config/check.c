@@ -28,7 +28,7 @@ static int line_of(const struct option_lines *lines, const char *name)
 }
 
 static int check_relations(const struct config *cfg, const struct option_lines *lines,
-			   const char **ret_key, int *ret_line, char *reason)
+			   const struct option_faults *faults)
 {
 	struct sockaddr_in6 address;
 	socklen_t address_bytes;
@@ -81,14 +81,13 @@ static int check_relations(const struct config *cfg, const struct option_lines *
 	};
 
 	for (size_t i = 0; i < sizeof(relations) / sizeof(relations[0]); i++) {
-		if (!relations[i].holds) {
-			*ret_key = relations[i].subject;
-			*ret_line = line_of(lines, relations[i].subject);
-			if (*ret_line == 0) {
-				*ret_line = line_of(lines, relations[i].other);
-			}
-			snprintf(reason, OPTION_WHY_BYTES, "%s", relations[i].reason);
-			return -EINVAL;
+		const struct relation *rel = &relations[i];
+		int line = line_of(lines, rel->subject);
+
+		if (!rel->holds &&
+		    faults->add(faults->ctx, rel->subject,
+				line != 0 ? line : line_of(lines, rel->other), rel->reason)) {
+			return 1;
 		}
 	}
 	return 0;
@@ -100,11 +99,12 @@ static int is_made_of(const char *text, const char *chars)
 }
 
 static int check_dds(const struct config *cfg, const struct option_lines *lines,
-		     const char **ret_key, int *ret_line, char *reason)
+		     const struct option_faults *faults)
 {
+	const char *key = "dds.interface";
 	const char *fault = NULL;
+	int line;
 
-	*ret_key = "dds.interface";
 	if (!cfg->dds_enable) {
 		return 0;
 	}
@@ -115,60 +115,69 @@ static int check_dds(const struct config *cfg, const struct option_lines *lines,
 	} else if (!is_made_of(cfg->dds_interface, HOST_CHARS)) {
 		fault = "is not the name of a network interface";
 	} else if (!is_made_of(cfg->dds_peers, HOST_CHARS ",")) {
-		*ret_key = "dds.peers";
+		key = "dds.peers";
 		fault = "must be addresses or host names with commas between";
 	} else if (strpbrk(cfg->dds_security, "<>&\"'${}") != NULL) {
-		*ret_key = "dds.security";
+		key = "dds.security";
 		fault = "must be a path without < > & $ { } and quotes";
 	}
 	if (fault == NULL) {
 		return 0;
 	}
-	*ret_line = line_of(lines, *ret_key);
-	if (*ret_line == 0 && cfg->dds_interface[0] == '\0') {
-		*ret_line = line_of(lines, "dds.enable");
+	line = line_of(lines, key);
+	if (line == 0 && cfg->dds_interface[0] == '\0') {
+		line = line_of(lines, "dds.enable");
 	}
-	snprintf(reason, OPTION_WHY_BYTES, "%s", fault);
-	return -EINVAL;
+	return faults->add(faults->ctx, key, line, fault);
 }
 
-static int check_slaves(const struct config *cfg, const char **ret_key, int *ret_line, char *reason)
+/* Slave @i against those before it. */
+static const char *slave_fault(const struct config *cfg, size_t i, const char **ret_key,
+			       char *reason)
+{
+	const struct config_slave *slave = &cfg->slave[i];
+
+	*ret_key = "slaves[].sync0_shift";
+	if (slave->sync0_shift_ns <= -cfg->cycle_period_ns ||
+	    slave->sync0_shift_ns >= cfg->cycle_period_ns) {
+		return "must be less than one cycle.period";
+	}
+	for (size_t j = 0; j < i; j++) {
+		if (slave->sync0_line[0] != '\0' &&
+		    strcmp(slave->sync0_line, cfg->slave[j].sync0_line) == 0) {
+			*ret_key = "slaves[].sync0_line";
+			snprintf(reason, OPTION_WHY_BYTES, "is already used by slave %zu", j);
+			return reason;
+		}
+		if (slave->name[0] != '\0' && strcmp(slave->name, cfg->slave[j].name) == 0) {
+			*ret_key = "slaves[].name";
+			snprintf(reason, OPTION_WHY_BYTES,
+				 "slaves %zu and %zu have the same name %s", j, i, slave->name);
+			return reason;
+		}
+	}
+	return NULL;
+}
+
+static int check_slaves(const struct config *cfg, const struct option_faults *faults)
 {
 	size_t sync0_lines = 0;
+	char reason[OPTION_WHY_BYTES];
 
 	for (size_t i = 0; i < cfg->slave_count; i++) {
-		const struct config_slave *slave = &cfg->slave[i];
+		const char *key = "slaves[].sync0_line";
+		const char *fault;
 
-		*ret_line = slave->line;
-		sync0_lines += slave->sync0_line[0] != '\0';
-		if (sync0_lines > LIMIT_SYNC0_LINES) {
-			*ret_key = "slaves[].sync0_line";
+		sync0_lines += cfg->slave[i].sync0_line[0] != '\0';
+		if (cfg->slave[i].sync0_line[0] != '\0' && sync0_lines == LIMIT_SYNC0_LINES + 1) {
 			snprintf(reason, OPTION_WHY_BYTES, "more than LIMIT_SYNC0_LINES = %d lines",
 				 LIMIT_SYNC0_LINES);
-			return -EINVAL;
+			fault = reason;
+		} else {
+			fault = slave_fault(cfg, i, &key, reason);
 		}
-		if (slave->sync0_shift_ns <= -cfg->cycle_period_ns ||
-		    slave->sync0_shift_ns >= cfg->cycle_period_ns) {
-			*ret_key = "slaves[].sync0_shift";
-			snprintf(reason, OPTION_WHY_BYTES, "must be less than one cycle.period");
-			return -EINVAL;
-		}
-		for (size_t j = 0; j < i && slave->sync0_line[0] != '\0'; j++) {
-			if (strcmp(slave->sync0_line, cfg->slave[j].sync0_line) == 0) {
-				*ret_key = "slaves[].sync0_line";
-				snprintf(reason, OPTION_WHY_BYTES, "is already used by slave %zu",
-					 j);
-				return -EINVAL;
-			}
-		}
-		for (size_t j = 0; j < i && slave->name[0] != '\0'; j++) {
-			if (strcmp(slave->name, cfg->slave[j].name) == 0) {
-				*ret_key = "slaves[].name";
-				snprintf(reason, OPTION_WHY_BYTES,
-					 "slaves %zu and %zu have the same name %s", j, i,
-					 slave->name);
-				return -EINVAL;
-			}
+		if (fault != NULL && faults->add(faults->ctx, key, cfg->slave[i].line, fault)) {
+			return 1;
 		}
 	}
 	return 0;
@@ -202,33 +211,44 @@ static const char *output_fault(const struct config *cfg, size_t i, const char *
 	return NULL;
 }
 
-static int check_outputs(const struct config *cfg, const char **ret_key, int *ret_line,
-			 char *reason)
+static int check_outputs(const struct config *cfg, const struct option_faults *faults)
 {
 	for (size_t i = 0; i < cfg->output_count; i++) {
-		const char *fault = output_fault(cfg, i, ret_key);
+		const char *key;
+		const char *fault = output_fault(cfg, i, &key);
 
-		if (fault != NULL) {
-			*ret_line = cfg->output[i].line;
-			snprintf(reason, OPTION_WHY_BYTES, "%s", fault);
-			return -EINVAL;
+		if (fault != NULL && faults->add(faults->ctx, key, cfg->output[i].line, fault)) {
+			return 1;
 		}
 	}
 	return 0;
 }
 
-int option_cross_check(const struct config *cfg, const struct option_lines *lines,
-		       const char **ret_key, int *ret_line, char *reason)
-{
-	int r = check_relations(cfg, lines, ret_key, ret_line, reason);
+/* Counts what it hands on. */
+struct counted {
+	const struct option_faults *faults;
+	size_t count;
+};
 
-	if (r == 0) {
-		r = check_dds(cfg, lines, ret_key, ret_line, reason);
-	}
-	if (r == 0) {
-		r = check_slaves(cfg, ret_key, ret_line, reason);
-	}
-	return r < 0 ? r : check_outputs(cfg, ret_key, ret_line, reason);
+static int count_fault(void *ctx, const char *key, int line, const char *reason)
+{
+	struct counted *counted = ctx;
+
+	counted->count++;
+	return counted->faults->add(counted->faults->ctx, key, line, reason);
+}
+
+int option_cross_check(const struct config *cfg, const struct option_lines *lines,
+		       const struct option_faults *faults)
+{
+	struct counted counted = { .faults = faults };
+	const struct option_faults all = { .add = count_fault, .ctx = &counted };
+	int is_over = check_relations(cfg, lines, &all);
+
+	is_over = is_over || check_dds(cfg, lines, &all);
+	is_over = is_over || check_slaves(cfg, &all);
+	is_over = is_over || check_outputs(cfg, &all);
+	return is_over || counted.count > 0 ? -EINVAL : 0;
 }
 
 int option_sdo_finish(const struct option_sdo *item, struct config_sdo *ret_sdo, char *reason)

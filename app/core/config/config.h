@@ -212,6 +212,24 @@ int config_set(struct config *cfg, const char *assignment, char *error, size_t e
  */
 int config_assemble(const char *path, const char *const *set, size_t set_count, struct config *cfg,
 		    char *error, size_t error_bytes);
+/* Where a configuration comes from, and what reading it reports besides its result. */
+struct config_source {
+	const char *path;       /* NULL: the defaults */
+	const char *const *set; /* "cycle.period=500us", over the file */
+	size_t set_count;
+	/** NULL: the first problem is the only one. Else every problem, one line as in @error; the
+	 * reading goes on behind it, and fails at its end. Options are checked against each other
+	 * only where there was no problem before. */
+	void (*problem)(void *ctx, const char *line);
+	/** NULL, or: @option, by its dotted name, is @text: in that line of the file; 0: set over
+	 * it. */
+	void (*seen)(void *ctx, const char *option, const char *text, int line);
+	void *ctx;
+};
+
+/** config_assemble() of @source, watched. With problem(), @error has the last one. */
+int config_assemble_from(const struct config_source *source, struct config *cfg, char *error,
+			 size_t error_bytes);
 /** Check the options against each other; config_load() and config_parse() do so themselves. 0 or
  * -EINVAL. */
 int config_check(const struct config *cfg, char *error, size_t error_bytes);

@@ -294,3 +294,11 @@ int number_parse_real(const struct option *option, const char *text, void *base,
 	memcpy((char *)base + option->offset, &value, sizeof(value));
 	return 0;
 }
+
+int number_lacks_unit(const struct option *option, const char *text)
+{
+	size_t len = strlen(text);
+
+	return (units_of(option) != NULL || strcmp(option->unit, "%") == 0) && len > 0 &&
+	       (strchr("0123456789.", text[len - 1]) != NULL);
+}

@@ -9,4 +9,7 @@
 int number_parse_whole(const struct option *option, const char *text, void *base, char *reason);
 int number_parse_real(const struct option *option, const char *text, void *base, char *reason);
 
+/** 1 if @text, a value of @option, is a plain number of a duration, a size or per cent. */
+int number_lacks_unit(const struct option *option, const char *text);
+
 #endif

@@ -162,19 +162,30 @@ int config_parse_duration(const char *text, int64_t *ret_ns, char *reason)
 	return option_parse(&duration, text, ret_ns, reason);
 }
 
+/* Where the first fault is reported. */
+struct report {
+	const struct config *cfg;
+	char *error;
+	size_t error_bytes;
+};
+
+static int report_first(void *ctx, const char *key, int line, const char *reason)
+{
+	struct report *report = ctx;
+
+	if (line > 0 && report->cfg->path[0] != '\0') {
+		snprintf(report->error, report->error_bytes, "%s:%d: %s: %s", report->cfg->path,
+			 line, key, reason);
+	} else {
+		snprintf(report->error, report->error_bytes, "%s: %s", key, reason);
+	}
+	return 1;
+}
+
 int config_check(const struct config *cfg, char *error, size_t error_bytes)
 {
-	char reason[OPTION_WHY_BYTES] = "";
-	const char *key;
-	int line;
+	struct report report = { .cfg = cfg, .error = error, .error_bytes = error_bytes };
 
-	if (option_cross_check(cfg, NULL, &key, &line, reason) == 0) {
-		return 0;
-	}
-	if (line > 0 && cfg->path[0] != '\0') {
-		snprintf(error, error_bytes, "%s:%d: %s: %s", cfg->path, line, key, reason);
-	} else {
-		snprintf(error, error_bytes, "%s: %s", key, reason);
-	}
-	return -EINVAL;
+	return option_cross_check(cfg, NULL,
+				  &(struct option_faults){ .add = report_first, .ctx = &report });
 }

@@ -112,13 +112,17 @@ struct option_lines {
 	int line[OPTION_LIMIT];
 };
 
-/**
- * Check the options against each other. 0, or -EINVAL with the option's name in @ret_key, the
- * reason in
- * @reason and the line to blame in @ret_line (0 if none is known). @lines may be NULL.
- */
+/* Receives options that do not fit each other: the option's name, the line to blame (0 if none is
+ * known), the reason. Not 0: no more. */
+struct option_faults {
+	int (*add)(void *ctx, const char *key, int line, const char *reason);
+	void *ctx;
+};
+
+/** Check the options against each other. 0, or -EINVAL after a fault was added. @lines may be
+ * NULL. */
 int option_cross_check(const struct config *cfg, const struct option_lines *lines,
-		       const char **ret_key, int *ret_line, char *reason);
+		       const struct option_faults *faults);
 
 /** Turn a whole item of slaves[].sdo[] into @ret_sdo. 0, or -EINVAL or -ERANGE with @reason. */
 int option_sdo_finish(const struct option_sdo *item, struct config_sdo *ret_sdo, char *reason);

@@ -14,6 +14,16 @@ struct scope {
 	unsigned slave;      /* in slaves[].: which */
 };
 
+/* @walk->error has a problem. */
+static int report(struct walk *walk)
+{
+	walk->problems++;
+	if (walk->watch->problem != NULL) {
+		walk->watch->problem(walk->watch->ctx, walk->error);
+	}
+	return -EINVAL;
+}
+
 int walk_fail(struct walk *walk, int line, const char *key, const char *reason)
 {
 	char text[OPTION_KEY_BYTES + OPTION_WHY_BYTES + 8];
@@ -21,7 +31,20 @@ int walk_fail(struct walk *walk, int line, const char *key, const char *reason)
 	snprintf(text, sizeof(text), "%s%s%s", key, key[0] == '\0' ? "" : ": ", reason);
 	option_make_plain(text);
 	snprintf(walk->error, walk->error_bytes, "%s:%d: %s", walk->name, line, text);
-	return -EINVAL;
+	return report(walk);
+}
+
+/* Every problem is reported, or only the first one? */
+static int goes_on(const struct walk *walk)
+{
+	return walk->watch->problem != NULL;
+}
+
+static void note(const struct walk *walk, const char *option, const char *text, int line)
+{
+	if (walk->watch->seen != NULL) {
+		walk->watch->seen(walk->watch->ctx, option, text, line);
+	}
 }
 
 static int line_of(const yaml_node_t *node)
@@ -72,6 +95,7 @@ static int read_scalar(struct walk *walk, const struct scope *scope, const struc
 		return walk_fail(walk, line_of(node), shown, reason);
 	}
 	*line = line_of(node);
+	note(walk, shown, text_of(node), *line);
 	return 0;
 }
 
@@ -82,8 +106,9 @@ static int check_required(struct walk *walk, const struct scope *scope, const ya
 {
 	size_t len = strlen(scope->pattern);
 	char key[OPTION_KEY_BYTES];
+	int r = 0;
 
-	for (size_t i = 0; i < option_count(); i++) {
+	for (size_t i = 0; i < option_count() && (r == 0 || goes_on(walk)); i++) {
 		const char *rest = option_at(i)->name + len;
 		int is_there = 0;
 
@@ -98,14 +123,15 @@ static int check_required(struct walk *walk, const struct scope *scope, const ya
 		}
 		if (!is_there) {
 			snprintf(key, sizeof(key), "%s%s", scope->shown, rest);
-			return walk_fail(walk, line_of(node), key, "is missing");
+			r = walk_fail(walk, line_of(node), key, "is missing");
 		}
 	}
-	return 0;
+	return r;
 }
 
 static int read_item(struct walk *walk, const struct scope *scope, const yaml_node_t *node)
 {
+	int is_whole;
 	int r;
 
 	if (node->type != YAML_MAPPING_NODE) {
@@ -116,7 +142,11 @@ static int read_item(struct walk *walk, const struct scope *scope, const yaml_no
 	}
 	option_fill_defaults(scope->pattern, scope->base);
 	r = read_mapping(walk, scope, node);
-	return r < 0 ? r : check_required(walk, scope, node);
+	if (r < 0 && !goes_on(walk)) {
+		return r;
+	}
+	is_whole = check_required(walk, scope, node) == 0;
+	return r < 0 || !is_whole ? -EINVAL : 0;
 }
 
 static int read_slave(struct walk *walk, const yaml_node_t *node, unsigned index)
@@ -180,6 +210,7 @@ static int read_list(struct walk *walk, const struct scope *scope, enum option_l
 	const struct option_list *list = &option_lists[id];
 	char reason[OPTION_WHY_BYTES];
 	unsigned index = 0;
+	int first = 0;
 	int r = 0;
 
 	if (is_null(node)) {
@@ -190,7 +221,7 @@ static int read_list(struct walk *walk, const struct scope *scope, enum option_l
 				 "expected a list: lines that start with \"- \"");
 	}
 	for (yaml_node_item_t *i = node->data.sequence.items.start;
-	     r == 0 && i < node->data.sequence.items.top; i++, index++) {
+	     (first == 0 || goes_on(walk)) && i < node->data.sequence.items.top; i++, index++) {
 		const yaml_node_t *item = yaml_document_get_node(walk->doc, *i);
 		size_t used = id == OPTION_LIST_SDOS ? walk->cfg->sdo_count : index;
 
@@ -212,8 +243,9 @@ static int read_list(struct walk *walk, const struct scope *scope, enum option_l
 		case OPTION_LISTS:
 			break;
 		}
+		first = first == 0 ? r : first;
 	}
-	return r;
+	return first;
 }
 
 static int read_section(struct walk *walk, const char *name, const yaml_node_t *node)
@@ -299,8 +331,10 @@ static int read_pair(struct walk *walk, const struct scope *scope, const char *k
 
 static int read_mapping(struct walk *walk, const struct scope *scope, const yaml_node_t *node)
 {
+	int first = 0;
+
 	for (const yaml_node_pair_t *p = node->data.mapping.pairs.start;
-	     p < node->data.mapping.pairs.top; p++) {
+	     p < node->data.mapping.pairs.top && (first == 0 || goes_on(walk)); p++) {
 		const yaml_node_t *key = yaml_document_get_node(walk->doc, p->key);
 		int r = check_key(walk, scope, node, p);
 
@@ -308,11 +342,9 @@ static int read_mapping(struct walk *walk, const struct scope *scope, const yaml
 			r = read_pair(walk, scope, text_of(key), line_of(key),
 				      yaml_document_get_node(walk->doc, p->value));
 		}
-		if (r < 0) {
-			return r;
-		}
+		first = first == 0 ? r : first;
 	}
-	return 0;
+	return first;
 }
 
 /* The line of what @assignment sets is no longer the one to blame. */
@@ -342,28 +374,57 @@ static int read_root(struct walk *walk)
 	return read_mapping(walk, &scope, root);
 }
 
+/* Only a name that config_set() has taken comes here. */
+static void note_set(const struct walk *walk, const char *assignment)
+{
+	const char *equals = strchr(assignment, '=');
+	char name[OPTION_KEY_BYTES];
+
+	snprintf(name, sizeof(name), "%.*s", (int)(equals - assignment), assignment);
+	note(walk, name, equals + 1, 0);
+}
+
+/* A fault of the whole configuration: with the line of the file, where there is one. */
+static int add_fault(void *ctx, const char *key, int line, const char *reason)
+{
+	struct walk *walk = ctx;
+
+	if (line > 0) {
+		walk_fail(walk, line, key, reason);
+	} else {
+		snprintf(walk->error, walk->error_bytes, "%s: %s", key, reason);
+		report(walk);
+	}
+	return !goes_on(walk);
+}
+
+int walk_finish(struct walk *walk)
+{
+	for (size_t i = 0; i < walk->set_count && (walk->problems == 0 || goes_on(walk)); i++) {
+		if (config_set(walk->cfg, walk->set[i], walk->error, walk->error_bytes) < 0) {
+			report(walk);
+		} else {
+			forget_line(walk, walk->set[i]);
+			note_set(walk, walk->set[i]);
+		}
+	}
+	if (walk->problems == 0) {
+		option_cross_check(walk->cfg, &walk->lines,
+				   &(struct option_faults){ .add = add_fault, .ctx = walk });
+	}
+	return walk->problems == 0 ? 0 : -EINVAL;
+}
+
 int walk_document(struct walk *walk)
 {
 	const struct option *presence = option_find("bus.presence");
-	char reason[OPTION_WHY_BYTES] = "";
-	const char *key = "";
-	int line = 0;
-	int r = read_root(walk);
 
-	if (r == 0 && walk->cfg->slave_count > 0 && walk->lines.line[option_place(presence)] == 0) {
+	read_root(walk);
+	if (walk->problems > 0 && !goes_on(walk)) {
+		return -EINVAL;
+	}
+	if (walk->cfg->slave_count > 0 && walk->lines.line[option_place(presence)] == 0) {
 		walk->cfg->bus_presence = CONFIG_EXACT_SLAVES;
 	}
-	for (size_t i = 0; r == 0 && i < walk->set_count; i++) {
-		r = config_set(walk->cfg, walk->set[i], walk->error, walk->error_bytes);
-		forget_line(walk, walk->set[i]);
-	}
-	if (r == 0 && option_cross_check(walk->cfg, &walk->lines, &key, &line, reason) < 0) {
-		r = -EINVAL;
-		if (line > 0) {
-			walk_fail(walk, line, key, reason);
-		} else {
-			snprintf(walk->error, walk->error_bytes, "%s: %s", key, reason);
-		}
-	}
-	return r;
+	return walk_finish(walk);
 }

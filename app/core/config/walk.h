@@ -16,6 +16,8 @@ struct walk {
 	struct option_lines lines;
 	const char *const *set; /* assignments over the document */
 	size_t set_count;
+	const struct config_source *watch;
+	size_t problems; /* so far */
 	char *error;
 	size_t error_bytes;
 };
@@ -24,7 +26,12 @@ struct walk {
  * the line in @walk->error. */
 int walk_document(struct walk *walk);
 
-/** Put "NAME:LINE: key: reason" into @walk->error. Returns -EINVAL. */
+/** Put "NAME:LINE: key: reason" into @walk->error and report it; without a line, 0, no NAME.
+ * Returns -EINVAL. */
 int walk_fail(struct walk *walk, int line, const char *key, const char *reason);
+
+/** What is set over the document, in order, and the check of the whole. 0, or -EINVAL with the line
+ * in @walk->error. */
+int walk_finish(struct walk *walk);
 
 #endif

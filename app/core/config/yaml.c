@@ -57,39 +57,39 @@ static int read_documents(struct walk *walk, yaml_parser_t *parser)
 	return r;
 }
 
-/* The contents of a file and the assignments over it. */
-struct source {
+/* The contents of a file. */
+struct contents {
 	const char *name;
 	const char *text;
 	size_t text_len;
-	const char *const *set;
-	size_t set_count;
 };
 
-static int parse(const struct source *source, struct config *cfg, char *error, size_t error_bytes)
+static int parse(const struct contents *contents, const struct config_source *source,
+		 struct config *cfg, char *error, size_t error_bytes)
 {
 	struct config work;
-	struct walk walk = { .name = source->name,
+	struct walk walk = { .name = contents->name,
 			     .cfg = &work,
 			     .set = source->set,
 			     .set_count = source->set_count,
+			     .watch = source,
 			     .error = error,
 			     .error_bytes = error_bytes };
 	yaml_parser_t parser;
 	int r;
 
-	if (source->text_len > FILE_LIMIT_BYTES) {
+	if (contents->text_len > FILE_LIMIT_BYTES) {
 		walk_fail(&walk, 1, "", "larger than 1 MiB");
 		return -E2BIG;
 	}
 	config_defaults(&work);
-	snprintf(work.path, sizeof(work.path), "%s", source->name);
+	snprintf(work.path, sizeof(work.path), "%s", contents->name);
 	if (!yaml_parser_initialize(&parser)) {
 		walk_fail(&walk, 0, "", "out of memory");
 		return -ENOMEM;
 	}
-	yaml_parser_set_input_string(&parser, (const unsigned char *)source->text,
-				     source->text_len);
+	yaml_parser_set_input_string(&parser, (const unsigned char *)contents->text,
+				     contents->text_len);
 	r = read_documents(&walk, &parser);
 	yaml_parser_delete(&parser);
 	if (r == 0) {
@@ -101,9 +101,9 @@ static int parse(const struct source *source, struct config *cfg, char *error, s
 int config_parse(const char *name, const char *text, size_t text_len, struct config *cfg,
 		 char *error, size_t error_bytes)
 {
-	const struct source source = { .name = name, .text = text, .text_len = text_len };
+	const struct contents contents = { .name = name, .text = text, .text_len = text_len };
 
-	return parse(&source, cfg, error, error_bytes);
+	return parse(&contents, &(struct config_source){ .path = name }, cfg, error, error_bytes);
 }
 
 /* All of @fd, at most one byte more than allowed. Length or -errno. */
@@ -128,14 +128,14 @@ static ssize_t read_all(int fd, char *buf, size_t capacity)
 	return (ssize_t)len;
 }
 
-static int load(const char *path, const char *const *set, size_t set_count, struct config *cfg,
-		char *error, size_t error_bytes)
+static int load(const struct config_source *source, struct config *cfg, char *error,
+		size_t error_bytes)
 {
 	static char text[FILE_LIMIT_BYTES + 1]; /* a program reads its file once, before its threads
 						 */
-	struct source source;
+	struct contents contents = { .name = source->path, .text = text };
 	ssize_t len = -1;
-	int fd = open(path, O_RDONLY | O_CLOEXEC);
+	int fd = open(source->path, O_RDONLY | O_CLOEXEC);
 	int r = fd < 0 ? -errno : 0;
 
 	if (fd >= 0) {
@@ -144,34 +144,40 @@ static int load(const char *path, const char *const *set, size_t set_count, stru
 		close(fd);
 	}
 	if (r < 0) {
-		snprintf(error, error_bytes, "%s: cannot read the configuration: %s", path,
+		snprintf(error, error_bytes, "%s: cannot read the configuration: %s", source->path,
 			 strerror(-r));
 		return r;
 	}
-	source = (struct source){ .name = path,
-				  .text = text,
-				  .text_len = (size_t)len,
-				  .set = set,
-				  .set_count = set_count };
-	return parse(&source, cfg, error, error_bytes);
+	contents.text_len = (size_t)len;
+	return parse(&contents, source, cfg, error, error_bytes);
 }
 
 int config_load(const char *path, struct config *cfg, char *error, size_t error_bytes)
 {
-	return load(path, NULL, 0, cfg, error, error_bytes);
+	return load(&(struct config_source){ .path = path }, cfg, error, error_bytes);
+}
+
+int config_assemble_from(const struct config_source *source, struct config *cfg, char *error,
+			 size_t error_bytes)
+{
+	struct walk walk = { .cfg = cfg,
+			     .set = source->set,
+			     .set_count = source->set_count,
+			     .watch = source,
+			     .error = error,
+			     .error_bytes = error_bytes };
+
+	if (source->path != NULL) {
+		return load(source, cfg, error, error_bytes);
+	}
+	config_defaults(cfg);
+	return walk_finish(&walk);
 }
 
 int config_assemble(const char *path, const char *const *set, size_t set_count, struct config *cfg,
 		    char *error, size_t error_bytes)
 {
-	int r = 0;
-
-	if (path != NULL) {
-		return load(path, set, set_count, cfg, error, error_bytes);
-	}
-	config_defaults(cfg);
-	for (size_t i = 0; r == 0 && i < set_count; i++) {
-		r = config_set(cfg, set[i], error, error_bytes);
-	}
-	return r < 0 ? r : config_check(cfg, error, error_bytes);
+	return config_assemble_from(
+		&(struct config_source){ .path = path, .set = set, .set_count = set_count }, cfg,
+		error, error_bytes);
 }
