@@ -8,6 +8,9 @@
 
 static enum exit_code fail(const struct cli *cli, const char *path, int err)
 {
+	if (err == EEXIST) {
+		return cli_fail(cli, EXIT_CODE_FAILED, "%s: exists: --force replaces it", path);
+	}
 	return cli_fail(cli,
 			err == EACCES || err == EPERM ? EXIT_CODE_PERMISSION : EXIT_CODE_FAILED,
 			"%s: %s", path, strerror(err));
@@ -35,9 +38,10 @@ enum exit_code file_read(const struct cli *cli, const char *path, size_t limit, 
 				   limit);
 }
 
-enum exit_code file_write(const struct cli *cli, const char *path, const uint8_t *data, size_t len)
+static enum exit_code write_whole(const struct cli *cli, const char *path, const char *mode,
+				  const uint8_t *data, size_t len)
 {
-	FILE *out = fopen(path, "we");
+	FILE *out = fopen(path, mode);
 	int is_whole = out != NULL && fwrite(data, 1, len, out) == len;
 	int err = is_whole ? 0 : errno;
 
@@ -45,4 +49,15 @@ enum exit_code file_write(const struct cli *cli, const char *path, const uint8_t
 		err = errno;
 	}
 	return err == 0 ? EXIT_CODE_OK : fail(cli, path, err);
+}
+
+enum exit_code file_write(const struct cli *cli, const char *path, const uint8_t *data, size_t len)
+{
+	return write_whole(cli, path, "we", data, len);
+}
+
+enum exit_code file_write_new(const struct cli *cli, const char *path, const uint8_t *data,
+			      size_t len)
+{
+	return write_whole(cli, path, "wxe", data, len);
 }

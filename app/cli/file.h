@@ -13,5 +13,8 @@ enum exit_code file_read(const struct cli *cli, const char *path, size_t limit, 
 			 size_t *ret_len);
 /** Write @path, replacing what it has. */
 enum exit_code file_write(const struct cli *cli, const char *path, const uint8_t *data, size_t len);
+/** Write @path, which must not exist. */
+enum exit_code file_write_new(const struct cli *cli, const char *path, const uint8_t *data,
+			      size_t len);
 
 #endif

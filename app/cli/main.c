@@ -118,6 +118,8 @@ static const struct verb verbs[] = {
 	  "LINT\n"
 	  "USINT UINT UDINT ULINT REAL LREAL, and for reading STRING.\n",
 	  verb_sdo },
+	{ "pdo", "[SLAVE...]", "SyncManagers and PDOs: assigned ones, and those that could be.",
+	  "By CoE where the slave has it and its mailbox works, else by the SII.\n", verb_pdo },
 	{ "soe", "read|write|list SLAVE [IDN] [VALUE]",
 	  "Read, write or list the parameters of a drive (SoE).",
 	  "ecdaq soe list drive0                  all IDNs (of S-0-0017)\n"
@@ -168,6 +170,19 @@ static const struct verb verbs[] = {
 	  "Ctrl-C, it\n"
 	  "stays where it is, and the command may be repeated.\n",
 	  verb_firmware },
+	{ "scan", "", "What is on the bus, as a configuration to start from.",
+	  "ecdaq scan --write ecdaq.yaml\n\n"
+	  "Names, identity and alias; serial numbers, channels and PDOs as comments.\n",
+	  verb_scan },
+	{ "config", "show|check|diff [FILE]",
+	  "The configuration: show it, check a file, compare it with the bus.",
+	  "ecdaq config show                  every option in effect, and where it is from\n"
+	  "ecdaq config check ecdaq.yaml      every problem of a file\n"
+	  "ecdaq config diff                  every difference between what ecdaqd was started "
+	  "with\n"
+	  "                                   and what is on the bus, in any state\n\n"
+	  "Without FILE that of --config, else of the ecdaqd that is running.\n",
+	  verb_config },
 	{ "crc", "[SLAVE...]", "Error counters in the registers of the slaves, port by port.",
 	  "Each stops at 255. Their sums since the start of ecdaqd: ecdaq slaves -v.\n", verb_crc },
 	{ "domains", "[SLAVE...]", "The cyclic frames: datagrams, FMMUs, working counters.",
@@ -218,7 +233,8 @@ static void help(void)
 	     "  --version       print the version\n"
 	     "\n"
 	     "Every verb that reads has --json: one JSON value per line.\n");
-	exit_code_help(stdout, EXIT_CODE_COMMON | EXIT_CODE_BIT(CONFIG) | EXIT_CODE_BIT(STATE) |
+	exit_code_help(stdout, EXIT_CODE_COMMON | EXIT_CODE_BIT(CONFIG) | EXIT_CODE_BIT(NO_SLAVE) |
+				       EXIT_CODE_BIT(SLAVES) | EXIT_CODE_BIT(STATE) |
 				       EXIT_CODE_BIT(PERMISSION) | EXIT_CODE_BIT(NO_DAEMON) |
 				       EXIT_CODE_BIT(REFUSED));
 }

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/bytes.h"
+#include "cli/coe_type.h"
 #include "cli/text.h"
 #include "program/json.h"
 
@@ -22,35 +23,6 @@ static const char *code_to_str(uint8_t code)
 					     [7] = "variable", [8] = "array", [9] = "record" };
 
 	return code < sizeof(texts) / sizeof(texts[0]) && texts[code] != NULL ? texts[code] : "?";
-}
-
-/* Base data types of ETG.1020; a number for those of a device. */
-static const char *type_to_str(uint16_t type, char buf[TEXT_BYTES])
-{
-	static const struct {
-		uint16_t type;
-		const char *text;
-	} texts[] = {
-		{ 0x0001, "BOOL" },        { 0x0002, "SINT" },          { 0x0003, "INT" },
-		{ 0x0004, "DINT" },        { 0x0005, "USINT" },         { 0x0006, "UINT" },
-		{ 0x0007, "UDINT" },       { 0x0008, "REAL" },          { 0x0009, "STRING" },
-		{ 0x000a, "BYTES" },       { 0x000b, "WORDS" },         { 0x000c, "TIME" },
-		{ 0x000d, "TIMESPAN" },    { 0x0011, "LREAL" },         { 0x0015, "LINT" },
-		{ 0x001b, "ULINT" },       { 0x001e, "BYTE" },          { 0x001f, "WORD" },
-		{ 0x0020, "DWORD" },       { 0x0021, "PDO_MAPPING" },   { 0x0023, "IDENTITY" },
-		{ 0x0025, "COMMAND_PAR" }, { 0x0027, "PDO_PARAMETER" }, { 0x0029, "SM_SYNC" },
-		{ 0x0030, "BIT1" },        { 0x0031, "BIT2" },          { 0x0032, "BIT3" },
-		{ 0x0033, "BIT4" },        { 0x0034, "BIT5" },          { 0x0035, "BIT6" },
-		{ 0x0036, "BIT7" },        { 0x0037, "BIT8" },
-	};
-
-	for (size_t i = 0; i < sizeof(texts) / sizeof(texts[0]); i++) {
-		if (texts[i].type == type) {
-			return texts[i].text;
-		}
-	}
-	snprintf(buf, TEXT_BYTES, "0x%04x", type);
-	return buf;
 }
 
 /* "rrrw--": read, then write, each in PRE-OP, SAFE-OP and OP. */
@@ -83,7 +55,7 @@ static void show_entry(const struct admin_sdo_entry *entry)
 	char access[TEXT_BYTES];
 
 	put_name(entry->name, printf("  :%02x    %-13s %5u  %s", entry->subindex,
-				     type_to_str(entry->data_type, type), entry->bit_len,
+				     coe_type_to_str(entry->data_type, type), entry->bit_len,
 				     access_to_str(entry->access, access)));
 }
 
@@ -94,7 +66,7 @@ static void write_entry(struct json *js, const struct admin_sdo_entry *entry)
 	json_object_begin(js, NULL);
 	json_u64(js, "subindex", entry->subindex);
 	json_text(js, "name", entry->name);
-	json_text(js, "type", type_to_str(entry->data_type, text));
+	json_text(js, "type", coe_type_to_str(entry->data_type, text));
 	json_u64(js, "bits", entry->bit_len);
 	json_text(js, "access", access_to_str(entry->access, text));
 	json_truth(js, "rxpdo", entry->access >> 6 & 1);

@@ -10,6 +10,7 @@
 
 #include "base/admin_protocol.h"
 #include "base/bytes.h"
+#include "base/difference.h"
 #include "base/histogram.h"
 #include "fake.h"
 #include "image/image.h"
@@ -332,6 +333,47 @@ static void answer_coe(struct fake *f, const struct admin_request *rq, struct ad
 	}
 }
 
+/* One of each sort: a slave, a device, an output; or a note alone. */
+static void answer_compare(const struct fake *f, struct admin_reply *reply)
+{
+	const struct difference diff[] = {
+		{ .kind = DIFFERENCE_IDENTITY,
+		  .item = 1,
+		  .position = 1,
+		  .line = 7,
+		  .name = "rear",
+		  .property = "revision",
+		  .expected = "0x00000002",
+		  .found = "0x00000001" },
+		{ .kind = DIFFERENCE_UNEXPECTED,
+		  .item = DIFFERENCE_NOWHERE,
+		  .position = 2,
+		  .name = "EL\x1b[31m",
+		  .found = "vendor 0x00000002" },
+		{ .kind = DIFFERENCE_CHANNEL,
+		  .position = DIFFERENCE_NOWHERE,
+		  .line = 9,
+		  .name = "rear.nope",
+		  .expected = "an output channel",
+		  .found = "no channel of this name" },
+	};
+	const struct difference note = { .kind = DIFFERENCE_OPTIONAL,
+					 .item = 3,
+					 .position = DIFFERENCE_NOWHERE,
+					 .name = "spare",
+					 .expected = "vendor any" };
+
+	static_assert(sizeof(diff) <= sizeof(reply->data), "one message");
+	snprintf(reply->text, sizeof(reply->text), "/etc/ecdaq.yaml");
+	if (strcmp(f->admin, "differs") == 0) {
+		give(reply, diff, sizeof(diff));
+	} else if (strcmp(f->admin, "half") == 0) {
+		give(reply, &note, sizeof(note) / 2);
+	} else {
+		give(reply, &note, sizeof(note));
+	}
+}
+
 static void answer(struct fake *f, const struct admin_request *rq, struct admin_reply *reply)
 {
 	*reply = (struct admin_reply){ .magic = ADMIN_MAGIC, .id = rq->id };
@@ -375,6 +417,9 @@ static void answer(struct fake *f, const struct admin_request *rq, struct admin_
 		break;
 	case ADMIN_DATAGRAMS:
 		answer_datagrams(f, reply);
+		break;
+	case ADMIN_COMPARE:
+		answer_compare(f, reply);
 		break;
 	case ADMIN_SDO_READ:
 	case ADMIN_SDO_WRITE:

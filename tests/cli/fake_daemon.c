@@ -5,8 +5,9 @@
  * the clock, SPEED times as fast as real ones. It prints "ready" and ends at the end of standard
  * input, by `ecdaq stop`, or by SIGKILL.
  *
- * usage: test_fake_daemon RUN_DIR [SPEED=N] [JUMP=1] [RECORDER=0] [ADMIN=mute|garbage|none]
- * [MODE=octal] [SLAVES=N] [BRANCHES=1] [BITS=1] [NOISY=1] [ALIAS=N] [FAULTS=N] [BEYOND=N]
+ * usage: test_fake_daemon RUN_DIR [SPEED=N] [JUMP=1] [RECORDER=0]
+ * [ADMIN=mute|garbage|none|differs|half] [MODE=octal] [SLAVES=N] [BRANCHES=1] [BITS=1] [NOISY=1]
+ * [ALIAS=N] [FAULTS=N] [BEYOND=N]
  * [DEGRADED=BITS] JUMP: every hundredth cycle number is followed by a gap of five. Each 64th frame
  * is lost. The admin socket: piccolo1.led belongs to the control program; objects 0x1018:1,
  * 0x1008:0, 0x8000:2 exist, 0x8000:1 cannot be written now; a one-shot time must be in the future.

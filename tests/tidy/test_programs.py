@@ -16,7 +16,10 @@ ONCE = {
         r"getopt_long\s*\(|args_parse\(struct args [^;{]*\n\{",
         {"app/core/base/args.c"},
     ),
-    "--check and --set": (r"\{ \"(?:check|set)\", 0, args_", {"app/core/program/command_line.c"}),
+    "--check and --set": (
+        r"\{ \"(?:check|set)\", 0, args_",
+        {"app/core/program/command_line.c", "app/cli/config.c"},  # of a file, not of the program
+    ),
     "stop signals": (r"sigaction\(SIGTERM", {"app/core/base/stop.c"}),
 }
 

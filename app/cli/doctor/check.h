@@ -11,7 +11,7 @@
 
 #include "base/status.h"
 #include "base/sync0.h"
-#include "cli/doctor/probe.h"
+#include "cli/probe.h"
 #include "config/config.h"
 
 enum finding_level {

@@ -5,7 +5,7 @@
 
 #include <stdint.h>
 
-#include "cli/doctor/probe.h"
+#include "cli/probe.h"
 
 enum { IRQ_MAX = 512 };
 

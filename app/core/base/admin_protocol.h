@@ -43,7 +43,9 @@ enum admin_verb {
 	ADMIN_REGISTER_READ = 12,  /* slave_pos, address, length: up to ADMIN_REGISTER_BYTES */
 	ADMIN_REGISTER_WRITE = 13, /* slave_pos, address, data; argument[1] 1: also what the master
 				      needs unchanged while the bus is in operation */
-	ADMIN_SII_READ = 14,       /* slave_pos; data: the whole EEPROM */
+	ADMIN_SII_READ = 14,       /* slave_pos; data: the whole EEPROM; argument[0] 1: as it was
+				      read at the start, which takes no frame: the categories that
+				      the master uses, zeros between them */
 	ADMIN_SII_WRITE = 15,      /* slave_pos, data: the image; argument[1] 1: also in SAFE-OP and
 				      OP, and of another device; data: struct admin_sii_written */
 	ADMIN_SII_ALIAS = 16,      /* slave_pos, argument[0]; argument[1] and answer as SII_WRITE */
@@ -70,6 +72,8 @@ enum admin_verb {
 			   waited for, data; data: the answer's type (2 bytes), then its data */
 	/* --- the cyclic frames --- */
 	ADMIN_DATAGRAMS = 31, /* data: struct admin_datagram, one each of the cyclic frames */
+	ADMIN_COMPARE = 48,   /* what is configured with what is found; text: the file, data: struct
+				 difference of base/difference.h, none or more */
 };
 
 /* Every slave with a one-shot output, all in one cycle or none. */
@@ -137,7 +141,7 @@ struct admin_reply {
 	uint32_t total;              /* 0: not known */
 	uint64_t cycle;              /* in which it took effect; SET, ONESHOT */
 	int64_t dc_time_ns;          /* ONESHOT: the absolute time armed */
-	char text[ADMIN_TEXT_BYTES]; /* one line: why it failed */
+	char text[ADMIN_TEXT_BYTES]; /* one line: why it failed; else as the verb says */
 	uint8_t data[ADMIN_DATA_BYTES];
 };
 

@@ -373,7 +373,7 @@ static void report_sdo(const struct admin_target *t, struct admin_pending *pendi
 static int is_command(enum admin_verb verb)
 {
 	return verb != ADMIN_REGISTER_READ && verb != ADMIN_SII_READ && verb != ADMIN_DIAGNOSIS &&
-	       verb != ADMIN_DATAGRAMS;
+	       verb != ADMIN_DATAGRAMS && verb != ADMIN_COMPARE;
 }
 
 int admin_command_takes_frame(enum admin_verb verb)
@@ -387,7 +387,7 @@ static void run_on_bus(const struct admin_target *t, struct admin_pending *pendi
 {
 	const struct admin_request *rq = &pending->request;
 	int is_all = rq->verb == ADMIN_RESCAN || rq->verb == ADMIN_DATAGRAMS ||
-		     rq->slave_pos == ADMIN_ALL_SLAVES;
+		     rq->verb == ADMIN_COMPARE || rq->slave_pos == ADMIN_ALL_SLAVES;
 
 	if (t->bus_request == NULL) {
 		admin_pending_refuse(pending, -EBUSY, "the bus is being brought up");
@@ -472,6 +472,7 @@ void admin_command_run(const struct admin_target *target, struct admin_pending *
 	case ADMIN_DIAGNOSIS:
 	case ADMIN_ERRORS_RESET:
 	case ADMIN_DATAGRAMS:
+	case ADMIN_COMPARE:
 		run_on_bus(target, pending);
 		return;
 	case ADMIN_CANCEL:

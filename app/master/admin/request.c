@@ -151,6 +151,7 @@ static int check_verb(const struct admin_request *rq, char *why)
 		return rq->slave_pos == ADMIN_ALL_SLAVES ? 0 : check_slave(rq, why);
 	case ADMIN_RESCAN:
 	case ADMIN_DATAGRAMS:
+	case ADMIN_COMPARE:
 		return 0;
 	case ADMIN_STATE:
 		if (rq->argument[0] == 0 || rq->argument[0] > UINT8_MAX) {

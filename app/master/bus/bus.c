@@ -196,6 +196,12 @@ const struct slave_info *bus_slaves(const struct bus *bus, size_t *ret_count)
 	return bus->info;
 }
 
+const uint8_t *bus_slave_sii(const struct bus *bus, size_t pos, size_t *ret_bytes)
+{
+	*ret_bytes = bus->slave[pos].sii_len;
+	return bus->slave[pos].sii;
+}
+
 const struct channel *bus_channels(const struct bus *bus, size_t *ret_count)
 {
 	*ret_count = bus->channel_count;

@@ -149,6 +149,9 @@ const struct slave_info *bus_slaves(const struct bus *bus, size_t *ret_count);
 /** Write to @page (its slave[] entries) where each slave is in the tree of ports, and the delays of
  * the cables once bus_dc_setup() has measured them. */
 void bus_show_places(const struct bus *bus, struct status_page *page);
+/** The SII of the slave at @pos as bus_scan() read it: the categories that matter, the rest zero.
+ */
+const uint8_t *bus_slave_sii(const struct bus *bus, size_t pos, size_t *ret_bytes);
 const struct channel *bus_channels(const struct bus *bus, size_t *ret_count);
 const struct exchange_plan *bus_plan(const struct bus *bus);
 /** What the cyclic frames need of the period; valid after bus_dc_setup(). */

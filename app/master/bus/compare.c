@@ -81,7 +81,7 @@ static void append_found(struct text *text, const struct config_slave *want,
 	}
 }
 
-static int is_revision_wanted(const struct config_slave *want, uint32_t revision)
+int compare_is_revision_wanted(const struct config_slave *want, uint32_t revision)
 {
 	switch (want->revision_policy) {
 	case CONFIG_REVISION_ANY:
@@ -94,14 +94,31 @@ static int is_revision_wanted(const struct config_slave *want, uint32_t revision
 	return want->revision == 0 || want->revision == revision;
 }
 
-static int is_wanted(const struct config_slave *want, const struct slave_info *found, unsigned id)
+int compare_is_wanted(const struct config_slave *want, const struct slave_info *found, unsigned id)
 {
 	return (want->vendor == 0 || want->vendor == found->vendor) &&
 	       (want->product == 0 || want->product == found->product) &&
-	       is_revision_wanted(want, found->revision) &&
+	       compare_is_revision_wanted(want, found->revision) &&
 	       (want->serial == 0 || want->serial == found->serial) &&
 	       (want->alias == 0 || want->alias == found->alias) &&
 	       (want->identification == 0 || want->identification == id);
+}
+
+int compare_is_specific(const struct config_slave *want)
+{
+	return want->serial != 0 || want->alias != 0 || want->identification != 0 ||
+	       want->product != 0;
+}
+
+void compare_wanted_format(const struct config_slave *want, char *buf, size_t bytes)
+{
+	append_wanted(&(struct text){ .buf = buf, .bytes = bytes }, want);
+}
+
+void compare_found_format(const struct config_slave *want, const struct slave_info *found,
+			  unsigned id, char *buf, size_t bytes)
+{
+	append_found(&(struct text){ .buf = buf, .bytes = bytes }, want, found, id);
 }
 
 static unsigned id_of(const uint16_t *id, size_t pos)
@@ -136,7 +153,7 @@ static void fill_bindable(const struct config *cfg, const struct slave_info *fou
 				const struct config_slave *want = &cfg->slave[i];
 
 				is_possible = (j < count && is_bindable(b, i + 1, j + 1) &&
-					       is_wanted(want, &found[j], id_of(id, j))) ||
+					       compare_is_wanted(want, &found[j], id_of(id, j))) ||
 					      (want->is_optional && is_bindable(b, i + 1, j));
 			}
 			b->row[i][j / 8] |= (uint8_t)(is_possible << (j % 8));
@@ -159,7 +176,7 @@ int compare_bind(const struct config *cfg, const struct slave_info *found, const
 	}
 	for (size_t i = 0; i < cfg->slave_count; i++) {
 		if (j < found_count && is_bindable(&b, i + 1, j + 1) &&
-		    is_wanted(&cfg->slave[i], &found[j], id_of(id, j))) {
+		    compare_is_wanted(&cfg->slave[i], &found[j], id_of(id, j))) {
 			ret_config[j++] = (int)i;
 		}
 	}
@@ -224,10 +241,9 @@ static int find_other(const struct config *cfg, size_t not_this, const struct sl
 {
 	for (size_t i = 0; i < cfg->slave_count; i++) {
 		const struct config_slave *other = &cfg->slave[i];
-		int is_specific = other->serial != 0 || other->alias != 0 ||
-				  other->identification != 0 || other->product != 0;
 
-		if (i != not_this && is_specific && is_wanted(other, found, id)) {
+		if (i != not_this && compare_is_specific(other) &&
+		    compare_is_wanted(other, found, id)) {
 			return (int)i;
 		}
 	}
@@ -249,7 +265,7 @@ static int match_one(struct matching *m, size_t i)
 {
 	for (size_t j = 0; j < m->found_count; j++) {
 		if (m->is_tried[j] ||
-		    !is_wanted(&m->cfg->slave[i], &m->found[j], id_of(m->id, j))) {
+		    !compare_is_wanted(&m->cfg->slave[i], &m->found[j], id_of(m->id, j))) {
 			continue;
 		}
 		m->is_tried[j] = 1;
@@ -325,7 +341,7 @@ int compare_slaves(const struct config *cfg, const struct slave_info *found, con
 	for (size_t i = 0; i < cfg->slave_count; i++) {
 		const struct config_slave *want = &cfg->slave[i];
 
-		if (j < found_count && is_wanted(want, &found[j], id_of(id, j))) {
+		if (j < found_count && compare_is_wanted(want, &found[j], id_of(id, j))) {
 			j++;
 			continue;
 		}

@@ -249,6 +249,8 @@ void session_bus_request(void *ctx, struct admin_pending *pending)
 	s->operator_at = session_now(s);
 	if (pending->request.verb == ADMIN_DATAGRAMS) {
 		session_list_datagrams(s, pending);
+	} else if (pending->request.verb == ADMIN_COMPARE) {
+		session_compare_request(s, pending);
 	} else if (pending->request.verb == ADMIN_RESCAN) {
 		if (!is_forced && !s->is_held && s->bus != NULL) {
 			admin_pending_refuse(pending, -EPERM,

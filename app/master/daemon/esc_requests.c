@@ -100,16 +100,26 @@ static void reset_errors(struct session *s, struct admin_pending *pending)
 
 /* --- EEPROM --- */
 
-static int answer_image(struct admin_pending *pending, const struct sii_request *sr)
+static int answer_image(struct admin_pending *pending, const uint8_t *image, size_t bytes)
 {
-	uint8_t *room = admin_pending_reserve(pending, sr->job.len_bytes);
+	uint8_t *room = admin_pending_reserve(pending, bytes);
 
 	if (room == NULL) {
 		return -ENOMEM;
 	}
-	memcpy(room, sr->image, sr->job.len_bytes);
-	admin_pending_answer_len(pending, sr->job.len_bytes);
+	memcpy(room, image, bytes);
+	admin_pending_answer_len(pending, bytes);
 	return 0;
+}
+
+/* What the scan has read. */
+static void answer_known(const struct session *s, struct admin_pending *pending)
+{
+	size_t bytes;
+	const uint8_t *image = bus_slave_sii(s->bus, pending->request.slave_pos, &bytes);
+
+	finish(pending, image == NULL ? -ENODATA : answer_image(pending, image, bytes),
+	       image == NULL ? "its EEPROM could not be read at the start" : "out of memory");
 }
 
 static void answer_written(struct admin_pending *pending, const struct sii_job *job)
@@ -132,7 +142,7 @@ static void end_job(struct admin_pending *pending, int r)
 	pending->cancel = NULL;
 	s->sii = NULL;
 	if (r == 0 && sr->job.kind == SII_JOB_READ) {
-		r = answer_image(pending, sr);
+		r = answer_image(pending, sr->image, sr->job.len_bytes);
 	} else if (r == 0) {
 		answer_written(pending, &sr->job);
 	}
@@ -231,7 +241,14 @@ void session_esc_request(struct session *s, struct admin_pending *pending)
 	case ADMIN_ERRORS_RESET:
 		reset_errors(s, pending);
 		return;
-	default: /* of the EEPROM */
+	case ADMIN_SII_READ:
+		if (pending->request.argument[0] != 0) {
+			answer_known(s, pending);
+		} else {
+			start_job(s, pending);
+		}
+		return;
+	default: /* others of the EEPROM */
 		start_job(s, pending);
 		return;
 	}

@@ -126,6 +126,8 @@ void session_bus_request(void *ctx, struct admin_pending *pending);
 void session_esc_request(struct session *s, struct admin_pending *pending);
 /** ADMIN_DATAGRAMS. */
 void session_list_datagrams(struct session *s, struct admin_pending *pending);
+/** ADMIN_COMPARE. */
+void session_compare_request(const struct session *s, struct admin_pending *pending);
 /** The bus goes: end the request that works on an EEPROM. */
 void session_sii_end(struct session *s);
 /** Answer whoever asked for the bring-up that has ended; @failure NULL: it succeeded. */

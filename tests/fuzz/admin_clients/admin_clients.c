@@ -156,12 +156,12 @@ static void check_good_client(void)
 
 static void ask(int fd, const uint8_t *arg)
 {
-	static const uint8_t verbs[] = { ADMIN_PING,         ADMIN_SET,      ADMIN_SDO_READ,
-					 ADMIN_SDO_WRITE,    ADMIN_STOP,     ADMIN_CANCEL,
-					 ADMIN_RESCAN,       ADMIN_STATE,    ADMIN_REGISTER_READ,
-					 ADMIN_SII_WRITE,    ADMIN_VOE,      ADMIN_FOE_WRITE,
-					 ADMIN_DIAGNOSIS,    ADMIN_SOE_READ, ADMIN_CLEAR,
-					 ADMIN_ERRORS_RESET, ADMIN_DATAGRAMS };
+	static const uint8_t verbs[] = { ADMIN_PING,         ADMIN_SET,       ADMIN_SDO_READ,
+					 ADMIN_SDO_WRITE,    ADMIN_STOP,      ADMIN_CANCEL,
+					 ADMIN_RESCAN,       ADMIN_STATE,     ADMIN_REGISTER_READ,
+					 ADMIN_SII_WRITE,    ADMIN_VOE,       ADMIN_FOE_WRITE,
+					 ADMIN_DIAGNOSIS,    ADMIN_SOE_READ,  ADMIN_CLEAR,
+					 ADMIN_ERRORS_RESET, ADMIN_DATAGRAMS, ADMIN_COMPARE };
 	struct admin_request rq = { .magic = ADMIN_MAGIC,
 				    .verb = verbs[arg[0] % sizeof(verbs)],
 				    .id = arg[1] % 16,

@@ -354,6 +354,24 @@ TEST(admin, the_list_of_datagrams_needs_no_slave_and_is_no_event)
 	CHECK_EQ(fake.events, 0);
 }
 
+TEST(admin, a_comparison_reaches_the_bus_with_any_slave_position_and_is_no_event)
+{
+	struct fake fake;
+	struct admin_target target;
+	struct admin_request rq = fake_request(ADMIN_COMPARE);
+
+	fake_init(&fake);
+	target = fake_target(&fake);
+	rq.slave_pos = 400;
+	target.bus_request = NULL; /* during a bring-up */
+	CHECK_EQ(start(&target, &rq)->reply.result, -EBUSY);
+	target.bus_request = take;
+	CHECK_EQ(start(&target, &rq)->reply.result, 0);
+	CHECK(fake.pending != NULL);
+	CHECK_EQ(fake.events, 0);
+	CHECK_EQ(admin_command_takes_frame(ADMIN_COMPARE), 0);
+}
+
 TEST(admin, requests_to_registers_and_eeproms_reach_the_bus_and_those_that_write_are_events)
 {
 	static const struct {

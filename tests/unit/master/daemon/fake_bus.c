@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "bus/differences.h"
 #include "bus/esc_access.h"
 #include "bus/exchange_list.h"
 #include "mailbox/mailbox.h"
@@ -541,4 +542,25 @@ int sii_job_alias(struct sii_job *job, struct bus *bus, size_t pos, uint16_t ali
 int sii_job_step(struct sii_job *job)
 {
 	return no_answer(job->error);
+}
+
+const uint8_t *bus_slave_sii(const struct bus *bus, size_t pos, size_t *ret_bytes)
+{
+	(void)bus;
+	(void)pos;
+	*ret_bytes = 0;
+	return NULL;
+}
+
+int differences_of_bus(const struct bus *bus, const struct config *cfg, struct differences *list)
+{
+	(void)bus;
+	(void)cfg;
+	(void)list;
+	return 0;
+}
+
+void differences_free(struct differences *list)
+{
+	(void)list;
 }

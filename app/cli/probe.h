@@ -6,8 +6,8 @@
  * same checks. All of it returns 0 (or a length) or -errno: -ENOENT is "this kernel does not have
  * it", -EACCES "not for this user". Outputs are untouched on failure. Context: blocking.
  */
-#ifndef CLI_DOCTOR_PROBE_H
-#define CLI_DOCTOR_PROBE_H
+#ifndef CLI_PROBE_H
+#define CLI_PROBE_H
 
 #include <stddef.h>
 #include <stdint.h>

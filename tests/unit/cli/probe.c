@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The machine as the doctor reads it: files below a root, and calls. */
-#include "cli/doctor/probe.h"
+#include "cli/probe.h"
 
 #include <errno.h>
 #include <sys/stat.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* What of a command line of ecdaqd makes its configuration. */
-#include "cli/doctor/resolve.h"
+#include "cli/resolve.h"
 
 #include "harness/test.h"
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "cli/doctor/probe.h"
+#include "cli/probe.h"
 
 #include <arpa/inet.h>
 #include <dirent.h>

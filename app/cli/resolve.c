@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "cli/doctor/resolve.h"
+#include "cli/resolve.h"
 
 #include <ctype.h>
 #include <inttypes.h>
@@ -110,15 +110,13 @@ static size_t read_all(FILE *file, char text[RESOLVE_TEXT_BYTES])
 	return len;
 }
 
-/* The command line of ecdaqd, or that of its next start. 0 if unknown. */
-static int find_words(const struct probe *p, int64_t pid, char text[RESOLVE_TEXT_BYTES],
-		      struct resolve_words *words)
+int resolve_words(const struct probe *p, int64_t pid, char *text, struct resolve_words *ret)
 {
 	size_t len = pid == 0 ? 0 : read_all(probe_open(p, "/proc/%" PRId64 "/cmdline", pid), text);
 	char *options;
 
 	if (len > 0) {
-		resolve_parse(text, len, '\0', words);
+		resolve_parse(text, len, '\0', ret);
 		return 1;
 	}
 	if (!probe_exists(p, APPLIANCE_CONFIG)) {
@@ -128,17 +126,16 @@ static int find_words(const struct probe *p, int64_t pid, char text[RESOLVE_TEXT
 	text[len] = '\0';
 	options = strstr(text, APPLIANCE_OPTIONS);
 	options = options == NULL ? text + len : options + strlen(APPLIANCE_OPTIONS);
-	resolve_parse(options, strcspn(options, "\n"), ' ', words);
-	words->config = APPLIANCE_CONFIG;
+	resolve_parse(options, strcspn(options, "\n"), ' ', ret);
+	ret->config = APPLIANCE_CONFIG;
 	return 1;
 }
 
-/* The path of a command line's file as seen from here. */
-static int config_path(const struct probe *p, int64_t pid, const char *config,
-		       char path[PROBE_PATH_BYTES])
+int resolve_config_path(const struct probe *p, int64_t pid, const char *config,
+			char ret_path[PROBE_PATH_BYTES])
 {
-	return config[0] == '/' ? probe_path(p, path, "%s", config)
-				: probe_path(p, path, "/proc/%" PRId64 "/cwd/%s", pid, config);
+	return config[0] == '/' ? probe_path(p, ret_path, "%s", config)
+				: probe_path(p, ret_path, "/proc/%" PRId64 "/cwd/%s", pid, config);
 }
 
 void resolve_load(const struct probe *p, int64_t pid, struct config *ret_cfg,
@@ -151,11 +148,11 @@ void resolve_load(const struct probe *p, int64_t pid, struct config *ret_cfg,
 	const char *from = NULL;
 
 	config_defaults(ret_cfg);
-	if (!find_words(p, pid, text, &words)) {
+	if (!resolve_words(p, pid, text, &words)) {
 		snprintf(ret_name, PROBE_PATH_BYTES, "defaults");
 		return;
 	}
-	if (words.config != NULL && config_path(p, pid, words.config, path) == 0) {
+	if (words.config != NULL && resolve_config_path(p, pid, words.config, path) == 0) {
 		from = path;
 	}
 	snprintf(ret_name, PROBE_PATH_BYTES, "%.200s%s", from == NULL ? "defaults" : words.config,

@@ -1,0 +1,284 @@
+/* SPDX-License-Identifier: MIT */
+/* ecdaq scan: what is on the bus, as a configuration. */
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/args.h"
+#include "cli/cli.h"
+#include "cli/coe_type.h"
+#include "cli/each_slave.h"
+#include "cli/file.h"
+#include "cli/pdo_info.h"
+#include "cli/source.h"
+#include "image/image.h"
+#include "program/json.h"
+
+#define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
+
+enum { ERROR_BYTES = 512 };
+
+struct scan_command {
+	struct cli *cli;
+	const struct status_page *page;
+	struct samples samples; /* the channel table of this session */
+	int has_channels;
+	const char *path; /* NULL: standard output */
+	int is_forced;
+	int is_json;
+	FILE *out;
+};
+
+/* --- comments: text of slaves, made printable --- */
+
+static void put_entry(FILE *out, const struct pdo_info_entry *entry)
+{
+	char type[TEXT_BYTES];
+	char name[SII_NAME_BYTES];
+
+	if (entry->index == 0) {
+		fprintf(out, "    #     -          %3u padding\n", entry->bits);
+		return;
+	}
+	fprintf(out, "    #     0x%04x:%02x  %3u %-6s %s\n", entry->index, entry->subindex,
+		entry->bits, entry->type == 0 ? "?" : coe_type_to_str(entry->type, type),
+		text_plain(entry->name, name, sizeof(name)));
+}
+
+static void put_pdos(FILE *out, const struct pdo_info *info)
+{
+	char text[256];
+
+	if (info->why[0] != '\0') {
+		fprintf(out, "    # PDOs by SII, not by CoE: %s\n",
+			text_plain(info->why, text, sizeof(text)));
+	} else if (info->pdo_count > 0) {
+		fprintf(out, "    # PDOs by %s:\n", info->is_by_coe ? "CoE" : "SII");
+	}
+	for (size_t i = 0; i < info->pdo_count; i++) {
+		const struct pdo_info_pdo *pdo = &info->pdo[i];
+
+		fprintf(out, "    #   %s 0x%04x ", pdo->is_tx ? "TxPDO" : "RxPDO", pdo->index);
+		if (pdo->is_assigned) {
+			fprintf(out, "SM%d", pdo->sm);
+		} else {
+			fputs("not assigned", out);
+		}
+		fprintf(out, "%s%s\n", pdo->name[0] == '\0' ? "" : "  ",
+			text_plain(pdo->name, text, sizeof(text)));
+		for (size_t e = 0; e < pdo->count && pdo->is_assigned; e++) {
+			put_entry(out, &info->entry[pdo->first + e]);
+		}
+	}
+}
+
+static void put_channels(const struct scan_command *cmd, uint16_t pos)
+{
+	int is_open = 0;
+
+	for (uint32_t i = 0; cmd->has_channels && i < cmd->samples.meta->channel_count; i++) {
+		const struct channel *ch = &cmd->samples.channels[i];
+		char type[TEXT_BYTES];
+		char name[LIMIT_NAME_BYTES];
+		char unit[sizeof(ch->unit)];
+
+		if (ch->slave_pos != pos) {
+			continue;
+		}
+		if (!is_open) {
+			fputs("    # channels:\n", cmd->out);
+			is_open = 1;
+		}
+		image_type_format(ch, type, sizeof(type));
+		fprintf(cmd->out, "    #   %-6s %-7s %s%s%s\n",
+			ch->direction == CHANNEL_OUTPUT ? "output" : "input", type,
+			text_plain(ch->name, name, sizeof(name)), ch->unit[0] == '\0' ? "" : " ",
+			text_plain(ch->unit, unit, sizeof(unit)));
+	}
+}
+
+/* --- the file --- */
+
+static void put_head(const struct scan_command *cmd)
+{
+	char interface[sizeof(cmd->page->interface)];
+
+	fprintf(cmd->out,
+		"# Written by ecdaq scan: the slaves on this bus, in their order. The list is "
+		"exact: a slave\n"
+		"# that is missing, or one too many, keeps the bus from OP (bus.presence).\n"
+		"bus:\n  interface: ");
+	text_plain(cmd->page->interface, interface, sizeof(interface));
+	json_put_text(cmd->out, interface);
+	fputs("\n\nslaves:\n", cmd->out);
+}
+
+static enum exit_code put_slave(void *ctx, uint16_t pos)
+{
+	const struct scan_command *cmd = ctx;
+	struct slave_info slave = source_slave(cmd->page, pos);
+	char device[sizeof(slave.device)];
+	struct pdo_info *info;
+	enum exit_code result = pdo_info_read(cmd->cli, pos, &info);
+
+	if (result != EXIT_CODE_OK) {
+		return result;
+	}
+	fprintf(cmd->out, "  # %u: %s%s\n", pos, text_plain(slave.device, device, sizeof(device)),
+		GET(cmd->page->slave[pos].is_lost) ? " (lost)" : "");
+	fprintf(cmd->out, "  - name: %s\n", slave.name);
+	fprintf(cmd->out, "    vendor: 0x%08x\n    product: 0x%08x\n    revision: 0x%08x\n",
+		slave.vendor, slave.product, slave.revision);
+	if (slave.serial != 0) {
+		fprintf(cmd->out, "    # only this very device: serial: %u\n", slave.serial);
+	}
+	if (slave.alias != 0) {
+		fprintf(cmd->out, "    alias: 0x%04x\n", slave.alias);
+	}
+	put_channels(cmd, pos);
+	put_pdos(cmd->out, info);
+	pdo_info_free(info);
+	return EXIT_CODE_OK;
+}
+
+/* Whoever starts with the file must not be the first to see that it is wrong. */
+static enum exit_code check(const struct scan_command *cmd, const char *text, size_t len)
+{
+	struct config *cfg = malloc(sizeof(*cfg));
+	char error[ERROR_BYTES] = "out of memory";
+	int r = cfg == NULL ? -ENOMEM
+			    : config_parse("ecdaq scan", text, len, cfg, error, sizeof(error));
+
+	free(cfg);
+	return r == 0 ? EXIT_CODE_OK : cli_fail(cmd->cli, EXIT_CODE_FAILED, "%s", error);
+}
+
+static enum exit_code write_out(const struct scan_command *cmd, const char *text, size_t len)
+{
+	enum exit_code result = check(cmd, text, len);
+
+	if (result != EXIT_CODE_OK) {
+		return result;
+	}
+	if (cmd->path == NULL) {
+		fwrite(text, 1, len, stdout);
+		return EXIT_CODE_OK;
+	}
+	result = cmd->is_forced ? file_write(cmd->cli, cmd->path, (const uint8_t *)text, len)
+				: file_write_new(cmd->cli, cmd->path, (const uint8_t *)text, len);
+	if (result == EXIT_CODE_OK) {
+		printf("%s: %u slaves\n", cmd->path, source_slave_count(cmd->page));
+	}
+	return result;
+}
+
+static enum exit_code write_yaml(struct scan_command *cmd)
+{
+	enum exit_code result;
+	char *text = NULL;
+	size_t len = 0;
+
+	cmd->out = open_memstream(&text, &len);
+	if (cmd->out == NULL) {
+		return cli_fail(cmd->cli, EXIT_CODE_FAILED, "out of memory");
+	}
+	put_head(cmd);
+	result = each_slave(cmd->cli, cmd->page, NULL, 0, put_slave, cmd);
+	if (fclose(cmd->out) != 0 && result == EXIT_CODE_OK) {
+		result = cli_fail(cmd->cli, EXIT_CODE_FAILED, "out of memory");
+	}
+	if (result == EXIT_CODE_OK) {
+		result = write_out(cmd, text, len);
+	}
+	free(text);
+	return result;
+}
+
+/* --- JSON --- */
+
+static void show_json(const struct scan_command *cmd)
+{
+	struct json js;
+
+	json_init(&js, stdout);
+	json_array_begin(&js, NULL);
+	for (uint32_t i = 0; i < source_slave_count(cmd->page); i++) {
+		struct slave_info slave = source_slave(cmd->page, i);
+
+		json_object_begin(&js, NULL);
+		json_u64(&js, "position", i);
+		json_text(&js, "name", slave.name);
+		json_text(&js, "device", slave.device);
+		json_u64(&js, "vendor", slave.vendor);
+		json_u64(&js, "product", slave.product);
+		json_u64(&js, "revision", slave.revision);
+		json_u64(&js, "serial", slave.serial);
+		json_u64(&js, "alias", slave.alias);
+		json_truth(&js, "dc", slave.has_dc);
+		json_truth(&js, "lost", GET(cmd->page->slave[i].is_lost) != 0);
+		json_array_begin(&js, "channel");
+		for (uint32_t c = 0; cmd->has_channels && c < cmd->samples.meta->channel_count;
+		     c++) {
+			if (cmd->samples.channels[c].slave_pos == i) {
+				json_text(&js, NULL, cmd->samples.channels[c].name);
+			}
+		}
+		json_array_end(&js);
+		json_object_end(&js);
+	}
+	json_array_end(&js);
+	json_end_line(&js);
+}
+
+/* --- all --- */
+
+static enum exit_code run(struct scan_command *cmd)
+{
+	if (source_slave_count(cmd->page) == 0) {
+		return cli_fail(cmd->cli, EXIT_CODE_NO_SLAVE,
+				"%s: no slave was found: ecdaq state, ecdaq rescan",
+				cmd->page->interface);
+	}
+	if (cmd->is_json) {
+		show_json(cmd);
+		return EXIT_CODE_OK;
+	}
+	return write_yaml(cmd);
+}
+
+enum exit_code verb_scan(struct cli *cli, int argc, char **argv)
+{
+	struct scan_command cmd = { .cli = cli };
+	const struct args_option options[] = {
+		{ "write", 'w', args_text, &cmd.path, "FILE", "write it to FILE" },
+		{ "force", 0, args_flag, &cmd.is_forced, NULL, "replace FILE if it is there" },
+		{ "json", 0, args_flag, &cmd.is_json, NULL,
+		  "the slaves as a JSON array, not as a configuration" },
+	};
+	struct args args = { .options = options, .option_count = 3 };
+	enum exit_code result;
+
+	if (!cli_parse(cli, &args, argc, argv, &result)) {
+		return result;
+	}
+	if (cmd.path != NULL ? cmd.is_json : cmd.is_forced) {
+		return cli_fail(cli, EXIT_CODE_USAGE,
+				cmd.is_json ? "--write and --json exclude each other"
+					    : "--force requires --write");
+	}
+	result = source_status(cli, &cmd.page);
+	if (result != EXIT_CODE_OK) {
+		return result;
+	}
+	/* That of an earlier session has other slaves. */
+	if (samples_try(cli, &cmd.samples) == 0) {
+		cmd.has_channels = cmd.samples.meta->session == cmd.page->session;
+		result = run(&cmd);
+		samples_close(&cmd.samples);
+	} else {
+		result = run(&cmd);
+	}
+	source_status_close(cmd.page);
+	return result;
+}

@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * Every difference between what is configured and what is found, for people; what fits is decided
+ * by compare_bind() alone. Context: service thread; allocates.
+ */
+#ifndef BUS_DIFFERENCES_H
+#define BUS_DIFFERENCES_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/difference.h"
+#include "base/sample.h"
+#include "config/config.h"
+
+struct bus;
+
+/* Zero at first. */
+struct differences {
+	struct difference *at;
+	size_t count;
+	size_t room;
+};
+
+void differences_free(struct differences *list);
+
+/** Those of the slaves: none if compare_bind() binds them, but optional ones that are absent. @id
+ * as for compare_bind(). 0 or -ENOMEM. */
+int differences_of_slaves(const struct config *cfg, const struct slave_info *found,
+			  const uint16_t *id, size_t found_count, struct differences *list);
+
+/** outputs[] that are no output channels. @slave_count of @slaves: those of the channels. */
+int differences_of_outputs(const struct config *cfg, const struct channel *channels,
+			   size_t channel_count, struct differences *list);
+
+/**
+ * All of @bus against @cfg as it was configured: slaves, those that were lost since, new devices,
+ * outputs. @bus NULL: no slave was found. 0 or -ENOMEM.
+ */
+int differences_of_bus(const struct bus *bus, const struct config *cfg, struct differences *list);
+
+#endif
