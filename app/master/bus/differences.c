@@ -453,7 +453,8 @@ static int add_lost(const struct bus *bus, const struct config *cfg, struct diff
 			diff->item = (uint16_t)(item - 1);
 			diff->line = (uint32_t)cfg->slave[item - 1].line;
 		}
-		snprintf(diff->name, sizeof(diff->name), "%s", bus->info[j].name);
+		snprintf(diff->name, sizeof(diff->name), "%.*s", (int)sizeof(diff->name) - 1,
+			 bus->info[j].name);
 	}
 	return 0;
 }
