@@ -338,38 +338,27 @@ static void take(void *ctx, struct admin_pending *pending)
 	admin_pending_complete(pending, 0);
 }
 
-TEST(admin, the_list_of_datagrams_needs_no_slave_and_is_no_event)
+TEST(admin, what_is_asked_of_the_whole_bus_needs_no_slave_takes_no_frame_and_is_no_event)
 {
-	struct fake fake;
-	struct admin_target target;
-	struct admin_request rq = fake_request(ADMIN_DATAGRAMS);
+	static const enum admin_verb verbs[] = { ADMIN_DATAGRAMS, ADMIN_COMPARE };
 
-	fake_init(&fake);
-	target = fake_target(&fake);
-	target.slave_count = 0;
-	target.bus_request = NULL; /* during a bring-up */
-	CHECK_EQ(start(&target, &rq)->reply.result, -EBUSY);
-	target.bus_request = take;
-	CHECK_EQ(start(&target, &rq)->reply.result, 0);
-	CHECK_EQ(fake.events, 0);
-}
+	for (size_t i = 0; i < sizeof(verbs) / sizeof(verbs[0]); i++) {
+		struct fake fake;
+		struct admin_target target;
+		struct admin_request rq = fake_request(verbs[i]);
 
-TEST(admin, a_comparison_reaches_the_bus_with_any_slave_position_and_is_no_event)
-{
-	struct fake fake;
-	struct admin_target target;
-	struct admin_request rq = fake_request(ADMIN_COMPARE);
-
-	fake_init(&fake);
-	target = fake_target(&fake);
-	rq.slave_pos = 400;
-	target.bus_request = NULL; /* during a bring-up */
-	CHECK_EQ(start(&target, &rq)->reply.result, -EBUSY);
-	target.bus_request = take;
-	CHECK_EQ(start(&target, &rq)->reply.result, 0);
-	CHECK(fake.pending != NULL);
-	CHECK_EQ(fake.events, 0);
-	CHECK_EQ(admin_command_takes_frame(ADMIN_COMPARE), 0);
+		fake_init(&fake);
+		target = fake_target(&fake);
+		target.slave_count = 0;
+		rq.slave_pos = 400;
+		target.bus_request = NULL; /* during a bring-up */
+		CHECK_EQ(start(&target, &rq)->reply.result, -EBUSY);
+		target.bus_request = take;
+		CHECK_EQ(start(&target, &rq)->reply.result, 0);
+		CHECK(fake.pending != NULL);
+		CHECK_EQ(fake.events, 0);
+		CHECK_EQ(admin_command_takes_frame(verbs[i]), 0);
+	}
 }
 
 TEST(admin, requests_to_registers_and_eeproms_reach_the_bus_and_those_that_write_are_events)

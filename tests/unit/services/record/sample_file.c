@@ -6,6 +6,7 @@
 #include "base/bytes.h"
 #include "harness/test.h"
 #include "record/mcap_reader.h"
+#include "record/mcap_recover.h"
 
 struct mcap_writer *sample_file_begin(struct memory_file *f, int zstd_level)
 {
@@ -111,4 +112,28 @@ struct sample_findings sample_file_read(struct memory_file *f, size_t len)
 	}
 	mcap_reader_destroy(r);
 	return found;
+}
+
+int sample_file_recover(struct memory_file *f, struct memory_file *ret_copy)
+{
+	const struct mcap_io io = memory_io(ret_copy);
+	const struct mcap_source source = memory_source(f, f->len);
+	struct mcap_source copied;
+	struct mcap_writer *w;
+	struct mcap_scan *scan;
+	int r = mcap_scan_create(&source, NULL, &scan);
+
+	if (r < 0) {
+		return r;
+	}
+	CHECK_EQ(mcap_writer_create(&io, 0, &w), 0);
+	CHECK_EQ(mcap_copy_whole(&source, scan, w), 0);
+	mcap_scan_destroy(scan);
+	CHECK_EQ(mcap_writer_finish(w), 0);
+	mcap_writer_destroy(w);
+	copied = memory_source(ret_copy, ret_copy->len);
+	CHECK_EQ(mcap_scan_create(&copied, NULL, &scan), 0);
+	CHECK(mcap_scan_is_whole(scan));
+	mcap_scan_destroy(scan);
+	return 0;
 }

@@ -29,4 +29,7 @@ struct sample_findings {
 
 struct sample_findings sample_file_read(struct memory_file *f, size_t len);
 
+/** All that is whole in @f as a new file, CHECKed to be whole. 0, or -errno if @f is none. */
+int sample_file_recover(struct memory_file *f, struct memory_file *ret_copy);
+
 #endif
