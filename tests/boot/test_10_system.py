@@ -128,6 +128,18 @@ def test_the_watchdog_is_fed_by_systemd(machine: Machine) -> None:
     assert usec == "15s"
 
 
+def test_a_service_can_neither_command_the_master_nor_take_names_of_its_files(
+    machine: Machine,
+) -> None:
+    """ecdaq-dds reads the network: whoever takes it over has what it may."""
+    machine.run("ecdaq status > /dev/null")
+    for command in ("ecdaq stop", "touch /run/ecdaq/samples.new", "touch /run/ecdaq/record/status"):
+        done = machine.run(f"sudo -u ecdaq-dds {command} 2>&1; echo $?")
+        assert "ermission denied" in done and not done.endswith("\n0\n"), done
+    machine.run("sudo -u ecdaq-dds ecdaq status > /dev/null")
+    assert machine.run("stat -c %G /run/ecdaq/commands-remote").strip() == "ecdaq-remote"
+
+
 @pytest.mark.parametrize("unit", sorted(EXPOSURE_LIMITS))
 def test_the_exposure_of_a_service_is_bounded(machine: Machine, unit: str) -> None:
     message = machine.run(f"systemd-analyze security --no-pager {unit} | tail -n 1")

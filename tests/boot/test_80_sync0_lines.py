@@ -57,7 +57,7 @@ ExecStart=/usr/bin/ecdaq-sim --interface ecsim0 --slaves 2 --priority 60 \
 """
 DUMP = f"""[Service]
 ExecStart=
-ExecStart=/usr/bin/ecdaq-sync0 {CONFIG} $ECDAQ_OPTIONS --dump /run/ecdaq/sync0.dump
+ExecStart=/usr/bin/ecdaq-sync0 {CONFIG} $ECDAQ_OPTIONS --dump /run/ecdaq/sync0/dump
 """
 
 
@@ -233,7 +233,7 @@ def test_a_suppressed_pulse_is_reported_with_its_cycle_and_nothing_else_is(
     last = machine.sync0()
     root(machine, "systemctl stop ecdaq-sync0 wire")
     books = Books(
-        machine.run(f"cat {PLACE}/log"), machine.run("cat /run/ecdaq/sync0.dump"), PERIOD_NS
+        machine.run(f"cat {PLACE}/log"), machine.run("cat /run/ecdaq/sync0/dump"), PERIOD_NS
     )
     carry(machine, "0=0", "1=1")
     root(machine, "systemctl start ecdaq-sync0")

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "base/run_path.h"
 #include "base/slave_place.h"
 #include "base/sync0.h"
 #include "fake.h"
@@ -226,8 +227,11 @@ void fake_make_status(struct fake *f)
 
 void fake_make_record_status(struct fake *f)
 {
-	struct record_status *record = status_create(fake_path(f, CONFIG_RUN_RECORD_STATUS),
-						     RECORD_STATUS_MAGIC, sizeof(*record), f->mode);
+	const char *path = fake_path(f, CONFIG_RUN_RECORD_STATUS);
+	struct record_status *record =
+		run_path_own_folder(path) < 0
+			? NULL
+			: status_create(path, RECORD_STATUS_MAGIC, sizeof(*record), f->mode);
 
 	if (record == NULL) {
 		fake_die("record-status", errno);
@@ -245,8 +249,11 @@ void fake_make_record_status(struct fake *f)
 
 void fake_make_sync0_status(struct fake *f)
 {
-	struct sync0_status *page = status_create(fake_path(f, CONFIG_RUN_SYNC0_STATUS),
-						  SYNC0_STATUS_MAGIC, sizeof(*page), f->mode);
+	const char *path = fake_path(f, CONFIG_RUN_SYNC0_STATUS);
+	struct sync0_status *page =
+		run_path_own_folder(path) < 0
+			? NULL
+			: status_create(path, SYNC0_STATUS_MAGIC, sizeof(*page), f->mode);
 
 	if (page == NULL) {
 		fake_die("sync0-status", errno);

@@ -199,7 +199,7 @@ def test_a_crashed_master_ends_the_session(bench: Bench) -> None:
 def test_a_second_recorder_is_refused_in_one_line(bench: Bench) -> None:
     bench.record()
     wait_until("lock", lambda: bool((bench.folder / ".ecdaq-record.lock").exists()))
-    wait_until("status", (bench.run_dir / "record-status").exists)
+    wait_until("status", (bench.run_dir / "record/status").exists)
     second = bench.record()
     _, output = second.communicate(timeout=60)
     assert second.returncode == 6

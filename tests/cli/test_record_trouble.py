@@ -70,7 +70,7 @@ def test_a_sync_that_found_the_disk_full_costs_no_cycle(bench: Bench, thin: Thin
         *thin.inside(RECORD, "--run-dir", bench.run_dir, "--dir", thin.disk, "--once"),
         *("--set", "record.compression=0", "--set", "record.reserve=0B"),
     )
-    status = bench.run_dir / "record-status"
+    status = bench.run_dir / "record/status"
     wait_until("status page", status.exists)
     producer = bench.produce("--cycles", str(cycles), "--depth", "16384", "--pace")
     wait_until("ring", (bench.run_dir / "samples").exists)
@@ -123,7 +123,7 @@ def test_ended_without_recording_all_it_is_not_exit_0(bench: Bench) -> None:
         *(RECORD, "--run-dir", bench.run_dir, "--dir", bench.folder),
         *("--set", "record.reserve=1TiB"),
     )
-    status = bench.run_dir / "record-status"
+    status = bench.run_dir / "record/status"
     wait_until("status page", status.exists)
     assert bench.produce("--cycles", "100").wait(60) == 0
     wait_until("the alarm", lambda: b"recording stopped, disk full" in status.read_bytes())

@@ -279,5 +279,6 @@ def test_a_calibration_needs_two_lines(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("content", [b"", b"cdq", b"\0" * 5000])
 def test_a_damaged_status_page_is_refused(run_dir: Path, content: bytes) -> None:
-    (run_dir / "sync0-status").write_bytes(content)
+    (run_dir / "sync0").mkdir()
+    (run_dir / "sync0/status").write_bytes(content)
     fails(ecdaq(run_dir, "sync0"), FAILED, "another version of ecdaq, or damaged")

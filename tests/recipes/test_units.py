@@ -67,3 +67,24 @@ def test_every_service_is_sandboxed(path: Path) -> None:
     figure = float(re.findall(r"exposure level for \S+: ([\d.]+) ", done.stdout)[0])
     print(f"{path.stem}: {figure}")
     assert figure < EXPOSURE_LIMIT
+
+
+def test_a_service_writes_in_its_own_folder_of_the_run_directory_only() -> None:
+    folders = (ROOT / "usr/lib/tmpfiles.d/ecdaq.conf").read_text()
+    for unit in ("ecdaq-record", "ecdaq-dds", "ecdaq-sync0"):
+        own = "/run/ecdaq/" + unit.removeprefix("ecdaq-")
+        assert f"d {own} 2750 {unit} ecdaq-read -\n" in folders
+        writes = " ".join(values(f"{unit}.service", "ReadWritePaths")).split()
+        assert [p for p in writes if p.startswith("/run/")] == [own]
+    assert "d /run/ecdaq 2750 ecdaqd ecdaq-read -\n" in folders
+
+
+def test_only_an_operator_commands_the_master_and_only_dds_sets_remote_outputs() -> None:
+    text = (ROOT / "usr/lib/sysusers.d/ecdaq.conf").read_text()
+    members = [line.split()[1:] for line in text.splitlines() if line.startswith("m ")]
+    # ecdaqd gives its sockets away, for which it has to be a member.
+    assert {user for user, group in members if group == "ecdaq-admin"} == {"ecdaqd", "operator"}
+    assert {user for user, group in members if group == "ecdaq-remote"} == {"ecdaqd", "ecdaq-dds"}
+    for unit in UNITS.glob("*.service"):
+        assert values(unit.name, "Group") in ([], ["ecdaq-read"])
+        assert values(unit.name, "SupplementaryGroups") == []

@@ -3,7 +3,6 @@
 
 #include <assert.h>
 #include <errno.h>
-#include <fcntl.h>
 #include <signal.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -14,7 +13,7 @@
 #include <unistd.h>
 
 #include "foreign.h"
-#include "pages.h"
+#include "new_file.h"
 
 #define RING_MAGIC UINT64_C(0x31676e6972716463) /* "cdqring1" */
 #define PAGE_BYTES 4096u
@@ -107,71 +106,37 @@ static void fill_header(struct ring_header *h, const struct ring_spec *spec)
 	snprintf(h->kind, sizeof(h->kind), "%s", spec->kind);
 }
 
-static int map_new_file(const char *path, unsigned mode, uint64_t bytes, void **ret_map)
-{
-	int fd = open(path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-	void *map;
-	int r;
-
-	if (fd < 0) {
-		return -errno;
-	}
-	/* Not ftruncate: a full tmpfs must fail here and not by SIGBUS in the cycle. */
-	r = fchmod(fd, mode) < 0 ? errno : posix_fallocate(fd, 0, (off_t)bytes);
-	if (r != 0) {
-		close(fd);
-		unlink(path);
-		return -r;
-	}
-	map = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, fd, 0);
-	r = errno;
-	close(fd);
-	if (map == MAP_FAILED) {
-		unlink(path);
-		return -r;
-	}
-	*ret_map = map;
-	return 0;
-}
-
 int ring_create(const struct ring_spec *spec, struct ring **ret_ring)
 {
 	struct ring_header header = { .magic = 0 };
+	struct new_file file = { .map = NULL };
 	struct ring *ring;
-	char temporary[4096];
-	void *map = NULL;
 	int r;
 
-	if (snprintf(temporary, sizeof(temporary), "%s.new", spec->path) >=
-	    (int)sizeof(temporary)) {
-		return -ENAMETOOLONG;
-	}
 	fill_header(&header, spec);
 	ring = calloc(1, sizeof(*ring));
 	if (ring == NULL) {
 		return -ENOMEM;
 	}
-	r = map_new_file(temporary, spec->file_mode, header.total_bytes, &map);
+	r = new_file_create(spec->path, spec->file_mode, header.total_bytes, &file);
 	if (r < 0) {
 		free(ring);
 		return r;
 	}
-	assert(map != NULL);
-	pages_touch(map, header.total_bytes);
-	memcpy(map, &header, sizeof(header));
+	assert(file.map != NULL);
+	memcpy(file.map, &header, sizeof(header));
 	if (spec->meta_bytes > 0) {
-		memcpy((char *)map + header.meta_offset, spec->meta, spec->meta_bytes);
+		memcpy((char *)file.map + header.meta_offset, spec->meta, spec->meta_bytes);
 	}
-	ring->header = map;
-	ring->slots = (_Atomic uint64_t *)(void *)((char *)map + header.slots_offset);
+	ring->header = file.map;
+	ring->slots = (_Atomic uint64_t *)(void *)((char *)file.map + header.slots_offset);
 	ring->slot_words = header.slot_bytes / WORD_BYTES;
 	ring->mask = header.slot_count - 1;
 	ring->map_bytes = header.total_bytes;
 	atomic_store_explicit(&ring->header->state, RING_STATE_OPEN, memory_order_release);
-	if (rename(temporary, spec->path) < 0) {
-		r = -errno;
-		unlink(temporary);
-		ring_destroy(ring);
+	r = new_file_publish(&file, spec->path);
+	if (r < 0) {
+		free(ring);
 		return r;
 	}
 	*ret_ring = ring;

@@ -5,9 +5,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
-enum { PATH_BYTES = 4096 };
+enum { PATH_BYTES = 4096, FOLDER_MODE = 0750 };
 
 const char *run_path_named(const char *dir)
 {
@@ -38,4 +39,20 @@ int run_path(const char *dir, const char *file, char *ret_path, size_t path_byte
 	}
 	memcpy(ret_path, path, (size_t)len + 1);
 	return 0;
+}
+
+int run_path_own_folder(const char *path)
+{
+	const char *end = strrchr(path, '/');
+	char folder[PATH_BYTES];
+
+	if (end == NULL || end == path) {
+		return -EINVAL;
+	}
+	if ((size_t)(end - path) >= sizeof(folder)) {
+		return -ENAMETOOLONG;
+	}
+	memcpy(folder, path, (size_t)(end - path));
+	folder[end - path] = '\0';
+	return mkdir(folder, FOLDER_MODE) == 0 || errno == EEXIST ? 0 : -errno;
 }

@@ -13,4 +13,11 @@ const char *run_path_named(const char *dir);
 /** The path of @file in it to @ret_path. 0; -ENAMETOOLONG: longer than @path_bytes, untouched. */
 int run_path(const char *dir, const char *file, char *ret_path, size_t path_bytes);
 
+/**
+ * Make the folder of the file @path, if it is not there: mode 0750, and in the group of a
+ * set-group-ID directory above. It has the files of one process, which alone may write there. 0, or
+ * -errno; -EINVAL: @path has no folder; -ENOENT: what is above is not there either.
+ */
+int run_path_own_folder(const char *path);
+
 #endif

@@ -2,7 +2,6 @@
 #include "status.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/mman.h>
@@ -10,7 +9,7 @@
 #include <unistd.h>
 
 #include "foreign.h"
-#include "pages.h"
+#include "new_file.h"
 
 enum { READ_TRIES = 100 };
 
@@ -52,40 +51,19 @@ const char *record_state_to_str(uint32_t state)
 
 void *status_create(const char *path, uint64_t magic, uint32_t bytes, unsigned file_mode)
 {
-	char temporary[4096];
-	void *map = MAP_FAILED;
-	int fd;
-	int r;
+	struct new_file file = { .map = NULL };
+	int r = new_file_create(path, file_mode, bytes, &file);
 
-	if (snprintf(temporary, sizeof(temporary), "%s.new", path) >= (int)sizeof(temporary)) {
-		errno = ENAMETOOLONG;
-		return NULL;
-	}
-	fd = open(temporary, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-	if (fd < 0) {
-		return NULL;
-	}
-	r = fchmod(fd, file_mode) < 0 ? errno : posix_fallocate(fd, 0, bytes);
 	if (r == 0) {
-		map = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, fd, 0);
-		r = map == MAP_FAILED ? errno : 0;
+		memcpy(file.map, &magic, sizeof(magic));
+		memcpy((char *)file.map + sizeof(magic), &bytes, sizeof(bytes));
+		r = new_file_publish(&file, path);
 	}
-	close(fd);
-	if (r == 0) {
-		pages_touch(map, bytes);
-		memcpy(map, &magic, sizeof(magic));
-		memcpy((char *)map + sizeof(magic), &bytes, sizeof(bytes));
-		r = rename(temporary, path) < 0 ? errno : 0;
-	}
-	if (r != 0) {
-		if (map != MAP_FAILED) {
-			munmap(map, bytes);
-		}
-		unlink(temporary);
-		errno = r;
+	if (r < 0) {
+		errno = -r;
 		return NULL;
 	}
-	return map;
+	return file.map;
 }
 
 /* 1: all texts of the copy are whole; 0: one was being written; -EPROTO: the file is too short. */

@@ -89,7 +89,9 @@ struct config_output {
 struct config {
 	/* runtime */
 	char run_dir[CONFIG_PATH_BYTES]; /* ring, events, status, admin socket; "" = default */
-	char group[32];                  /* of the admin socket and the shared files; "" = leave */
+	char group[32];                  /* of the run directory and its files; "" = default */
+	char admin_group[32];            /* of the admin socket */
+	char remote_group[32];           /* of the socket that gives the board of remote outputs */
 	/* bus */
 	char interface[32];
 	int64_t bus_scan_timeout_ns;
@@ -246,18 +248,18 @@ enum { CONFIG_WHY_BYTES = 192 };
  */
 int config_parse_duration(const char *text, int64_t *ret_ns, char *reason);
 
-/* Files of the run directory. */
+/* Files of the run directory, which is ecdaqd's; a service has a folder of its own in it. */
 #define CONFIG_RUN_SAMPLES "samples"                 /* ring of samples */
 #define CONFIG_RUN_EVENTS "events"                   /* ring of events */
 #define CONFIG_RUN_STATUS "status"                   /* struct status_page */
-#define CONFIG_RUN_RECORD_STATUS "record-status"     /* struct record_status */
-#define CONFIG_RUN_DDS_STATUS "dds-status"           /* struct dds_status */
-#define CONFIG_RUN_COMMANDS_REMOTE "commands-remote" /* socket that gives ecdaq-dds its board */
-#define CONFIG_RUN_SYNC0 "sync0"                     /* ring of struct sync0_result */
-#define CONFIG_RUN_SYNC0_EVENTS "sync0-events"       /* ring of events of ecdaq-sync0 */
-#define CONFIG_RUN_SYNC0_STATUS "sync0-status"       /* struct sync0_status */
-#define CONFIG_RUN_SYNC0_LOCK "sync0-lock"           /* held by the one ecdaq-sync0 */
 #define CONFIG_RUN_ADMIN "admin"                     /* socket, base/admin_protocol.h */
+#define CONFIG_RUN_COMMANDS_REMOTE "commands-remote" /* socket that gives ecdaq-dds its board */
+#define CONFIG_RUN_RECORD_STATUS "record/status"     /* struct record_status */
+#define CONFIG_RUN_DDS_STATUS "dds/status"           /* struct dds_status */
+#define CONFIG_RUN_SYNC0 "sync0/results"             /* ring of struct sync0_result */
+#define CONFIG_RUN_SYNC0_EVENTS "sync0/events"       /* ring of events of ecdaq-sync0 */
+#define CONFIG_RUN_SYNC0_STATUS "sync0/status"       /* struct sync0_status */
+#define CONFIG_RUN_SYNC0_LOCK "sync0/lock"           /* held by the one ecdaq-sync0 */
 
 /** 1 if the run directory is named by @cfg->run_dir or $ECDAQ_RUN_DIR, and not the default. */
 int config_has_run_dir(const struct config *cfg);

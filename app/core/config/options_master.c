@@ -14,8 +14,22 @@ static const struct option rows[] = {
 	  .type = OPTION_TEXT,
 	  FIELD(group),
 	  .default_value = "",
-	  .prose = "Group that may read the rings and command the daemon through the admin "
-		   "socket. Empty: the daemon's own group." },
+	  .prose = "Group that may read the run directory: rings and status pages. Empty: "
+		   "`ecdaq-read` where that group exists and the daemon is in it, else the "
+		   "daemon's own group." },
+	{ .name = "runtime.admin_group",
+	  .type = OPTION_TEXT,
+	  FIELD(admin_group),
+	  .default_value = "",
+	  .prose = "Group that may command the daemon through the admin socket: stop it, change "
+		   "states, write objects. Its members have to be in `runtime.group`, too. Empty: "
+		   "as there, with `ecdaq-admin`." },
+	{ .name = "runtime.remote_group",
+	  .type = OPTION_TEXT,
+	  FIELD(remote_group),
+	  .default_value = "",
+	  .prose = "Group that may set outputs of owner remote: ecdaq-dds. Empty: as there, with "
+		   "`ecdaq-remote`." },
 	/* bus */
 	{ .name = "bus.interface",
 	  .type = OPTION_TEXT,

@@ -4,6 +4,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <grp.h>
+#include <limits.h>
 #include <linux/magic.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,7 +18,7 @@
 
 #include "base/event.h"
 
-enum { DIR_MODE = 0750, SHARED_MODE = 03770, FILE_MODE = 0640, GROUP_BYTES = 4096 };
+enum { DIR_MODE = 0750, SHARED_MODE = 02750, FILE_MODE = 0640, GROUP_BYTES = 4096 };
 
 int run_dir_path(const struct run_dir *run, const char *file, char *ret_path, size_t path_bytes)
 {
@@ -53,31 +54,56 @@ static int fail(struct failure *failure, const char *what, int err)
 			   err == ENOSPC ? " (a smaller ring.depth needs less)" : "");
 }
 
-static int find_group(struct run_dir *run, const char *name, struct failure *failure)
+static int is_member(gid_t group)
+{
+	gid_t groups[NGROUPS_MAX];
+	int n = getgroups(NGROUPS_MAX, groups);
+
+	for (int i = 0; i < n; i++) {
+		if (groups[i] == group) {
+			return 1;
+		}
+	}
+	return group == getegid() || geteuid() == 0;
+}
+
+/* The group that is configured as @option has to be there; without one @usual is taken where it can
+ * be. */
+static int find_group(const char *option, const char *name, const char *usual, gid_t *ret_group,
+		      struct failure *failure)
 {
 	struct group entry;
 	struct group *found = NULL;
 	char buf[GROUP_BYTES];
 
-	run->group = (gid_t)-1;
-	if (name[0] == '\0') {
-		return 0;
+	getgrnam_r(name[0] != '\0' ? name : usual, &entry, buf, sizeof(buf), &found);
+	if (name[0] != '\0' && found == NULL) {
+		return failure_set(failure, EXIT_CODE_CONFIG, -ENOENT, "%s: %s: no such group",
+				   option, name);
 	}
-	getgrnam_r(name, &entry, buf, sizeof(buf), &found);
-	if (found == NULL) {
-		return failure_set(failure, EXIT_CODE_CONFIG, -ENOENT,
-				   "runtime.group: %s: no such group", name);
-	}
-	run->group = found->gr_gid;
+	*ret_group = found != NULL && (name[0] != '\0' || is_member(found->gr_gid)) ? found->gr_gid
+										    : (gid_t)-1;
 	return 0;
 }
 
-/* The recorder and the publisher, other users of the group, create pages of their own beside ours:
- * the group may create files. Each belongs to the group (set-group-ID), and only its owner may
- * remove it (sticky). */
-static int hand_to_group(const struct run_dir *run, struct failure *failure)
+static int find_groups(struct run_dir *run, const struct config *cfg, struct failure *failure)
 {
-	if (run->group == (gid_t)-1) {
+	int r = find_group("runtime.group", cfg->group, "ecdaq-read", &run->group, failure);
+
+	r = r < 0 ? r
+		  : find_group("runtime.admin_group", cfg->admin_group, "ecdaq-admin",
+			       &run->admin_group, failure);
+	return r < 0 ? r
+		     : find_group("runtime.remote_group", cfg->remote_group, "ecdaq-remote",
+				  &run->remote_group, failure);
+}
+
+/* What is made in it belongs to the group as well (set-group-ID). A directory that is so already is
+ * left alone: the service's sandbox forbids the bit. */
+static int hand_to_group(const struct run_dir *run, const struct stat *st, struct failure *failure)
+{
+	if (run->group == (gid_t)-1 ||
+	    (st->st_gid == run->group && (st->st_mode & 07777) == SHARED_MODE)) {
 		return 0;
 	}
 	if (chown(run->dir, (uid_t)-1, run->group) < 0 || chmod(run->dir, SHARED_MODE) < 0) {
@@ -112,7 +138,7 @@ static int make_dir(struct run_dir *run, struct failure *failure)
 				   "%s: belongs to user %u, not to this one", run->dir, st.st_uid);
 	}
 	run->is_tmpfs = fs.f_type == TMPFS_MAGIC || fs.f_type == RAMFS_MAGIC;
-	return hand_to_group(run, failure);
+	return hand_to_group(run, &st, failure);
 }
 
 static int busy(const struct run_dir *run, struct failure *failure)
@@ -216,7 +242,7 @@ int run_dir_open(struct run_dir *run, const struct config *cfg, const struct pla
 	for (size_t len = strlen(run->dir); len > 1 && run->dir[len - 1] == '/'; len--) {
 		run->dir[len - 1] = '\0';
 	}
-	r = find_group(run, cfg->group, failure);
+	r = find_groups(run, cfg, failure);
 	if (r == 0) {
 		r = make_dir(run, failure);
 	}

@@ -19,8 +19,10 @@
 
 struct run_dir {
 	char dir[CONFIG_PATH_BYTES];
-	gid_t group; /* (gid_t)-1: leave */
-	int lock;    /* descriptor that holds the lock; -1: none */
+	gid_t group;        /* of the directory; (gid_t)-1: leave */
+	gid_t admin_group;  /* of the admin socket; the same */
+	gid_t remote_group; /* of the socket that gives the board; the same */
+	int lock;           /* descriptor that holds the lock; -1: none */
 	int is_tmpfs;
 	struct status_page *page;
 	struct ring *events;

@@ -284,10 +284,10 @@ static int open_sockets(struct session *s, char *error, size_t error_bytes)
 		snprintf(error, error_bytes, "%s: %s", s->run.dir, strerror(-r));
 		return r;
 	}
-	r = admin_server_create(admin, s->run.group, &s->admin, error, error_bytes);
+	r = admin_server_create(admin, s->run.admin_group, &s->admin, error, error_bytes);
 	return r < 0 ? r
-		     : admin_server_offer_board(s->admin, remote, s->run.group, s->run.remote_fd,
-						error, error_bytes);
+		     : admin_server_offer_board(s->admin, remote, s->run.remote_group,
+						s->run.remote_fd, error, error_bytes);
 }
 
 static int watch_sockets(struct session *s, struct failure *failure)

@@ -10,6 +10,7 @@
 
 #include "base/clock.h"
 #include "base/platform.h"
+#include "base/run_path.h"
 #include "reader/feed.h"
 #include "reader/reader.h"
 #include "record/sample_feed.h"
@@ -128,6 +129,9 @@ static void have_page(struct recorder *rec)
 	struct record_status *page;
 
 	if (rec->page != &rec->own || rec->opt.status_path[0] == '\0') {
+		return;
+	}
+	if (run_path_own_folder(rec->opt.status_path) < 0) {
 		return;
 	}
 	page = status_create(rec->opt.status_path, RECORD_STATUS_MAGIC, sizeof(*page), 0644);

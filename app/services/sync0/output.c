@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "base/ring.h"
+#include "base/run_path.h"
 #include "base/status.h"
 #include "reader/page.h"
 
@@ -124,8 +125,11 @@ static int busy(const struct output *out, char *why)
 /* To hold it no right to write is needed: it may have been made by another user's. */
 static int take_lock(struct output *out, char *why)
 {
-	int r;
+	int r = run_path_own_folder(out->lock_path);
 
+	if (r < 0) {
+		return fail(out->lock_path, r, why);
+	}
 	out->lock = open(out->lock_path, O_RDONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, FILE_MODE);
 	if (out->lock < 0) {
 		return fail(out->lock_path, -errno, why);

@@ -7,6 +7,7 @@
 #include <grp.h>
 #include <stddef.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "harness/test.h"
@@ -97,7 +98,7 @@ TEST(run_dir, a_second_instance_is_rejected_and_leaves_the_page_of_the_first_unc
 	bench_close(&b);
 }
 
-TEST(run_dir, group_members_can_add_files_and_remove_only_their_own)
+TEST(run_dir, group_members_can_read_and_cannot_add_files)
 {
 	static struct bench b;
 	struct run_dir run;
@@ -110,8 +111,73 @@ TEST(run_dir, group_members_can_add_files_and_remove_only_their_own)
 	snprintf(b.cfg.group, sizeof(b.cfg.group), "%s", group->gr_name);
 	CHECK_EQ(open_home(&b, &run, &failure), 0);
 	CHECK_EQ(stat(b.cfg.run_dir, &st), 0);
-	CHECK_EQ(st.st_mode & 07777, 03770);
+	CHECK_EQ(st.st_mode & 07777, 02750);
 	CHECK_EQ(st.st_gid, getegid());
+	run_dir_close(&run);
+	bench_close(&b);
+}
+
+/* What another member of the directory's group gets who makes @path. */
+static int made_by_a_member(const char *path, gid_t group)
+{
+	int status = 0;
+	pid_t pid = fork();
+
+	CHECK(pid >= 0);
+	if (pid == 0) {
+		if (setgroups(0, NULL) < 0 || setgid(group) < 0 || setuid(12345) < 0) {
+			_exit(255);
+		}
+		_exit(open(path, O_WRONLY | O_CREAT, 0600) < 0 ? errno : 0);
+	}
+	CHECK_EQ(waitpid(pid, &status, 0), pid);
+	CHECK(WIFEXITED(status));
+	return WEXITSTATUS(status);
+}
+
+TEST(run_dir, a_member_of_the_group_cannot_take_the_name_of_a_page_to_come)
+{
+	static struct bench b;
+	struct run_dir run;
+	struct failure failure;
+	char path[512];
+
+	if (geteuid() != 0) {
+		SKIP("needs root to be two users");
+	}
+	bench_open(&b, "/dev/shm");
+	CHECK_EQ(chmod(b.root, 0755), 0);
+	snprintf(b.cfg.group, sizeof(b.cfg.group), "daemon");
+	CHECK_EQ(open_home(&b, &run, &failure), 0);
+	CHECK_EQ(run_dir_path(&run, CONFIG_RUN_STATUS, path, sizeof(path)), 0);
+	CHECK_EQ(made_by_a_member(path, run.group), EACCES); /* it may read it only */
+	CHECK_EQ(run_dir_path(&run, CONFIG_RUN_SAMPLES ".new", path, sizeof(path)), 0);
+	CHECK_EQ(made_by_a_member(path, run.group), EACCES);
+	run_dir_close(&run);
+	bench_close(&b);
+}
+
+TEST(run_dir, who_reads_who_commands_and_who_sets_outputs_are_three_groups)
+{
+	static struct bench b;
+	struct run_dir run;
+	struct failure failure;
+
+	if (geteuid() != 0) {
+		SKIP("needs root to give files to another group");
+	}
+	bench_open(&b, "/dev/shm");
+	snprintf(b.cfg.group, sizeof(b.cfg.group), "daemon");
+	snprintf(b.cfg.admin_group, sizeof(b.cfg.admin_group), "adm");
+	snprintf(b.cfg.remote_group, sizeof(b.cfg.remote_group), "mail");
+	CHECK_EQ(open_home(&b, &run, &failure), 0);
+	CHECK_EQ(run.group, getgrnam("daemon")->gr_gid);
+	CHECK_EQ(run.admin_group, getgrnam("adm")->gr_gid);
+	CHECK_EQ(run.remote_group, getgrnam("mail")->gr_gid);
+	run_dir_close(&run);
+	snprintf(b.cfg.remote_group, sizeof(b.cfg.remote_group), "no-such-group-9");
+	CHECK_EQ(open_home(&b, &run, &failure), -ENOENT);
+	CHECK_STR(failure.text, "runtime.remote_group: no-such-group-9: no such group");
 	run_dir_close(&run);
 	bench_close(&b);
 }

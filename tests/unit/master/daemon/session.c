@@ -4,7 +4,9 @@
 
 #include <errno.h>
 #include <ftw.h>
+#include <grp.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -80,7 +82,18 @@ static void warn(void *ctx, const char *text)
 	snprintf(b->warning, sizeof(b->warning), "%s", text);
 }
 
-static void bench_open(struct bench *b)
+static void bench_prepare(struct bench *b)
+{
+	memset(b, 0, sizeof(*b));
+	fake_bus_init();
+	config_defaults(&b->cfg);
+	b->cfg.ring_depth_ns = NS_PER_S;
+	snprintf(b->dir, sizeof(b->dir), "/dev/shm/ecdaqd-session-XXXXXX");
+	CHECK(mkdtemp(b->dir) != NULL);
+	snprintf(b->cfg.run_dir, sizeof(b->cfg.run_dir), "%s", b->dir);
+}
+
+static void bench_begin(struct bench *b)
 {
 	struct failure failure;
 	struct session_spec spec = {
@@ -96,14 +109,13 @@ static void bench_open(struct bench *b)
 		.segment = RUN_DIR_SIMULATED,
 	};
 
-	memset(b, 0, sizeof(*b));
-	fake_bus_init();
-	config_defaults(&b->cfg);
-	b->cfg.ring_depth_ns = NS_PER_S;
-	snprintf(b->dir, sizeof(b->dir), "/dev/shm/ecdaqd-session-XXXXXX");
-	CHECK(mkdtemp(b->dir) != NULL);
-	snprintf(b->cfg.run_dir, sizeof(b->cfg.run_dir), "%s", b->dir);
 	CHECK_EQ(session_create(&spec, &b->session, &failure), 0);
+}
+
+static void bench_open(struct bench *b)
+{
+	bench_prepare(b);
+	bench_begin(b);
 }
 
 static int forget(const char *path, const struct stat *st, int kind, struct FTW *ftw)
@@ -454,6 +466,30 @@ static struct admin_request led(uint64_t value)
 	snprintf(rq.item[0].channel, sizeof(rq.item[0].channel), "a.led");
 	rq.item[0].raw = value;
 	return rq;
+}
+
+TEST(session, who_may_command_and_who_may_set_remote_outputs_are_the_groups_of_the_sockets)
+{
+	static struct bench b;
+	struct stat st;
+	char path[256];
+
+	if (geteuid() != 0) {
+		SKIP("needs root to give sockets to other groups");
+	}
+	bench_prepare(&b);
+	snprintf(b.cfg.admin_group, sizeof(b.cfg.admin_group), "adm");
+	snprintf(b.cfg.remote_group, sizeof(b.cfg.remote_group), "mail");
+	bench_begin(&b);
+	snprintf(path, sizeof(path), "%s/" CONFIG_RUN_ADMIN, b.dir);
+	CHECK_EQ(stat(path, &st), 0);
+	CHECK_EQ(st.st_gid, getgrnam("adm")->gr_gid);
+	CHECK_EQ(st.st_mode & 07777, 0660);
+	snprintf(path, sizeof(path), "%s/" CONFIG_RUN_COMMANDS_REMOTE, b.dir);
+	CHECK_EQ(stat(path, &st), 0);
+	CHECK_EQ(st.st_gid, getgrnam("mail")->gr_gid);
+	CHECK_EQ(st.st_mode & 07777, 0660);
+	bench_close(&b);
 }
 
 TEST(session, an_output_set_through_the_socket_is_on_the_wire_and_safe_at_the_end)

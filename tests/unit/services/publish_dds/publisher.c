@@ -146,7 +146,7 @@ static void new_ring(struct bench *b, uint64_t session)
 
 static void bench_close(struct bench *b)
 {
-	static const char *const files[] = { "samples", "dds-status" };
+	static const char *const files[] = { "samples", "dds/status", "dds" };
 	char path[128];
 
 	publisher_destroy(b->publisher);
@@ -154,7 +154,7 @@ static void bench_close(struct bench *b)
 	fake_topics(NULL);
 	for (size_t i = 0; i < sizeof(files) / sizeof(files[0]); i++) {
 		snprintf(path, sizeof(path), "%s/%s", b->dir, files[i]);
-		unlink(path);
+		remove(path);
 	}
 	CHECK_EQ(rmdir(b->dir), 0);
 }

@@ -200,7 +200,7 @@ void bench_init(struct bench *b, uint64_t session, uint64_t slots)
 	CHECK(mkdtemp(b->root) != NULL);
 	snprintf(b->ring_path, sizeof(b->ring_path), "%s/samples", b->root);
 	snprintf(b->events_path, sizeof(b->events_path), "%s/events", b->root);
-	snprintf(b->status_path, sizeof(b->status_path), "%s/record-status", b->root);
+	snprintf(b->status_path, sizeof(b->status_path), "%s/record/status", b->root);
 	snprintf(b->dir, sizeof(b->dir), "%s/records/here", b->root);
 	b->now_ns = 1000 * NS_PER_S;
 	b->bytes_free = UINT64_C(1) << 40;
@@ -240,7 +240,10 @@ static void remove_tree(const char *path)
 
 void bench_done(struct bench *b)
 {
-	static const char *const files[] = { "samples", "events", "record-status",
+	static const char *const files[] = { "samples",
+					     "events",
+					     "record/status",
+					     "record",
 					     "records/here/.ecdaq-record.lock",
 					     "records/here/.ecdaq-record.state" };
 	char path[2 * BENCH_PATH_BYTES];
@@ -255,7 +258,7 @@ void bench_done(struct bench *b)
 	remove_tree(b->dir);
 	for (size_t i = 0; i < sizeof(files) / sizeof(files[0]); i++) {
 		snprintf(path, sizeof(path), "%s/%s", b->root, files[i]);
-		unlink(path);
+		remove(path);
 	}
 	rmdir(b->dir);
 	snprintf(path, sizeof(path), "%s/records", b->root);

@@ -115,8 +115,9 @@ static unsigned mappings(void)
 
 static void end(void)
 {
-	static const char *const names[] = { "edges",        "samples",      "sync0",
-					     "sync0-events", "sync0-status", "sync0-lock" };
+	static const char *const names[] = { "edges",        "samples",      "sync0/results",
+					     "sync0/events", "sync0/status", "sync0/lock",
+					     "sync0" };
 
 	if (b.watch != NULL) {
 		watch_finish(b.watch);
@@ -128,7 +129,7 @@ static void end(void)
 		fclose(b.edges);
 	}
 	for (size_t i = 0; i < sizeof(names) / sizeof(names[0]); i++) {
-		unlink(path_of(names[i]));
+		remove(path_of(names[i]));
 	}
 	CHECK_EQ(rmdir(b.dir), 0);
 }
@@ -179,7 +180,7 @@ static struct sync0_status *page(void)
 {
 	static struct sync0_status copy;
 
-	CHECK_EQ(page_read_sync0(path_of("sync0-status"), &copy), 0);
+	CHECK_EQ(page_read_sync0(path_of("sync0/status"), &copy), 0);
 	return &copy;
 }
 
@@ -253,8 +254,8 @@ TEST(sync0_watch, a_run_directory_that_is_made_later_or_anew_is_taken)
 	CHECK_EQ(page()->state, SYNC0_NO_LINE);
 	mapped = mappings();
 	CHECK(mapped > 0);
-	unlink(path_of("sync0-lock"));
-	unlink(path_of("sync0-status"));
+	unlink(path_of("sync0/lock"));
+	unlink(path_of("sync0/status"));
 	watch_step(b.watch);
 	CHECK_EQ(page()->state, SYNC0_NO_LINE);
 	CHECK_EQ(mappings(), mapped); /* those of the deleted files are gone */
