@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import time
@@ -183,9 +184,7 @@ class Segment:
                     process.kill()
                     process.wait(10)
         self.space.close()
-        for file in self.run_dir.iterdir():
-            file.unlink()
-        self.run_dir.rmdir()
+        shutil.rmtree(self.run_dir)
 
 
 class Undisturbed:
