@@ -199,6 +199,24 @@ static int exchange(int fd, struct admin_transfer *tr)
 	return r;
 }
 
+/* The outcome @r of an exchange, reported. */
+static enum exit_code judge_exchange(const struct cli *cli, const struct admin_transfer *tr, int r)
+{
+	if (r == -EAGAIN) {
+		return cli_fail(cli, EXIT_CODE_FAILED, "ecdaqd: no answer within %d s",
+				timeout_s(tr->request));
+	}
+	if (r == -EPROTO) {
+		return cli_fail(cli, EXIT_CODE_FAILED,
+				"ecdaqd: the answer is from another version of ecdaq");
+	}
+	if (r == -ECONNRESET || r == -EPIPE) {
+		return cli_fail(cli, EXIT_CODE_NO_DAEMON,
+				"ecdaqd: connection closed without an answer");
+	}
+	return r < 0 ? cli_fail(cli, EXIT_CODE_FAILED, "ecdaqd: %s", strerror(-r)) : EXIT_CODE_OK;
+}
+
 enum exit_code admin_transfer(struct cli *cli, struct admin_transfer *tr)
 {
 	char path[CONFIG_PATH_BYTES];
@@ -216,19 +234,7 @@ enum exit_code admin_transfer(struct cli *cli, struct admin_transfer *tr)
 	tr->request->magic = ADMIN_MAGIC;
 	r = exchange(fd, tr);
 	close(fd);
-	if (r == -EAGAIN) {
-		return cli_fail(cli, EXIT_CODE_FAILED, "ecdaqd: no answer within %d s",
-				timeout_s(tr->request));
-	}
-	if (r == -EPROTO) {
-		return cli_fail(cli, EXIT_CODE_FAILED,
-				"ecdaqd: the answer is from another version of ecdaq");
-	}
-	if (r == -ECONNRESET || r == -EPIPE) {
-		return cli_fail(cli, EXIT_CODE_NO_DAEMON,
-				"ecdaqd: connection closed without an answer");
-	}
-	return r < 0 ? cli_fail(cli, EXIT_CODE_FAILED, "ecdaqd: %s", strerror(-r)) : EXIT_CODE_OK;
+	return judge_exchange(cli, tr, r);
 }
 
 enum exit_code admin_transfer_do(struct cli *cli, struct admin_transfer *tr)
@@ -242,6 +248,50 @@ void admin_transfer_done(struct admin_transfer *tr)
 {
 	free(tr->answer);
 	tr->answer = NULL;
+}
+
+enum exit_code admin_hold(struct cli *cli, struct admin_request *request, int *ret_fd)
+{
+	struct admin_transfer tr = { .request = request };
+	char path[CONFIG_PATH_BYTES];
+	enum exit_code result = cli_path(cli, CONFIG_RUN_ADMIN, path);
+	int fd;
+	int r;
+
+	if (result != EXIT_CODE_OK) {
+		return result;
+	}
+	fd = connect_to(path, ADMIN_TIMEOUT_S);
+	if (fd < 0) {
+		return fail_connect(cli, path, -fd);
+	}
+	request->magic = ADMIN_MAGIC;
+	r = send_all(fd, &tr);
+	r = r == 0 ? receive(fd, &tr) : r;
+	result = judge_exchange(cli, &tr, r);
+	if (result == EXIT_CODE_OK && tr.reply.kind != ADMIN_REPLY_PROGRESS) {
+		result = admin_judge(cli, &tr.reply);
+	}
+	if (result != EXIT_CODE_OK) {
+		close(fd);
+		return result;
+	}
+	*ret_fd = fd;
+	return EXIT_CODE_OK;
+}
+
+int admin_hold_has_ended(int fd)
+{
+	struct pollfd pfd = { .fd = fd, .events = POLLIN };
+
+	return poll(&pfd, 1, 0) > 0;
+}
+
+void admin_hold_end(int fd)
+{
+	if (fd >= 0) {
+		close(fd);
+	}
 }
 
 void admin_show_progress(const struct admin_transfer *tr)

@@ -37,6 +37,16 @@ void admin_transfer_done(struct admin_transfer *tr);
 /** For progress: per cent on standard error, if that is a terminal. */
 void admin_show_progress(const struct admin_transfer *tr);
 
+/**
+ * Send a request that stays open, and wait until ecdaqd reports that it has begun. EXIT_CODE_OK,
+ * and @ret_fd is for the next two; or the code of a failure or refusal that was reported.
+ */
+enum exit_code admin_hold(struct cli *cli, struct admin_request *request, int *ret_fd);
+/** 1 if ecdaqd has ended the request, or itself. */
+int admin_hold_has_ended(int fd);
+/** End the request; -1 is fine. */
+void admin_hold_end(int fd);
+
 /** EXIT_CODE_OK if @reply grants the request; else report why not: EXIT_CODE_REFUSED. */
 enum exit_code admin_judge(const struct cli *cli, const struct admin_reply *reply);
 

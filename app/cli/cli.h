@@ -69,6 +69,7 @@ enum exit_code verb_foe(struct cli *cli, int argc, char **argv);
 enum exit_code verb_histogram(struct cli *cli, int argc, char **argv);
 enum exit_code verb_oneshot(struct cli *cli, int argc, char **argv);
 enum exit_code verb_pdo(struct cli *cli, int argc, char **argv);
+enum exit_code verb_pcap(struct cli *cli, int argc, char **argv);
 enum exit_code verb_reg(struct cli *cli, int argc, char **argv);
 enum exit_code verb_rescan(struct cli *cli, int argc, char **argv);
 enum exit_code verb_scan(struct cli *cli, int argc, char **argv);

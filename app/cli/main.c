@@ -189,6 +189,11 @@ static const struct verb verbs[] = {
 	  "expected: with all slaves in OP. measured: in the newest frame that came back. Of each\n"
 	  "slave its SyncManagers and active FMMUs, as they are now, and what it adds.\n",
 	  verb_domains },
+	{ "pcap", "", "The frames of the running bus as a capture file (pcapng).",
+	  "ecdaq pcap --time 2s --output bus.pcapng\n"
+	  "ecdaq pcap | wireshark -k -i -\n\n"
+	  "Cyclic frames and all others, out and in; also while the bus is brought up.\n",
+	  verb_pcap },
 	{ "events", "", "What happened, oldest first.", NULL, verb_events },
 	{ "sync0", "[calibrate]", "Results of ecdaq-sync0: the SYNC0 pulses on GPIO lines.",
 	  "calibrate: the same signal is on the first two lines: measure the noise of this "

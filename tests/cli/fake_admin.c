@@ -428,6 +428,7 @@ static void answer(struct fake *f, const struct admin_request *rq, struct admin_
 	case ADMIN_SDO_ENTRY:
 		answer_coe(f, rq, reply);
 		break;
+	case ADMIN_CAPTURE:
 	case ADMIN_SOE_READ:
 	case ADMIN_SOE_WRITE:
 	case ADMIN_EOE_IP_READ:

@@ -35,6 +35,7 @@ VERBS = {
     "config": "show|check|diff",
     "crc": "[SLAVE...]",
     "domains": "[SLAVE...]",
+    "pcap": "",
     "events": "",
     "sync0": "[calibrate]",
     "histogram": "wake|",
@@ -68,6 +69,7 @@ READING = [
     ["sii", "read", "0"],
     ["crc", "0"],
     ["domains", "0"],
+    ["pcap"],
 ]
 
 
@@ -158,6 +160,8 @@ def test_versions_agree() -> None:
         (["cstruct", "--name", "a" * 41], "expected a C name of up to 40 characters"),
         (["cstruct", "--name", "a-b"], "--name: a-b: expected a C name"),
         (["cstruct", "x"], "cstruct: x: unexpected argument"),
+        (["pcap", "--json"], "--json requires --output"),
+        (["pcap", "--count", "0"], "--count"),
         (["events", "--level", "loud"], "--level: loud: expected info"),
         (["line\nbreak"], "line?break: unknown command"),
     ],

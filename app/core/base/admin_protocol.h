@@ -72,8 +72,10 @@ enum admin_verb {
 			   waited for, data; data: the answer's type (2 bytes), then its data */
 	/* --- the cyclic frames --- */
 	ADMIN_DATAGRAMS = 31, /* data: struct admin_datagram, one each of the cyclic frames */
-	ADMIN_COMPARE = 48,   /* what is configured with what is found; text: the file, data: struct
-				 difference of base/difference.h, none or more */
+	ADMIN_CAPTURE = 32, /* frames go to the ring "frames" (base/frame_record.h); stays open, one
+			       PROGRESS when they do, until it is cancelled or its client gone */
+	ADMIN_COMPARE = 48, /* what is configured with what is found; text: the file, data: struct
+			       difference of base/difference.h, none or more */
 };
 
 /* Every slave with a one-shot output, all in one cycle or none. */

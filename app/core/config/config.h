@@ -251,6 +251,7 @@ int config_parse_duration(const char *text, int64_t *ret_ns, char *reason);
 /* Files of the run directory, which is ecdaqd's; a service has a folder of its own in it. */
 #define CONFIG_RUN_SAMPLES "samples"                 /* ring of samples */
 #define CONFIG_RUN_EVENTS "events"                   /* ring of events */
+#define CONFIG_RUN_FRAMES "frames"                   /* ring of frames, base/frame_record.h */
 #define CONFIG_RUN_STATUS "status"                   /* struct status_page */
 #define CONFIG_RUN_ADMIN "admin"                     /* socket, base/admin_protocol.h */
 #define CONFIG_RUN_COMMANDS_REMOTE "commands-remote" /* socket that gives ecdaq-dds its board */

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/frame_record.h"
 #include "base/ring.h"
 
 /* Of a writer that overruns the reader each time, some records are read on the next call. */
@@ -20,6 +21,8 @@ static const struct {
 	[FEED_EVENTS] = { "event", sizeof(struct event), offsetof(struct event, mono_ns) },
 	[FEED_SYNC0] = { "sync0", sizeof(struct sync0_result),
 			 offsetof(struct sync0_result, mono_ns) },
+	[FEED_FRAMES] = { FRAME_RING_KIND, FRAME_SLOT_BYTES,
+			  offsetof(struct frame_record, mono_ns) },
 };
 
 struct feed {
@@ -110,6 +113,7 @@ void feed_seek(struct feed *f, const struct feed_mark *mark)
 	union {
 		struct event event;
 		struct sync0_result sync0;
+		uint8_t frame[FRAME_SLOT_BYTES];
 	} before;
 	int64_t mono_ns;
 	uint64_t lost;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The records of an event ring (ecdaqd, ecdaq-sync0) or of the ring of SYNC0 results, followed from
- * one run of its writer to the next. Context: one thread at a time for each feed; blocks only as
- * file reads on a tmpfs do.
+ * The records of an event ring (ecdaqd, ecdaq-sync0), of the ring of SYNC0 results or of that of
+ * captured frames, followed from one run of its writer to the next. Context: one thread at a time
+ * for each feed; blocks only as file reads on a tmpfs do.
  */
 #ifndef READER_FEED_H
 #define READER_FEED_H
@@ -16,6 +16,7 @@
 enum feed_kind {
 	FEED_EVENTS, /* struct event */
 	FEED_SYNC0,  /* struct sync0_result */
+	FEED_FRAMES, /* FRAME_SLOT_BYTES: struct frame_record, and the frame */
 };
 
 /* Where the first ring is entered; later ones are read from their first record. */
@@ -47,7 +48,7 @@ void feed_seek_back(struct feed *feed, uint64_t count);
 
 /**
  * The oldest record not read yet and its sequence (NULL: not asked for). @bytes is the size of
- * @ret_record: that of the kind's struct. 1; 0: none. *@ret_lost is increased by the number of
+ * @ret_record: that of the kind. 1; 0: none. *@ret_lost is increased by the number of
  * records that were overwritten before it.
  */
 int feed_read(struct feed *feed, void *ret_record, size_t bytes, uint64_t *ret_sequence,

@@ -475,6 +475,11 @@ void admin_command_run(const struct admin_target *target, struct admin_pending *
 	case ADMIN_COMPARE:
 		run_on_bus(target, pending);
 		return;
+	case ADMIN_CAPTURE:
+		emit(target, EVENT_COMMAND, EVENT_NO_SLAVE, 0, ADMIN_CAPTURE,
+		     (int32_t)pending->uid);
+		target->capture(target->ctx, pending);
+		return;
 	case ADMIN_CANCEL:
 	case ADMIN_DATA:
 		break; /* the server's own */

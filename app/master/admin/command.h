@@ -44,6 +44,8 @@ struct admin_target {
 	/** Start ADMIN_RESCAN, ADMIN_STATE of a slave that exists or of all, or a request to the
 	 * registers or the EEPROM of a slave that exists. NULL while a bring-up is under way. */
 	void (*bus_request)(void *ctx, struct admin_pending *pending);
+	/** ADMIN_CAPTURE, also while there is no bus: it stays open until it is cancelled. */
+	void (*capture)(void *ctx, struct admin_pending *pending);
 	void (*stop)(void *ctx);
 	void (*clear)(void *ctx);
 	void (*emit)(void *ctx, const struct event *ev);

@@ -36,6 +36,7 @@ struct admin_pending {
 	size_t data_len;
 	uint32_t uid; /* of the client */
 	int is_cancelled;
+	int outlives_bus;         /* it works on nothing that goes with the bus */
 	struct admin_reply reply; /* result, text, slave_code, cycle, dc_time_ns, data up to
 				     ADMIN_DATA_BYTES; admin_pending_reserve() for more */
 	/** Called in every pass until it is complete. NULL: none is needed. */

@@ -152,6 +152,7 @@ static int check_verb(const struct admin_request *rq, char *why)
 	case ADMIN_RESCAN:
 	case ADMIN_DATAGRAMS:
 	case ADMIN_COMPARE:
+	case ADMIN_CAPTURE:
 		return 0;
 	case ADMIN_STATE:
 		if (rq->argument[0] == 0 || rq->argument[0] > UINT8_MAX) {

@@ -124,7 +124,8 @@ void admin_server_cancel_all(struct admin_server *server)
 
 		if (pending->state == ADMIN_PENDING_QUEUED) {
 			admin_pending_complete(pending, -ECANCELED);
-		} else if (pending->state == ADMIN_PENDING_OPEN && !pending->is_cancelled) {
+		} else if (pending->state == ADMIN_PENDING_OPEN && !pending->is_cancelled &&
+			   !pending->outlives_bus) {
 			pending->is_cancelled = 1;
 			if (pending->cancel != NULL) {
 				pending->cancel(pending);

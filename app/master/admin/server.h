@@ -45,8 +45,8 @@ unsigned admin_server_service(struct admin_server *server, const struct admin_ta
 			      mono_t now);
 
 /**
- * Cancel every open request: what they work on is about to go. An executor that cannot complete a
- * request in its cancel() must do so before that.
+ * Cancel every open request but those that outlive the bus, which is about to go. An executor that
+ * cannot complete a request in its cancel() must do so before that.
  */
 void admin_server_cancel_all(struct admin_server *server);
 

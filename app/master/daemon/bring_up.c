@@ -9,6 +9,7 @@
 
 #include "daemon/session.h"
 #include "daemon/session_internal.h"
+#include "link/capture.h"
 
 enum {
 	FILE_MODE = 0640,
@@ -74,6 +75,7 @@ static int open_line(struct session *s, struct failure *failure)
 	}
 	s->is_link_up = transport.is_up == NULL || transport.is_up(transport.ctx) != 0;
 	session_show_link(s);
+	transport = capture_wrap(s->capture, transport);
 	r = line_create(s->spec.platform, transport, &s->line);
 	if (r < 0) {
 		transport.destroy(transport.ctx);

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "daemon/session_internal.h"
+#include "link/capture.h"
 
 #define ZERO(field) atomic_store_explicit(&(field), 0, memory_order_relaxed)
 
@@ -326,6 +327,11 @@ int session_create(const struct session_spec *spec, struct session **ret_session
 	memset(s, 0, sizeof(*s));
 	s->spec = *spec;
 	s->poller = -1;
+	r = capture_create(spec->platform, &s->capture);
+	if (r < 0) {
+		free(s);
+		return failure_set(failure, EXIT_CODE_RESOURCES, r, "capture: no memory");
+	}
 	r = run_dir_open(&s->run, spec->cfg, &spec->platform, spec->segment, failure);
 	if (r < 0) {
 		session_destroy(s);
@@ -387,6 +393,8 @@ void session_destroy(struct session *session)
 	if (session->poller >= 0) {
 		close(session->poller);
 	}
+	ring_destroy(session->frames);
+	capture_destroy(session->capture);
 	run_dir_close(&session->run);
 	free(session);
 }

@@ -29,6 +29,9 @@ struct session {
 	mono_t stop_by; /* 0: not stopping; else nothing on the wire is waited for any longer */
 	_Atomic int clear_asked; /* [service] set; [cycle] reset */
 	struct event_queue events;
+	struct capture *capture; /* of the frames; always there */
+	struct ring *frames;     /* where to; NULL: nobody has asked for it yet */
+	unsigned captures;       /* requests that are open */
 	unsigned replies_waiting;
 	/* while the bus is up */
 	struct line *line;
@@ -124,6 +127,8 @@ void session_forget_states(struct session *s);
 void session_bus_request(void *ctx, struct admin_pending *pending);
 /** ADMIN_REGISTER_..., ADMIN_SII_..., ADMIN_DIAGNOSIS, ADMIN_ERRORS_RESET. */
 void session_esc_request(struct session *s, struct admin_pending *pending);
+/** ADMIN_CAPTURE; @ctx is the session. */
+void session_capture(void *ctx, struct admin_pending *pending);
 /** ADMIN_DATAGRAMS. */
 void session_list_datagrams(struct session *s, struct admin_pending *pending);
 /** ADMIN_COMPARE. */

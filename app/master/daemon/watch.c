@@ -48,6 +48,7 @@ static void make_target(struct session *s, struct admin_target *ret_target)
 		.cfg = s->spec.cfg,
 		.is_op = s->state == BUS_OP || s->is_partial,
 		.dc_now = admin_dc_now,
+		.capture = session_capture,
 		.stop = admin_stop,
 		.clear = admin_clear,
 		.emit = session_bus_event,

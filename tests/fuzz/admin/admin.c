@@ -85,6 +85,7 @@ static struct admin_target make_target(void)
 		.is_op = 1,
 		.dc_now = dc_now,
 		.mailbox = sdo,
+		.capture = sdo,
 		.stop = nothing,
 		.clear = nothing,
 		.emit = emit,

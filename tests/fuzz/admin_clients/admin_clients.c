@@ -123,6 +123,7 @@ static unsigned service(void)
 					     .slave_count = 2,
 					     .mailbox = mailbox,
 					     .bus_request = bus_request,
+					     .capture = bus_request,
 					     .stop = nothing,
 					     .clear = nothing,
 					     .emit = emit };
@@ -166,7 +167,8 @@ static void ask(int fd, const uint8_t *arg)
 					 ADMIN_RESCAN,       ADMIN_STATE,     ADMIN_REGISTER_READ,
 					 ADMIN_SII_WRITE,    ADMIN_VOE,       ADMIN_FOE_WRITE,
 					 ADMIN_DIAGNOSIS,    ADMIN_SOE_READ,  ADMIN_CLEAR,
-					 ADMIN_ERRORS_RESET, ADMIN_DATAGRAMS, ADMIN_COMPARE };
+					 ADMIN_ERRORS_RESET, ADMIN_DATAGRAMS, ADMIN_COMPARE,
+					 ADMIN_CAPTURE };
 	struct admin_request rq = { .magic = ADMIN_MAGIC,
 				    .verb = verbs[arg[0] % sizeof(verbs)],
 				    .id = arg[1] % 16,

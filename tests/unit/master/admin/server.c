@@ -427,6 +427,23 @@ TEST(admin_server, all_requests_can_be_cancelled_and_their_clients_get_an_answer
 	bench_close(&b);
 }
 
+TEST(admin_server, a_capture_outlives_the_bus_and_ends_with_its_client)
+{
+	struct bench b;
+	int fd;
+
+	bench_open(&b);
+	fd = connect_and_read_sdo(&b, 7, 0);
+	b.fake.pending->outlives_bus = 1;
+	admin_server_cancel_all(b.server);
+	CHECK_EQ(service(&b), 1);
+	CHECK_EQ(b.fake.cancels, 0);
+	close(fd);
+	CHECK_EQ(service(&b), 0);
+	CHECK_EQ(b.fake.cancels, 1);
+	bench_close(&b);
+}
+
 /* Octet @i of a long transfer. */
 static uint8_t octet(size_t i)
 {

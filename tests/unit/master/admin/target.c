@@ -140,6 +140,7 @@ struct admin_target fake_target(struct fake *fake)
 		.dc_now = dc_now,
 		.mailbox = sdo,
 		.bus_request = bus_request,
+		.capture = sdo,
 		.stop = stop,
 		.clear = clear,
 		.emit = emit,
