@@ -43,7 +43,14 @@ fetch_apt_source() {
 		# Some mirrors list the security suite's sources and do not hold them.
 		bbwarn "the mirror does not give the source of $source"
 	done
-	bbfatal "no source of ${APT_SOURCE}"
+	# Where nothing but the .dsc is missing: the signed index states the same.
+	sdk_run sh -euc '
+		cd "$1"
+		apt-cache showsrc --only-source "$2" |
+			sed -e "/^\$/q" -e "s/^Package: /Source: /" -e "/ [^ ]*\.dsc\$/d" > "$2.dsc"
+		sed -n "/^Checksums-Sha256:/,/^[^ ]/s/^ \([0-9a-f]\{64\}\) [0-9]* /\1  /p" "$2.dsc" > sums
+		sha256sum --check sums' index "${PP}/apt-source" "${@apt_source(d).partition('=')[0]}" ||
+		bbfatal "no source of ${APT_SOURCE}"
 }
 
 unpack_apt_source() {
