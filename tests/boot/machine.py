@@ -110,8 +110,7 @@ class Machine:
         # The data partition has to grow into what the image does not have.
         with self.disk.open("r+b") as disk:
             disk.truncate(2 << 30)
-        shutil.copy(IMAGE / f"{NAME}-vmlinux", folder / "vmlinux")
-        shutil.copy(IMAGE / f"{NAME}.cmdline", folder / "cmdline")
+        shutil.copy(IMAGE / f"{NAME}-u-boot.bin", folder / "u-boot.bin")
         self.port = free_port()
         self.process: subprocess.Popen[bytes] | None = None
         self.boots = 0

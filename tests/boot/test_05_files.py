@@ -11,6 +11,7 @@ import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,13 +20,14 @@ import pytest
 from machine import TOOLS, TOP
 
 sys.path.insert(0, str(TOP / "tests" / "recipes"))
+import boot_state
 import firmware
 
 IMAGES = TOP / "build" / "image"
 MACHINES = ("qemuarm64", "raspberrypi4-64")
 MIB = 1 << 20
 SIZES_MIB = {"boot": 128, "rootA": 512, "rootB": 512}
-KERNEL = {"qemuarm64": "Image", "raspberrypi4-64": "kernel8.img"}
+SLOT = "/usr/lib/ecdaq/slot"
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,14 @@ class Built:
         where = f"{self.name}.img?offset={start}"
         return self.tool("debugfs", "-R", f"cat {name}", where)
 
+    def link(self, name: str) -> str:
+        """Where a symbolic link of the root file system leads."""
+        start = int(self.partitions()[1]["start"]) * 512
+        where = f"{self.name}.img?offset={start}"
+        told = self.tool("debugfs", "-R", f"stat {name}", where).decode()
+        found = re.search(r'Fast link dest: "(.*)"', told)
+        return found[1] if found else self.root_file(name).decode()
+
 
 @pytest.fixture(scope="module", params=MACHINES)
 def built(request: pytest.FixtureRequest) -> Built:
@@ -93,17 +103,47 @@ def test_partitions_are_those_of_the_layout(built: Built) -> None:
         assert found[0]["bootable"] is True
 
 
-def test_the_boot_partition_holds_kernel_command_line_and_settings_folder(built: Built) -> None:
-    kernel = built.boot_file(KERNEL[built.machine])
+def test_the_boot_partition_holds_the_boot_script_and_the_settings_folder(built: Built) -> None:
+    script = built.boot_file("boot.scr")
+    # U-Boot's image header: magic number, CRC of itself, and kind 6.
+    assert script[:4] == b"\x27\x05\x19\x56" and script[30] == 6
+    assert zlib.crc32(script[:4] + bytes(4) + script[8:64]) == int.from_bytes(script[4:8], "big")
+    source = TOP / "recipes/recipes-bsp/u-boot-ecdaq/files/boot.cmd"
+    assert source.read_bytes() in script
+    assert b"authorized_keys" in built.boot_file("ecdaq/README.txt")
+
+
+def test_the_slot_holds_kernel_command_line_and_device_trees(built: Built) -> None:
+    kernel = built.root_file(built.link(f"{SLOT}/kernel"))
+    assert kernel == built.path("-vmlinux").read_bytes()
     if kernel[:2] == b"\x1f\x8b":
         kernel = gzip.decompress(kernel)
     assert kernel[56:60] == b"ARMd", "no arm64 kernel"
-    assert kernel == built.path("-vmlinux").read_bytes()
-    assert (
-        built.boot_file("cmdline.txt").decode().strip()
-        == built.path(".cmdline").read_text().strip()
-    )
-    assert b"authorized_keys" in built.boot_file("ecdaq/README.txt")
+    words = built.path(".cmdline").read_text()
+    assert built.root_file(f"{SLOT}/slot.env").decode() == f"cmdline={words}"
+    if built.machine == "raspberrypi4-64":
+        for tree in (*firmware.TREES, "bcm2711-rpi-cm4.dtb"):
+            link = built.link(f"{SLOT}/dtb/broadcom/{tree}")
+            assert built.root_file(link)[:4] == b"\xd0\x0d\xfe\xed", tree
+
+
+def test_the_boot_state_is_in_front_of_the_first_partition(built: Built) -> None:
+    first = min(int(p["start"]) for p in built.partitions()) * 512
+    ends = [offset + size for offset, size in boot_state.PLACES]
+    # A GPT ends before 1 MiB.
+    assert boot_state.PLACES[0][0] >= MIB and ends[0] <= boot_state.PLACES[1][0]
+    assert ends[1] <= first
+    assert boot_state.read(built.path(".img")) == [None, None], "a new disk has none"
+    assert built.root_file("/etc/fw_env.config") == boot_state.CONFIG.read_bytes()
+
+
+def test_the_firmware_of_the_emulator_is_u_boot_of_the_image(built: Built) -> None:
+    board = {"qemuarm64": "qemu_arm64", "raspberrypi4-64": "rpi_arm64"}[built.machine]
+    loader = built.root_file(f"/usr/lib/u-boot-ecdaq/{board}/u-boot.bin")
+    assert loader == built.path("-u-boot.bin").read_bytes()
+    assert b"-ecdaq (" in loader
+    if built.machine == "raspberrypi4-64":
+        assert built.boot_file("u-boot.bin") == loader
 
 
 def test_the_command_line_isolates_the_last_core(built: Built) -> None:
@@ -114,17 +154,8 @@ def test_the_command_line_isolates_the_last_core(built: Built) -> None:
         *(f"irqaffinity={others}", "ro", "init=/usr/lib/ecdaq/preinit"),
     ):
         assert word in words, words
-
-
-def test_the_root_is_where_the_command_line_says(built: Built) -> None:
-    root = re.findall(r"root=(\S+)", built.path(".cmdline").read_text())
-    if built.machine == "qemuarm64":
-        assert root == ["PARTLABEL=rootA"]
-    else:
-        # Disk signature and partition number of the MBR.
-        with built.path(".img").open("rb") as file:
-            signature = int.from_bytes(file.read(512)[440:444], "little")
-        assert root == [f"PARTUUID={signature:08x}-02"]
+    # The boot script adds these: they are those of the slot.
+    assert [w for w in words if w.startswith(("root=", "rauc.slot="))] == []
 
 
 def test_the_root_file_system_is_clean_and_has_our_programs(built: Built) -> None:
@@ -212,7 +243,7 @@ def test_the_firmware_of_the_board_finds_what_it_needs(built: Built) -> None:
         assert b"brcm,bcm2711" in files[tree]
         for needed in (b"brcm,bcm2711-genet-v5", b"brcm,bcm2711-emmc2", b"brcm,bcm2835-pm"):
             assert needed in files[tree], (tree, needed)
-    for line in ("arm_64bit=1", "kernel=kernel8.img", "enable_uart=1", "upstream_kernel=1"):
+    for line in ("arm_64bit=1", "kernel=u-boot.bin", "enable_uart=1", "upstream_kernel=1"):
         assert line in settings.splitlines()
 
 

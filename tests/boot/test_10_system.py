@@ -20,6 +20,7 @@ EXPOSURE_LIMITS = {
     "ecdaq-dds.service": 2.0,
     "ecdaq-sync0.service": 2.0,
     "ecdaq-boot-config.service": 2.5,
+    "ecdaq-boot-good.service": 3.5,
     "ecdaq-clock.service": 2.0,
     "ecdaq-names.service": 1.5,
     "ecdaq-nic.service": 3.5,

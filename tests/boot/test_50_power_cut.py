@@ -146,6 +146,8 @@ def test_every_disk_that_a_cut_may_leave_holds_what_was_acknowledged(
     machine: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     wait_for("a recording", OP_S, lambda: recording(machine))
+    # It writes the boot state.
+    machine.wait_until("the start is good", "systemctl is-active --quiet ecdaq-boot-good")
     said = follow(machine)
     first, sectors = machine.partitions()["data"]
     source = Source(machine.write_log, machine.disk_before, first, sectors, tuple(said))

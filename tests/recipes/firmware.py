@@ -24,7 +24,7 @@ def settings(text: str) -> list[tuple[str, str]]:
 
 def files_wanted(text: str) -> set[str]:
     """Every file that the firmware opens with this config.txt, and cannot do without."""
-    wanted = {"start4.elf", "fixup4.dat", "config.txt", "cmdline.txt", *TREES}
+    wanted = {"start4.elf", "fixup4.dat", "config.txt", *TREES}
     for key, value in settings(text):
         if key.startswith("gpu_mem") and int(value) < CUT_DOWN_BELOW_MIB:
             wanted |= {"start4cd.elf", "fixup4cd.dat"}

@@ -20,6 +20,7 @@ LICENSES = {
     "MIT",
     "GPL-2.0-only WITH SOEM-exception",
     "GPL-2.0-only WITH Linux-syscall-note",
+    "GPL-2.0-or-later",
 }
 HOST = re.compile(
     r"(?<![\w.-])(?!www\.)(?:[a-z0-9-]+\.)*(?:debian\.org|pythonhosted\.org|pypi\.org)\b"

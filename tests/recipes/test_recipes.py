@@ -15,7 +15,15 @@ from execute import copy_tree
 from graph import Graph, Task
 from metadata import Metadata, MetadataError, Recipe
 
-OURS = {"linux-ecdaq", "soem", "ecdaq", "ecdaq-config", "ecdaq-segment", "ecdaq-image"}
+OURS = {
+    "linux-ecdaq",
+    "soem",
+    "ecdaq",
+    "ecdaq-config",
+    "ecdaq-segment",
+    "ecdaq-image",
+    "u-boot-ecdaq",
+}
 TEXTS = sorted(
     p
     for folder in ("recipes", "layers", "kernel-config", "app/tools/image")
@@ -87,7 +95,10 @@ def test_what_does_not_depend_on_the_machine_is_built_once(tmp_path: Path) -> No
         settings = {"MACHINE": machine, "DISTRO": "ecdaq", "TMPDIR": str(tmp_path)}
         graph = Graph(Metadata(TOP, tmp_path / machine, settings))
         hashes.append(
-            [graph.hash(Task(name, "do_dpkg_build")) for name in ("linux-ecdaq", "ecdaq")]
+            [
+                graph.hash(Task(name, "do_dpkg_build"))
+                for name in ("linux-ecdaq", "u-boot-ecdaq", "ecdaq")
+            ]
         )
     assert all(h == hashes[0] for h in hashes)
 

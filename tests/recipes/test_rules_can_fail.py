@@ -237,14 +237,14 @@ def test_an_error_in_a_layout_is_reported_with_line_or_file(tmp_path: Path, line
     ],
 )
 def test_a_file_that_the_firmware_does_not_find_is_named(text: str, name: str) -> None:
-    present = {"start4.elf", "fixup4.dat", "config.txt", "cmdline.txt", *firmware.TREES}
+    present = {"start4.elf", "fixup4.dat", "config.txt", *firmware.TREES}
     assert firmware.missing("gpu_mem=32\n", present) == []
     assert name in firmware.missing(text, present)
     assert name not in firmware.missing(text, present | {name})
 
 
 def test_a_board_without_its_device_tree_is_named() -> None:
-    present = {"start4.elf", "fixup4.dat", "config.txt", "cmdline.txt", *firmware.TREES[1:]}
+    present = {"start4.elf", "fixup4.dat", "config.txt", *firmware.TREES[1:]}
     assert firmware.missing("", present) == [firmware.TREES[0]]
 
 

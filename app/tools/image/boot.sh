@@ -105,8 +105,7 @@ if [ "$fresh" = yes ] || [ ! -f "$vm/disk.img" ] || ! cmp -s "$image/$name.sha25
 	truncate -s 4G "$vm/disk.img"
 	cp "$image/$name.sha256" "$vm/made-of"
 fi
-cp "$image/$name-vmlinux" "$vm/vmlinux"
-cp "$image/$name.cmdline" "$vm/cmdline"
+cp "$image/$name-u-boot.bin" "$vm/u-boot.bin"
 cp "$key" "$vm/authorized_keys"
 cp "$config" "$vm/ecdaq.yaml"
 [ "$wire" = no ] || grep -q '^sync0:' "$vm/ecdaq.yaml" || cat "$here/profile-wire.yaml" >> "$vm/ecdaq.yaml"

@@ -21,14 +21,15 @@ inputs: the first run notes it, and packages stay as they are until --refresh.
 
   --machine MACHINE  qemuarm64 (default): QEMU's virt machine, the segment simulated inside;
                      raspberrypi4-64: Raspberry Pi 4 Model B and Compute Module 4
-  --recipe RECIPE    one recipe instead of the whole image: linux-ecdaq, soem, ecdaq, ecdaq-config
+  --recipe RECIPE    one recipe instead of the whole image: linux-ecdaq, u-boot-ecdaq, soem, ecdaq,
+                     ecdaq-config
   --jobs N           tasks at the same time (default: as many as there are cores)
   --refresh          note the archive's present state first: what is made of its packages is made again if
                      it has others now (security updates)
   --plan             print the tasks that would run, with their hashes, and exit
 
-The results are in build/image/MACHINE/: the disk (.img, .img.zst for flashing, .bmap), the kernel, its
-command line, the package list (.manifest), the bill of materials (.spdx.json) and .sha256.
+The results are in build/image/MACHINE/: the disk (.img, .img.zst for flashing, .bmap), U-Boot, the
+kernel, its command line, the package list (.manifest), the bill of materials (.spdx.json) and .sha256.
 
 environment:
   ECDAQ_APT_MIRROR  Debian mirror to take packages from (default: the one this machine's apt uses)

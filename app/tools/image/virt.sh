@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# The machine qemuarm64, in a folder with disk.img, vmlinux and cmdline:
+# The machine qemuarm64, in a folder with disk.img and u-boot.bin:
 # virt.sh FOLDER host|guest [QEMU-OPTION...]
 #
 # host:  its clock is the host's; both processors run at once. Function, not timing.
@@ -10,7 +10,8 @@
 #        waits up to half a cycle for the other. So N is 16, of which Linux uses two (nr_cpus=2; the
 #        others are never started), and the turns are short.
 # A reset ends QEMU (-no-reboot).
-# ECDAQ_APPEND adds words to the kernel's command line. With ECDAQ_WRITE_LOG, the name of an empty file
+# The kernel comes from the disk. ECDAQ_APPEND adds words to its command line, by the file of the boot partition
+# that is for this. With ECDAQ_WRITE_LOG, the name of an empty file
 # in the folder, every write and flush of the disk is logged to it (QEMU's blklogwrites).
 set -eu
 
@@ -20,7 +21,7 @@ set -eu
 }
 here=$(CDPATH='' cd -- "$(dirname -- "$0")" && pwd)
 folder=$1
-append="$(cat "$folder/cmdline") ${ECDAQ_APPEND:-}"
+append=${ECDAQ_APPEND:-}
 case $2 in
 host) timing='-smp 2 -accel tcg,thread=multi' ;;
 guest)
@@ -33,6 +34,8 @@ guest)
 	;;
 esac
 shift 2
+printf 'append=%s\n' "$append" > "$folder/kernel.env"
+"$here/qemu.sh" "$folder" mcopy -o -i disk.img@@4M kernel.env ::ecdaq/
 disk=file=disk.img,format=raw
 if [ -n "${ECDAQ_WRITE_LOG:-}" ]; then
 	disk=driver=blklogwrites,file.driver=file,file.filename=disk.img
@@ -41,6 +44,6 @@ if [ -n "${ECDAQ_WRITE_LOG:-}" ]; then
 fi
 # shellcheck disable=SC2086 # a list of options
 exec "$here/qemu.sh" "$folder" qemu-system-aarch64 -M virt,gic-version=3 -cpu cortex-a72 -m 1024 $timing \
-	-no-reboot -kernel vmlinux -append "$append" \
+	-no-reboot -bios u-boot.bin \
 	-drive "$disk,if=none,id=disk" -device virtio-blk-pci,drive=disk,num-queues=1 \
 	-device virtio-rng-pci "$@"

@@ -39,20 +39,41 @@ name_image() {
 		run_privileged tee "${IMAGE_ROOTFS}/usr/lib/ecdaq/image"
 }
 
-# On the boot partition beside the machine's own files: the kernel's command line, and a description
-# of the ecdaq folder.
-IMAGE_BOOT_FILES += "${IMAGE_FULLNAME}.cmdline;cmdline.txt \
+# What U-Boot takes from a slot: kernel, command line, and the board's device trees under the names that U-Boot
+# has for them. Links are followed by U-Boot within the slot's file system.
+ROOTFS_POSTPROCESS_COMMAND =+ "fill_slot"
+fill_slot() {
+	slot="${IMAGE_ROOTFS}/usr/lib/ecdaq/slot"
+	run_privileged mkdir -p "$slot"
+	kernel=$(find "${IMAGE_ROOTFS}/boot" -name "vmlinu[xz]-*" -type f -printf '%f')
+	run_privileged ln -sf "/boot/$kernel" "$slot/kernel"
+	echo 'cmdline=${KERNEL_CMDLINE}' | run_privileged tee "$slot/slot.env"
+	for file in ${DTB_FILES}; do
+		tree=$(find "${IMAGE_ROOTFS}/usr/lib" -path "*/linux-image-*/$file" -printf '/usr/lib/%P')
+		run_privileged mkdir -p "$slot/dtb/$(dirname "$file")"
+		run_privileged ln -sf "$tree" "$slot/dtb/$file"
+		case $file in
+		# U-Boot has one name for every Compute Module 4, Linux a tree for its carrier.
+		*/bcm2711-rpi-cm4-io.dtb) run_privileged ln -sf "$tree" "$slot/dtb/${file%-io.dtb}.dtb" ;;
+		esac
+	done
+}
+
+# On the boot partition beside the machine's own files: U-Boot's script, and a description of the ecdaq folder.
+IMAGE_BOOT_FILES += "${IMAGE_ROOTFS}/usr/lib/u-boot-ecdaq/boot.scr;boot.scr \
                      ${IMAGE_ROOTFS}/usr/share/ecdaq/boot/ecdaq/README.txt;ecdaq/README.txt"
-do_copy_boot_files[vardeps] += "KERNEL_CMDLINE"
+# Beside the image: the command line, and U-Boot, which an emulator starts.
+do_copy_boot_files[vardeps] += "KERNEL_CMDLINE ECDAQ_UBOOT"
 do_copy_boot_files:append() {
 	echo '${KERNEL_CMDLINE}' > "${DEPLOYDIR}/${IMAGE_FULLNAME}.cmdline"
+	cp "${IMAGE_ROOTFS}/usr/lib/u-boot-ecdaq/${ECDAQ_UBOOT}/u-boot.bin" "${DEPLOYDIR}/${IMAGE_FULLNAME}-u-boot.bin"
 }
 
 # Our packages; the class adds the kernel, a machine its own.
-IMAGE_INSTALL += "ecdaq ecdaq-config"
+IMAGE_INSTALL += "ecdaq ecdaq-config u-boot-ecdaq"
 # Debian's: boot, network, time, diagnosis; and the libraries of our packages.
 IMAGE_PREINSTALL += "init systemd-sysv udev dbus kmod \
                      openssh-server sudo chrony \
                      iproute2 ethtool iputils-ping nftables \
-                     e2fsprogs fdisk dosfstools procps less gpiod \
+                     e2fsprogs fdisk dosfstools procps less gpiod libubootenv-tool \
                      libddsc0t64 libyaml-0-2 libzstd1 zlib1g"
