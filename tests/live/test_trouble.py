@@ -155,3 +155,25 @@ def test_a_full_disk_stops_the_recording_and_never_the_cycle(
     )
     segment.wait_for_cycles(2000, 60)
     undisturbed.check()
+
+
+def test_a_port_of_the_machines_network_is_refused_unless_forced(
+    make_segment: Callable[..., Segment],
+) -> None:
+    segment = make_segment()
+    segment.start_sim()
+    segment.space.run("ip", "address", "add", "192.0.2.7/24", "dev", "ecat0")
+    got = run_daemon(segment)
+    line = only_line(got)
+    assert "ecat0" in line and "192.0.2.7" in line and "--force" in line
+    assert got.returncode == 6
+    segment.start_daemon("--force")
+    segment.wait_for_op()
+
+
+def test_a_port_with_the_default_route_is_refused(make_segment: Callable[..., Segment]) -> None:
+    segment = make_segment()
+    segment.space.run("ip", "route", "add", "default", "dev", "ecat0")
+    got = run_daemon(segment)
+    assert "default route" in only_line(got)
+    assert got.returncode == 6

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "control/program.h"
+#include "link/port_use.h"
 
 /* How long it sleeps while the cycle works for it: a frame of its own rides once a cycle. */
 #define WAIT_NS (150 * NS_PER_US)
@@ -47,13 +48,39 @@ static enum exit_code code_of_transport(int r)
 	}
 }
 
+/* EtherCAT's frames do not go into a network of the machine unless somebody asks for it. */
+static int check_port(const struct program *pg, struct failure *failure)
+{
+	const char *interface = pg->cfg.interface;
+	char reason[PORT_USE_BYTES];
+	int r = pg->options.is_forced ? 0 : port_use(interface, reason, sizeof(reason));
+
+	if (r < 0) {
+		return failure_set(failure, EXIT_CODE_INTERFACE, r,
+				   "interface %s: cannot read its addresses: %s", interface,
+				   strerror(-r));
+	}
+	if (r > 0) {
+		return failure_set(
+			failure, EXIT_CODE_BUSY, -EBUSY,
+			"interface %s: %s, so it is not the EtherCAT port: choose another, "
+			"take IP off this one (ip address flush dev %s), or give --force",
+			interface, reason, interface);
+	}
+	return 0;
+}
+
 static int open_transport(void *ctx, struct transport *ret_transport, struct failure *failure)
 {
 	struct program *pg = ctx;
 	char error[PACKET_ERROR_BYTES] = "";
-	int r = packet_socket_open(pg->cfg.interface, packet_wait(&pg->cfg), ret_transport, error,
-				   sizeof(error));
+	int r = check_port(pg, failure);
 
+	if (r < 0) {
+		return r;
+	}
+	r = packet_socket_open(pg->cfg.interface, packet_wait(&pg->cfg), ret_transport, error,
+			       sizeof(error));
 	if (r < 0) {
 		return failure_set(failure, code_of_transport(r), r, "%s", error);
 	}

@@ -17,6 +17,7 @@ struct options {
 	uint64_t seconds; /* the same in seconds */
 	int is_exiting;   /* where a bring-up fails, rather than wait */
 	int is_simulated;
+	int is_forced; /* the segment is on a port that carries IP */
 };
 
 struct program {

@@ -298,6 +298,8 @@ int main(int argc, char **argv)
 		{ "exit-on-failure", 0, args_flag, &op->is_exiting, NULL,
 		  "exit if the bus does not reach its target, instead of waiting in the state that "
 		  "was reached and serving ecdaq" },
+		{ "force", 0, args_flag, &op->is_forced, NULL,
+		  "use the interface even if it has an IP address or the default route" },
 		{ "simulated", 0, args_flag, &op->is_simulated, NULL,
 		  "mark the segment as simulated in the status page" },
 	};
