@@ -42,6 +42,7 @@ PARSERS: dict[str, tuple[str, ...]] = {
         *(f"master/mailbox/{name}.c" for name in ("raw_client", "raw_match")),
     ),
     "sii": ("core/wire/sii.c",),
+    "esi": tuple(f"core/esi/{name}.c" for name in ("begin", "end", "esi", "field", "nodes")),
     "catalogue": ("sim/devices/slave_model_parse.c", "sim/devices/model_text.c"),
     "mcap": tuple(
         f"services/record/{name}.c"

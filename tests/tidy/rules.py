@@ -29,6 +29,7 @@ MODULES: dict[str, dict[str, set[str]]] = {
     "core": {
         "base": set(),
         "wire": {"base"},
+        "esi": {"base", "wire"},
         "config": {"base", "image"},
         "program": {"base", "config"},
         "image": {"base", "wire"},
@@ -56,6 +57,7 @@ MODULES: dict[str, dict[str, set[str]]] = {
         | {"wire/al.h", "wire/sii.h"}
         | {"wire/aoe.h", "wire/eoe.h", "wire/soe.h"}
         | {"wire/datagram.h", "wire/fmmu.h"}
+        | {"esi", "wire/coe_type.h"}
     },
     "sim": {
         "firmware": {"base", "wire"},
@@ -77,6 +79,7 @@ FOREIGN_HEADERS: list[tuple[str, set[str]]] = [
     (r"gpiod\.h|linux/gpio\.h", {"sync0"}),
     (r"yaml\.h", {"config"}),
     (r"zstd\w*\.h", {"record"}),
+    (r"expat\.h", {"esi"}),
 ]
 
 # Programs talk to a person; what is not matched here is library code.

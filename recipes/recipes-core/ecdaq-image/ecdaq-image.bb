@@ -76,4 +76,4 @@ IMAGE_PREINSTALL += "init systemd-sysv udev dbus kmod \
                      openssh-server sudo chrony \
                      iproute2 ethtool iputils-ping nftables \
                      e2fsprogs fdisk dosfstools procps less gpiod libubootenv-tool \
-                     libddsc0t64 libyaml-0-2 libzstd1 zlib1g"
+                     libddsc0t64 libexpat1 libyaml-0-2 libzstd1 zlib1g"

@@ -17,7 +17,7 @@ SDK_PREINSTALL += "bmap-tools dosfstools e2fsprogs fdisk mtools"
 SDK_PREINSTALL += "qemu-system-arm"
 # What our programs link; each is a Build-Depends of a recipe, too.
 SDK_PREINSTALL += "libyaml-dev:${DISTRO_ARCH} libzstd-dev:${DISTRO_ARCH} zlib1g-dev:${DISTRO_ARCH} \
-                   libgpiod-dev:${DISTRO_ARCH} libssl-dev:${DISTRO_ARCH} \
+                   libexpat1-dev:${DISTRO_ARCH} libgpiod-dev:${DISTRO_ARCH} libssl-dev:${DISTRO_ARCH} \
                    cyclonedds-dev:${DISTRO_ARCH} cyclonedds-tools"
 
 do_bootstrap[dirs] = "${TMPDIR}"
