@@ -26,8 +26,35 @@ enum exit_code cli_fail(const struct cli *cli, enum exit_code code, const char *
 	return code;
 }
 
+/* Only for --help; cli_take() has the same with their targets. */
+static const struct args_option selecting[] = {
+	{ "position", 'p', args_text, NULL, "LIST",
+	  "slaves by position, in place of SLAVE: 0,2-4" },
+	{ "alias", 'a', args_text, NULL, "LIST",
+	  "slaves by alias; with --position those so many behind it" },
+};
+
+enum { SELECTING_COUNT = sizeof(selecting) / sizeof(selecting[0]) };
+
+int cli_slave_at(const struct verb *verb, int *ret_is_list)
+{
+	const char *slave = strstr(verb->operands, "SLAVE");
+	int at = 1;
+
+	if (slave == NULL) {
+		return 0;
+	}
+	for (const char *p = verb->operands; p < slave; p++) {
+		at += *p == ' ';
+	}
+	*ret_is_list = strncmp(slave, "SLAVE...", strlen("SLAVE...")) == 0;
+	return at;
+}
+
 static void help(const struct verb *verb, const struct args *args)
 {
+	int is_list;
+
 	printf("usage: ecdaq %s%s%s%s\n\n%s\n", verb->name,
 	       args->option_count > 0 ? " [OPTION...]" : "", verb->operands[0] == '\0' ? "" : " ",
 	       verb->operands, verb->summary);
@@ -38,6 +65,9 @@ static void help(const struct verb *verb, const struct args *args)
 		putchar('\n');
 	}
 	args_help(stdout, args->options, args->option_count);
+	if (cli_slave_at(verb, &is_list) > 0) {
+		args_help(stdout, selecting, SELECTING_COUNT);
+	}
 }
 
 enum args_result cli_take(struct cli *cli, struct args *args, int argc, char **argv, char *error)
@@ -45,11 +75,17 @@ enum args_result cli_take(struct cli *cli, struct args *args, int argc, char **a
 	const struct args_option globals[] = {
 		{ "run-dir", 0, args_text, &cli->run_dir, "DIR", NULL },
 		{ "config", 0, args_text, &cli->config, "FILE", NULL },
+		{ "position", 'p', args_text, &cli->position, "LIST", NULL },
+		{ "alias", 'a', args_text, &cli->alias, "LIST", NULL },
 	};
+	int is_list;
+	int has_slaves = cli->verb != NULL && cli_slave_at(cli->verb, &is_list) > 0;
 	enum args_result result;
 
 	args->shared = globals;
-	args->shared_count = sizeof(globals) / sizeof(globals[0]);
+	args->shared_count =
+		sizeof(globals) / sizeof(globals[0]) - (has_slaves ? 0 : SELECTING_COUNT);
+	args->checks_later = cli->verb != NULL;
 	result = args_parse(args, argc, argv, error);
 	args->shared_count = 0;
 	return result;
@@ -58,10 +94,21 @@ enum args_result cli_take(struct cli *cli, struct args *args, int argc, char **a
 int cli_parse(struct cli *cli, struct args *args, int argc, char **argv, enum exit_code *ret_code)
 {
 	char error[ARGS_ERROR_BYTES];
+	enum args_result r;
 
 	*ret_code = EXIT_CODE_OK;
 	args->operands_usage = cli->verb->operands;
-	switch (cli_take(cli, args, argc, argv, error)) {
+	r = cli_take(cli, args, argc, argv, error);
+	if (r == ARGS_OK && (cli->position != NULL || cli->alias != NULL)) {
+		*ret_code = cli->select(cli, args);
+		if (*ret_code != EXIT_CODE_OK) {
+			return 0;
+		}
+	}
+	if (r == ARGS_OK) {
+		r = args_check_operands(args, error);
+	}
+	switch (r) {
 	case ARGS_OK:
 		return 1;
 	case ARGS_HELP:

@@ -11,11 +11,17 @@
 #include "program/exit_code.h"
 
 struct verb;
+struct selection;
 
 struct cli {
 	const struct verb *verb;
-	const char *run_dir;         /* --run-dir; NULL: by configuration and environment */
-	const char *config;          /* --config; NULL: none */
+	const char *run_dir;  /* --run-dir; NULL: by configuration and environment */
+	const char *config;   /* --config; NULL: none */
+	const char *position; /* --position, --alias; NULL: none */
+	const char *alias;
+	struct selection *selection; /* of these, for select() */
+	/** Put the selected slaves into the operands of @args: the code of a failure, reported. */
+	enum exit_code (*select)(struct cli *cli, struct args *args);
 	int is_dir_chosen;           /* by option, configuration or environment */
 	char dir[CONFIG_PATH_BYTES]; /* the run directory, with a slash behind it, once it was asked
 					for */
@@ -23,7 +29,7 @@ struct cli {
 
 struct verb {
 	const char *name;
-	const char *operands; /* "CHANNEL..." */
+	const char *operands; /* "CHANNEL..."; with SLAVE it has --position and --alias, too */
 	const char *summary;  /* one line */
 	const char *detail;   /* more lines for --help; NULL */
 	enum exit_code (*run)(struct cli *cli, int argc, char **argv);
@@ -38,6 +44,10 @@ enum exit_code cli_fail(const struct cli *cli, enum exit_code code, const char *
  * answered or an error reported, with the exit code in @ret_code.
  */
 int cli_parse(struct cli *cli, struct args *args, int argc, char **argv, enum exit_code *ret_code);
+
+/** Which operand of @verb is SLAVE, from 1 on; 0: none. *@ret_is_list: any number, the last ones.
+ */
+int cli_slave_at(const struct verb *verb, int *ret_is_list);
 
 /** args_parse() with the global options, which go to @cli. */
 enum args_result cli_take(struct cli *cli, struct args *args, int argc, char **argv, char *error);

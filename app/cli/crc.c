@@ -12,6 +12,7 @@
 #include "cli/admin_client.h"
 #include "cli/cable.h"
 #include "cli/cli.h"
+#include "cli/each_slave.h"
 #include "cli/screen.h"
 #include "cli/source.h"
 #include "program/args_duration.h"
@@ -245,7 +246,7 @@ static enum exit_code read_all(struct crc *crc, const struct args *args)
 	if (crc->is_json) {
 		json_array_begin(&crc->js, NULL);
 	}
-	result = source_each_slave(crc->cli, crc->page, args, run_one, crc);
+	result = each_slave(crc->cli, crc->page, args->operands, args->operand_count, run_one, crc);
 	if (crc->is_json) {
 		json_array_end(&crc->js);
 		json_end_line(&crc->js);

@@ -11,6 +11,7 @@
 #include "base/args.h"
 #include "cli/admin_client.h"
 #include "cli/cli.h"
+#include "cli/each_slave.h"
 #include "cli/source.h"
 #include "program/json.h"
 #include "wire/datagram.h"
@@ -323,12 +324,12 @@ static enum exit_code run(struct domains *d, const struct args *args)
 	}
 	if (!d->is_json) {
 		show_datagrams(d);
-		return source_each_slave(d->cli, d->page, args, run_one, d);
+		return each_slave(d->cli, d->page, args->operands, args->operand_count, run_one, d);
 	}
 	json_object_begin(&d->js, NULL);
 	put_datagrams(d);
 	json_array_begin(&d->js, "slave");
-	result = source_each_slave(d->cli, d->page, args, run_one, d);
+	result = each_slave(d->cli, d->page, args->operands, args->operand_count, run_one, d);
 	json_array_end(&d->js);
 	json_object_end(&d->js);
 	json_end_line(&d->js);

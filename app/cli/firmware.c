@@ -303,8 +303,7 @@ enum exit_code verb_firmware(struct cli *cli, int argc, char **argv)
 	struct firmware fw = { .cli = cli, .password = { .high = UINT32_MAX } };
 	const struct args_option options[] = {
 		{ "name", 'n', args_text, &fw.name, "NAME", "of the file at the slave" },
-		{ "password", 'p', args_integer, &fw.password, "NUMBER",
-		  "that the slave asks for" },
+		{ "password", 0, args_integer, &fw.password, "NUMBER", "that the slave asks for" },
 		{ "json", 0, args_flag, &fw.is_json, NULL, "the result as a JSON object" },
 	};
 	struct args args = {

@@ -137,7 +137,7 @@ enum exit_code verb_foe(struct cli *cli, int argc, char **argv)
 	const struct args_option options[] = {
 		{ "output", 'o', args_text, &foe.output, "FILE", "read: write the file to FILE" },
 		{ "name", 'n', args_text, &foe.name, "NAME", "write: its name at the slave" },
-		{ "password", 'p', args_integer, &password, "NUMBER", "that the slave asks for" },
+		{ "password", 0, args_integer, &password, "NUMBER", "that the slave asks for" },
 		{ "json", 0, args_flag, &foe.mail.is_json, NULL, "the result as a JSON object" },
 	};
 	struct args args = {

@@ -9,6 +9,7 @@
 
 #include "base/args.h"
 #include "cli/cli.h"
+#include "cli/selection.h"
 #include "program/exit_code.h"
 
 static enum exit_code verb_version(struct cli *cli, int argc, char **argv)
@@ -73,7 +74,8 @@ static const struct verb verbs[] = {
 	  "After ecdaqd has ended it shows the last known state, marked as such.\n", verb_status },
 	{ "top", "", "The same, live. Ends with q, Ctrl-C, or when ecdaqd ends.",
 	  "Where standard output is not a terminal it prints one line per interval.\n", verb_top },
-	{ "slaves", "", "The slaves: position, alias, AL state, name, device.", NULL, verb_slaves },
+	{ "slaves", "[SLAVE...]", "The slaves: position, alias, AL state, name, device.", NULL,
+	  verb_slaves },
 	{ "topology", "[SLAVE...]", "The tree of ports, with states and delays.",
 	  "at: position and port of the slave before it. cable: propagation delay, one way. "
 	  "clock:\n"
@@ -263,9 +265,28 @@ static enum exit_code finish(const struct cli *cli, enum exit_code result)
 	return result;
 }
 
+/* Once, or for each selected slave where the verb takes one; the first failure ends it. */
+static enum exit_code run(struct cli *cli, int argc, char **argv)
+{
+	char **words = calloc((size_t)argc + 1, sizeof(*words));
+	enum exit_code result;
+
+	if (words == NULL) {
+		return cli_fail(cli, EXIT_CODE_FAILED, "out of memory");
+	}
+	do {
+		memcpy(words, argv, (size_t)argc * sizeof(*words)); /* a run reorders them */
+		result = cli->verb->run(cli, argc, words);
+	} while (result == EXIT_CODE_OK && selection_has_more(cli->selection));
+	selection_done(cli->selection);
+	free(words);
+	return result;
+}
+
 int main(int argc, char **argv)
 {
-	struct cli cli = { .verb = NULL };
+	static struct selection selection;
+	struct cli cli = { .selection = &selection, .select = selection_apply };
 	struct args args = { .operands_min = 1, .operands_usage = "command", .ends_at_operand = 1 };
 	char error[ARGS_ERROR_BYTES];
 
@@ -286,5 +307,5 @@ int main(int argc, char **argv)
 		return (int)cli_fail(&cli, EXIT_CODE_USAGE,
 				     "%s: unknown command (see ecdaq --help)", args.operands[0]);
 	}
-	return (int)finish(&cli, cli.verb->run(&cli, args.operand_count - 1, args.operands + 1));
+	return (int)finish(&cli, run(&cli, args.operand_count - 1, args.operands + 1));
 }

@@ -5,12 +5,20 @@
 
 #include "base/args.h"
 #include "cli/cli.h"
+#include "cli/each_slave.h"
 #include "cli/report.h"
 #include "cli/source.h"
 #include "cli/text.h"
 #include "wire/al.h"
 
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
+
+struct slaves {
+	const struct status_page *page;
+	int is_json;
+	int is_verbose;
+	struct json js;
+};
 
 static char mark_of(const struct status_page *page, uint32_t index)
 {
@@ -87,45 +95,48 @@ static void show_more(const struct status_page *page, uint32_t index)
 	}
 }
 
+static enum exit_code run_one(void *ctx, uint16_t pos)
+{
+	struct slaves *cmd = ctx;
+
+	if (cmd->is_json) {
+		report_slave_json(cmd->page, pos, &cmd->js);
+		return EXIT_CODE_OK;
+	}
+	show(cmd->page, pos);
+	if (cmd->is_verbose) {
+		show_more(cmd->page, pos);
+	}
+	return EXIT_CODE_OK;
+}
+
 enum exit_code verb_slaves(struct cli *cli, int argc, char **argv)
 {
-	int is_json = 0;
-	int is_verbose = 0;
+	struct slaves cmd = { .page = NULL };
 	const struct args_option options[] = {
-		{ "json", 0, args_flag, &is_json, NULL, "a JSON array" },
-		{ "verbose", 'v', args_flag, &is_verbose, NULL,
+		{ "json", 0, args_flag, &cmd.is_json, NULL, "a JSON array" },
+		{ "verbose", 'v', args_flag, &cmd.is_verbose, NULL,
 		  "identity, clock and error counters" },
 	};
-	struct args args = { .options = options, .option_count = 2 };
-	const struct status_page *page;
+	struct args args = { .options = options, .option_count = 2, .operands_max = 4096 };
 	enum exit_code result;
-	struct json js;
 
 	if (!cli_parse(cli, &args, argc, argv, &result)) {
 		return result;
 	}
-	result = source_status(cli, &page);
+	result = source_status(cli, &cmd.page);
 	if (result != EXIT_CODE_OK) {
 		return result;
 	}
-	json_init(&js, stdout);
-	if (is_json) {
-		json_array_begin(&js, NULL);
+	json_init(&cmd.js, stdout);
+	if (cmd.is_json) {
+		json_array_begin(&cmd.js, NULL);
 	}
-	for (uint32_t i = 0; i < source_slave_count(page); i++) {
-		if (is_json) {
-			report_slave_json(page, i, &js);
-			continue;
-		}
-		show(page, i);
-		if (is_verbose) {
-			show_more(page, i);
-		}
+	result = each_slave(cli, cmd.page, args.operands, args.operand_count, run_one, &cmd);
+	if (cmd.is_json) {
+		json_array_end(&cmd.js);
+		json_end_line(&cmd.js);
 	}
-	if (is_json) {
-		json_array_end(&js);
-		json_end_line(&js);
-	}
-	source_status_close(page);
-	return EXIT_CODE_OK;
+	source_status_close(cmd.page);
+	return result;
 }

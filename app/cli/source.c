@@ -264,6 +264,9 @@ enum exit_code source_find_slave(const struct cli *cli, const struct status_page
 	if (strncmp(text, ALIAS_PREFIX, strlen(ALIAS_PREFIX)) == 0) {
 		return find_alias(cli, page, text, ret_pos);
 	}
+	if (strncmp(text, SOURCE_POSITION_PREFIX, strlen(SOURCE_POSITION_PREFIX)) == 0) {
+		text += strlen(SOURCE_POSITION_PREFIX);
+	}
 	errno = 0;
 	pos = strtoul(text, &end, 10);
 	if (text[0] < '0' || text[0] > '9' || *end != '\0' || errno != 0) {
@@ -276,31 +279,6 @@ enum exit_code source_find_slave(const struct cli *cli, const struct status_page
 	}
 	*ret_pos = (uint16_t)pos;
 	return EXIT_CODE_OK;
-}
-
-enum exit_code source_each_slave(const struct cli *cli, const struct status_page *page,
-				 const struct args *args,
-				 enum exit_code (*run)(void *ctx, uint16_t pos), void *ctx)
-{
-	int is_all = args->operand_count == 0;
-	uint32_t count = is_all ? source_slave_count(page) : (uint32_t)args->operand_count;
-	enum exit_code first = EXIT_CODE_OK;
-
-	for (uint32_t i = 0; i < count; i++) {
-		uint16_t pos = (uint16_t)i;
-		enum exit_code result =
-			is_all ? EXIT_CODE_OK
-			       : source_find_slave(cli, page, args->operands[i], &pos);
-
-		if (result == EXIT_CODE_OK) {
-			result = run(ctx, pos);
-		}
-		first = first == EXIT_CODE_OK ? result : first;
-		if (result == EXIT_CODE_NO_DAEMON || result == EXIT_CODE_PERMISSION) {
-			break;
-		}
-	}
-	return first;
 }
 
 enum exit_code source_slave_pos(struct cli *cli, const char *text, uint16_t *ret_pos)

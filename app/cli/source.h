@@ -61,18 +61,13 @@ const char *samples_flag_name(unsigned bit);
 struct slave_info source_slave(const struct status_page *page, uint32_t index);
 uint32_t source_slave_count(const struct status_page *page);
 
-/** The position that @text names, "piccolo0", "1" or "alias:1001", or the code of a failure,
- * reported. */
+/* Before a position that is not to be taken for a name. */
+#define SOURCE_POSITION_PREFIX "position:"
+
+/** The position that @text names, "piccolo0", "1", "position:1" or "alias:1001", or the code of a
+ * failure, reported. */
 enum exit_code source_find_slave(const struct cli *cli, const struct status_page *page,
 				 const char *text, uint16_t *ret_pos);
-/**
- * Call @run for each slave that the operands of @args name, or for all of them if there are none. A
- * failure with one of them does not keep the others from it, unless it is the same for all: no
- * ecdaqd, or no permission. The first failure.
- */
-enum exit_code source_each_slave(const struct cli *cli, const struct status_page *page,
-				 const struct args *args,
-				 enum exit_code (*run)(void *ctx, uint16_t pos), void *ctx);
 /** source_find_slave() of the status page as it is now. */
 enum exit_code source_slave_pos(struct cli *cli, const char *text, uint16_t *ret_pos);
 

@@ -36,11 +36,12 @@ struct fake {
 	unsigned mode;
 	unsigned slaves; /* claimed on the status page */
 	int has_long_names;
-	unsigned alias;   /* of both slaves; 0: 1001 of the second */
-	int has_bits;     /* channels that are not whole bytes */
-	int is_noisy;     /* 2 errors more at port 1 of slave 0 in each look */
-	uint8_t noise;    /* as its counter is now */
-	int has_branches; /* of five slaves, at ports 3 and 1 of the first */
+	unsigned alias;      /* of both slaves; 0: 1001 of the second */
+	const char *aliases; /* one each, with commas between; NULL: as alias says */
+	int has_bits;        /* channels that are not whole bytes */
+	int is_noisy;        /* 2 errors more at port 1 of slave 0 in each look */
+	uint8_t noise;       /* as its counter is now */
+	int has_branches;    /* of five slaves, at ports 3 and 1 of the first */
 	uint64_t page_faults;
 	long beyond;       /* slaves that ecdaq-sync0 has no line for; -1: it does not run */
 	unsigned control;  /* calls of a control program; 0: there is none */

@@ -124,6 +124,8 @@ static void parse(struct fake *f, int argc, char **argv)
 			f->slaves = 5;
 		} else if (strcmp(argv[i], "ALIAS") == 0) {
 			f->alias = (unsigned)strtoul(value, NULL, 10);
+		} else if (strcmp(argv[i], "ALIASES") == 0) {
+			f->aliases = value;
 		} else if (strcmp(argv[i], "BITS") == 0) {
 			f->has_bits = value[0] == '1';
 		} else if (strcmp(argv[i], "NOISY") == 0) {

@@ -61,6 +61,20 @@ static void describe_more(struct fake *f)
 	snprintf(adc->unit, sizeof(adc->unit), "V");
 }
 
+static uint16_t alias_of(const struct fake *f, unsigned pos)
+{
+	const char *list = f->aliases;
+
+	if (list == NULL) {
+		return (uint16_t)(f->alias > 0 ? f->alias : pos == 1 ? 1001 : 0);
+	}
+	for (; pos > 0; pos--) {
+		list += strcspn(list, ",");
+		list += *list == ',';
+	}
+	return (uint16_t)strtoul(list, NULL, 10);
+}
+
 void fake_describe(struct fake *f)
 {
 	static const struct {
@@ -96,9 +110,7 @@ void fake_describe(struct fake *f)
 			.revision = 0x0258008d,
 			.slave_pos = (uint16_t)s,
 			.station_addr = (uint16_t)(0x1001 + s),
-			.alias = (uint16_t)(f->alias > 0 ? f->alias
-					    : s == 1     ? 1001
-							 : 0),
+			.alias = alias_of(f, s),
 			.has_dc = 1,
 			.is_dc_reference = s == 0,
 			.dc_delay_ns = (int32_t)s * 310,
@@ -162,6 +174,7 @@ static void show_place(const struct fake *f, unsigned pos)
 
 	if (f->has_branches) {
 		snprintf(slave->info.name, sizeof(slave->info.name), "piccolo%u", pos);
+		slave->info.alias = alias_of(f, pos);
 		place.parent = pos == 3 ? 0 : place.parent;
 		place.parent_port = pos == 1 ? 3 : place.parent_port;
 		place.open_ports = pos == 0 ? 0xb : pos % 2 == 1 ? 3 : 1;

@@ -11,7 +11,7 @@ from ecdaq import CONFIG, NO_DAEMON, OK, ROOT, USAGE, Fake, ecdaq, fails, works
 VERBS = {
     "status": "",
     "top": "",
-    "slaves": "",
+    "slaves": "[SLAVE...]",
     "topology": "[SLAVE...]",
     "channels": "",
     "data": "[SLAVE...]",

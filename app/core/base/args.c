@@ -151,6 +151,10 @@ static const struct args_option *find(const struct args *args, const char *word,
 		if (is_option(word, option->name, option->letter, ret_value)) {
 			return option;
 		}
+		if (option->value != NULL && option->letter != 0 && word[1] == option->letter) {
+			*ret_value = word + 2;
+			return option;
+		}
 	}
 	return NULL;
 }
@@ -192,7 +196,7 @@ static int is_operand(const char *word)
 	       word[1] == '.';
 }
 
-static enum args_result check_operands(const struct args *args, char *error)
+enum args_result args_check_operands(const struct args *args, char *error)
 {
 	if (args->operand_count < args->operands_min) {
 		snprintf(error, ARGS_ERROR_BYTES, "missing %s",
@@ -243,7 +247,7 @@ enum args_result args_parse(struct args *args, int argc, char **argv, char *erro
 		}
 		i += taken;
 	}
-	return check_operands(args, error);
+	return args->checks_later ? ARGS_OK : args_check_operands(args, error);
 }
 
 /* @text from HELP_COLUMN on; what does not fit goes to lines of its own. */

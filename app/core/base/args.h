@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A command line by table: --name, --name=VALUE, --name VALUE, -n, and "--" after which nothing is
- * an option. Options and operands may be mixed; a word that starts with a dash and a digit is an
- * operand: a value. --help, -h and --version are options of every program. Context: blocking.
+ * A command line by table: --name, --name=VALUE, --name VALUE, -n, -nVALUE, and "--" after which
+ * nothing is an option. Options and operands may be mixed; a word that starts with a dash and a
+ * digit is an operand: a value. --help, -h and --version are options of every program. Context:
+ * blocking.
  */
 #ifndef BASE_ARGS_H
 #define BASE_ARGS_H
@@ -57,6 +58,7 @@ struct args {
 	int operands_min;
 	int operands_max;           /* INT_MAX: any number */
 	const char *operands_usage; /* for the error where one is missing: "CHANNEL..." */
+	int checks_later;           /* 1: the caller calls args_check_operands() */
 	int ends_at_operand;        /* 1: the first operand and what follows are left as they are */
 	char **operands;            /* out: argv's own words */
 	int operand_count;          /* out */
@@ -70,6 +72,9 @@ enum args_result { ARGS_OK, ARGS_HELP, ARGS_VERSION, ARGS_ERROR };
  * "what: problem" in @error (ARGS_ERROR_BYTES).
  */
 enum args_result args_parse(struct args *args, int argc, char **argv, char *error);
+
+/** Are there as many operands as @args says? ARGS_OK, or ARGS_ERROR with a text in @error. */
+enum args_result args_check_operands(const struct args *args, char *error);
 
 /** A line for each of @options, wrapped to 80 columns. */
 void args_help(FILE *out, const struct args_option *options, size_t option_count);
