@@ -22,6 +22,7 @@ EXPOSURE_LIMITS = {
     "ecdaq-boot-config.service": 2.5,
     "ecdaq-boot-good.service": 3.5,
     "ecdaq-clock.service": 2.0,
+    "ecdaq-firewall.service": 2.5,
     "ecdaq-names.service": 1.5,
     "ecdaq-nic.service": 3.5,
     "ecdaq-ssh-key.service": 2.0,
@@ -112,6 +113,19 @@ def test_passwords_and_root_are_refused_over_ssh(machine: Machine) -> None:
     settings = machine.run("sudo sshd -T").splitlines()
     for line in ("passwordauthentication no", "permitrootlogin no", "allowusers operator"):
         assert line in settings
+
+
+def test_only_ssh_listens_to_others(machine: Machine) -> None:
+    lines = machine.run("sudo ss -H -tuln").splitlines()
+    found = {(words[0], *words[4].rsplit(":", 1)) for words in map(str.split, lines)}
+    local = ("127.", "[::1]")
+    assert {
+        (kind, int(port)) for kind, address, port in found if not address.startswith(local)
+    } <= {
+        ("tcp", 22),
+        ("udp", 68),  # DHCP client
+    }
+    assert "policy drop" in machine.run("sudo nft list chain inet ecdaq input")
 
 
 def test_the_journal_is_kept_and_bounded(machine: Machine) -> None:

@@ -29,6 +29,8 @@ BIN = Path(os.environ.get("ECDAQ_BIN_DIR", TOP / "build" / "stage" / "bin"))
 BUILD = Path(os.environ.get("ECDAQ_BUILD", TOP / "build" / "release"))
 # The machine's port is the one that is not ecat0; udev calls it after its place on the bus.
 LAN = "enp0s3"
+# Ports of a second SSH server: the boot partition opens one.
+OPENED, CLOSED = 2222, 2223
 BOOT_FILES = {
     "ecdaq.yaml": profile("host")
     + f"""dds:
@@ -42,6 +44,7 @@ outputs:
     timeout: 30s
 """,
     "time-servers": f"{Space.HOST}\n",
+    "firewall": f"tcp {OPENED} {LAN}\n",
     "network/50-lan.network": f"[Match]\nName={LAN}\n[Network]\nAddress=192.168.77.2/24\n",
 }
 
@@ -170,3 +173,23 @@ def test_the_time_server_of_the_boot_partition_sets_the_clock_and_the_tai_offset
         return bool(found["tai"]["level"] == "OK")
 
     wait_for("TAI - UTC", 600, offset)
+
+
+def test_a_port_that_nothing_opens_does_not_answer(machine: Machine) -> None:
+    assert machine.space is not None
+    machine.run(f"sudo /usr/sbin/sshd -p {OPENED} -p {CLOSED}")
+    program = (
+        "import socket\n"
+        "closed = socket.socket(); closed.setblocking(False)\n"
+        f"closed.connect_ex(('192.168.77.2', {CLOSED}))\n"
+        f"for p in (22, {OPENED}):"
+        " print(socket.create_connection(('192.168.77.2', p), 120).recv(4))\n"
+        "print(closed.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR))\n"
+        "closed.recv(1)"
+    )
+    done = subprocess.run(
+        [*machine.space.enter, sys.executable, "-c", program], capture_output=True, text=True
+    )
+    # Not refused and not connected: nothing came back.
+    assert done.stdout.splitlines() == ["b'SSH-'", "b'SSH-'", "0"]
+    assert "BlockingIOError" in done.stderr or "NotConnected" in done.stderr, done.stderr

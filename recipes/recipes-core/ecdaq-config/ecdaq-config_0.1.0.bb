@@ -13,8 +13,8 @@ FILESEXTRAPATHS:prepend := "${ECDAQ_TOP}:"
 inherit dpkg-raw
 
 DEBIAN_SECTION = "admin"
-DEBIAN_DEPENDS = "chrony, e2fsprogs, ecdaq, ethtool, fdisk, iproute2, libubootenv-tool, openssh-server, procps, \
-                  sudo, systemd, udev, util-linux"
+DEBIAN_DEPENDS = "chrony, e2fsprogs, ecdaq, ethtool, fdisk, iproute2, libubootenv-tool, nftables, openssh-server, \
+                  procps, sudo, systemd, udev, util-linux"
 
 # What was renamed or taken away since the last time does not stay in the folder.
 do_unpack[cleandirs] += "${WORKDIR}/root"
