@@ -159,9 +159,9 @@ def test_a_file_needs_its_password_and_comes_back(
     written = bus.segment.ecdaq("foe", "write", "0", str(bus.file), *words)
     assert written.stdout == "a.cfg: 5120 bytes written\n"
     back = tmp_path / "back"
-    bus.segment.ecdaq("foe", "read", "0", "a.cfg", "-p", "4711", "-o", str(back))
+    bus.segment.ecdaq("foe", "read", "0", "a.cfg", "--password", "4711", "-o", str(back))
     assert back.read_bytes() == bus.file.read_bytes()
-    got = bus.segment.ecdaq("foe", "read", "0", "a.cfg", "-p", "4711", "--json")
+    got = bus.segment.ecdaq("foe", "read", "0", "a.cfg", "--password", "4711", "--json")
     shown = json.loads(got.stdout)
     assert bytes.fromhex(shown["bytes"]) == bus.file.read_bytes()
     got = bus.segment.ecdaq("firmware", "1", str(bus.file), check=False)
