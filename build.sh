@@ -65,6 +65,7 @@ the images are built with what time the processors have left:
   unit     app/, module by module; also under ASan+UBSan, and what threads share under TSan
   tidy     the rules of the source tree: include table, banned calls, sizes, formatting, links, lint
   cli      the operator's tool and the programs' command lines; also under ASan+UBSan
+  kit      the Python kit: recordings read and converted, without a bus
   replay   captures of real buses against the simulated segment
   sim      the whole master on virtual time; also under ASan+UBSan
   fuzz     every fuzz target: its corpus, then some seconds of search

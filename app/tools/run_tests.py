@@ -346,6 +346,7 @@ GROUPS: dict[str, list[Suite]] = {
         ctest("cli", "asan", "-LE", "^long$"),
         pytest("cli", "asan"),
     ],
+    "kit": [pytest("kit", "release")],
     "replay": [ctest("replay", "release"), pytest("replay", "release")],
     "sim": [
         ctest("sim", "release", "-LE", "^long$"),
@@ -390,7 +391,7 @@ GROUPS: dict[str, list[Suite]] = {
 ON_REQUEST = ("control", "sync0", "coverage", "long", "wire")
 # These mostly wait, and run beside the computing ones. The rest measure time: each alone.
 WAITING = ("cli", "docs")
-COMPUTING = ("unit", "tidy", "replay", "sim", "fuzz", "recipes")
+COMPUTING = ("unit", "tidy", "kit", "replay", "sim", "fuzz", "recipes")
 
 
 class Builder:

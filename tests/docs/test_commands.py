@@ -21,6 +21,7 @@ PAGES = (
     "README.md",
     "app/doc/tutorial/first-run.md",
     "app/doc/tutorial/first-plot.md",
+    "app/doc/tutorial/notebook.md",
     "app/doc/tutorial/first-real-slave.md",
 )
 PAGE_SECONDS = 1800

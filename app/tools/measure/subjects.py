@@ -111,6 +111,15 @@ ALL = (
         is_quick=True,
     ),
     subject(
+        "kit",
+        "An hour of two slaves in the Python kit",
+        (
+            "python tests/kit/hour.py",
+            partial(run, [sys.executable, "tests/kit/hour.py"], "."),
+        ),
+        is_quick=True,
+    ),
+    subject(
         "dds",
         f"DDS, {SECONDS} s each (ECDAQ_DDS_SECONDS)",
         pytest(

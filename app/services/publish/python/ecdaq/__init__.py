@@ -1,27 +1,67 @@
 # SPDX-License-Identifier: MIT
-"""Samples and commands of an ecdaq appliance over DDS, for Python.
+"""Recordings of an ecdaq appliance, its samples and commands over DDS, for Python.
 
 import ecdaq
+frame = ecdaq.read("build/run/record").to_pandas()
 with ecdaq.connect(interface="eth0") as link:
     print(link.channels())
     for sample in link.subscribe(seconds=1):
         print(sample.cycle, sample.adc)
 """
 
-from ecdaq.errors import InterfaceError, LinkError, NoAnswerError, RefusedError
-from ecdaq.link import Channel, Channels, Link, connect
-from ecdaq.series import Gaps, Series
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from ecdaq.errors import (
+    InterfaceError,
+    LinkError,
+    MissingExtraError,
+    NoAnswerError,
+    RecordingError,
+    RefusedError,
+)
+
+if TYPE_CHECKING:
+    from ecdaq.link import Channel, Channels, Link, connect
+    from ecdaq.recording import Recording, read
+    from ecdaq.series import Gaps, Series
+    from ecdaq.sine import Signal, SineFit, fit_sine
+    from ecdaq.table import Gap
 
 __all__ = [
     "Channel",
     "Channels",
+    "Gap",
     "Gaps",
     "InterfaceError",
     "Link",
     "LinkError",
+    "MissingExtraError",
     "NoAnswerError",
+    "Recording",
+    "RecordingError",
     "RefusedError",
     "Series",
+    "Signal",
+    "SineFit",
     "connect",
+    "fit_sine",
+    "read",
 ]
 __version__ = "0.1.0"
+
+# Imported when first used: reading needs no DDS, and DDS no numpy.
+_MODULES = {
+    "link": ("Channel", "Channels", "Link", "connect"),
+    "recording": ("Recording", "read"),
+    "series": ("Gaps", "Series"),
+    "sine": ("Signal", "SineFit", "fit_sine"),
+    "table": ("Gap",),
+}
+_MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module 'ecdaq' has no attribute {name!r}")
+    return getattr(importlib.import_module(f"ecdaq.{_MODULE_OF[name]}"), name)
