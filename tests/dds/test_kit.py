@@ -111,6 +111,54 @@ def test_wrong_arguments_are_one_line_and_no_traceback(
     assert re.fullmatch(f"ecdaq-remote: {re.escape(line)}[^\n]*\n", capsys.readouterr().err)
 
 
+@pytest.mark.parametrize(
+    ("error", "code", "line"),
+    [
+        (OSError(28, "No space left on device"), 1, "No space left on device"),
+        (PermissionError(13, "Permission denied", "here"), 1, "here: Permission denied"),
+        (RuntimeError("of the\nlibrary"), 1, "failed: RuntimeError: of the library"),
+        (KeyboardInterrupt(), 1, "interrupted before it was connected"),
+        (ImportError("no mcap", name="mcap.writer"), 1, "mcap cannot be imported: pip install"),
+        (NoAnswerError("no reply"), 16, "no reply"),
+        (ecdaq.RefusedError("owned by local"), 17, "owned by local"),
+    ],
+)
+def test_no_error_ends_in_a_traceback(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    error: BaseException,
+    code: int,
+    line: str,
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise error
+
+    monkeypatch.setattr("ecdaq.link.connect", fail)
+    assert remote.main(["--interface", "lo", "status"]) == code
+    assert re.fullmatch(f"ecdaq-remote: {re.escape(line)}[^\n]*\n", capsys.readouterr().err)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        [],
+        ["--interface", "lo"],
+        ["--interface", "lo", "fly"],
+        ["--interface", "lo", "--domain", "x", "status"],
+        ["--interface", "lo", "watch", "--seconds", "-1"],
+        ["--interface", "lo", "watch", "--seconds", "nan"],
+        ["--interface", "lo", "set"],
+    ],
+)
+def test_a_wrong_command_line_is_one_line_and_exit_code_2(
+    capsys: pytest.CaptureFixture[str], words: list[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        remote.main(words)
+    assert ended.value.code == 2
+    assert re.fullmatch(r"ecdaq-remote: [^\n]+ --help\n", capsys.readouterr().err)
+
+
 def test_raw_values_that_do_not_fit_are_a_value_error() -> None:
     with ecdaq.connect("lo", domain=230) as link:
         for value in (-1, 1 << 64):
@@ -247,7 +295,7 @@ def test_remote_tool_watches_records_sets_and_shows_status(
     assert "owned by local" in refused
     # Nanoseconds since 2000, every digit.
     assert re.search(r" sample_time=\d{18}\b", shown["watch"])
-    assert re.search(r"piccolo0\.csv: \d{3,} samples\n", shown["csv"])
+    assert re.search(r"piccolo0\.csv: \d{3,} samples, [\d.]+ s\n", shown["csv"])
     # Without an end: it is ended as by Ctrl-C, and finishes its file.
     folder = bench.folder / "mcap"
     recorder = bench.module("mcap", "ecdaq", *TOOL, "record", "--dir", str(folder))
@@ -256,7 +304,9 @@ def test_remote_tool_watches_records_sets_and_shows_status(
     recorder.send_signal(signal.SIGINT)
     assert recorder.wait(40) == 0, bench.logs()
     assert "0 gaps, 0 samples missing" in bench.log("mcap")
-    assert re.search(r"/ecdaq-\S+\.mcap: \d{3,} cycles, \d{4,} bytes\n", bench.log("mcap"))
+    assert re.search(
+        r"/ecdaq-\S+\.mcap: \d{3,} cycles, [\d.]+ s, \d{4,} bytes\n", bench.log("mcap")
+    )
     frame = pandas.read_csv(bench.folder / "piccolo0.csv")
     assert list(frame.columns)[:6] == ["cycle", "dc_time_ns", "utc_ns", "flags", "is_good", "led"]
     assert len(frame) > 200

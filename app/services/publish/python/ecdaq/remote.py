@@ -13,10 +13,13 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
 
 from ecdaq.errors import LinkError, NoAnswerError
-from ecdaq.idl_types import SampleV1
-from ecdaq.link import Channels, Link, connect
+
+if TYPE_CHECKING:  # main() imports DDS, and says so if it is missing
+    from ecdaq.idl_types import SampleV1
+    from ecdaq.link import Channels, Link
 
 GAPS_LISTED = 20
 
@@ -85,6 +88,7 @@ def header(channels: Channels, slave: int) -> list[str]:
 def record_csv(link: Link, options: argparse.Namespace) -> int:
     channels = link.channels()
     options.dir.mkdir(parents=True, exist_ok=True)
+    period_s = channels.period_ns / 1e9
     files = [(options.dir / f"{name}.csv").open("w", newline="") for name in channels.slave_names]
     rows = [0] * len(files)
     try:
@@ -103,7 +107,7 @@ def record_csv(link: Link, options: argparse.Namespace) -> int:
     finally:
         for file, count in zip(files, rows, strict=True):
             file.close()
-            print(f"{file.name}: {count} samples", flush=True)
+            print(f"{file.name}: {count} samples, {count * period_s:.1f} s", flush=True)
     return report_gaps(link)
 
 
@@ -123,7 +127,9 @@ def record_mcap(link: Link, options: argparse.Namespace) -> int:
 
     def finish(file: McapFile, reason: str) -> None:
         path = file.close(reason)
-        print(f"{path}: {file.cycles} cycles, {path.stat().st_size} bytes", flush=True)
+        seconds = file.cycles * file.channels.period_ns / 1e9
+        size = path.stat().st_size
+        print(f"{path}: {file.cycles} cycles, {seconds:.1f} s, {size} bytes", flush=True)
 
     file = McapFile(options.dir, link.channels(), f"ecdaq-remote {__version__}")
     poll_at = 0.0
@@ -185,8 +191,26 @@ def status(link: Link, options: argparse.Namespace) -> int:
     return 0
 
 
+class Parser(argparse.ArgumentParser):
+    """An error is one line, without the usage."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"ecdaq-remote: {message}: see {self.prog} --help\n")
+
+
+def positive(text: str) -> float:
+    """A number of seconds."""
+    value = float(text)
+    if not 0 <= value < float("inf"):
+        raise ValueError
+    return value
+
+
+positive.__name__ = "number of seconds"  # as argparse calls it in its message
+
+
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="ecdaq-remote", description="Read and command an ecdaq appliance over DDS."
     )
     add = parser.add_argument
@@ -206,41 +230,62 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         verb = verbs.add_parser(name, help=text, description=function.__doc__)
         verb.set_defaults(function=function)
         if name in ("watch", "record"):
-            verb.add_argument("--seconds", type=float, help="default: until Ctrl-C")
+            verb.add_argument("--seconds", type=positive, help="default: until Ctrl-C")
         if name == "record":
             verb.add_argument("--dir", type=Path, default=Path("."), help="default: this one")
             verb.add_argument("--csv", action="store_true", help="one CSV file per slave")
         if name == "set":
             verb.add_argument("assignments", nargs="+", metavar="OUTPUT=VALUE")
-            verb.add_argument("--hold", type=float, default=0, metavar="SECONDS")
+            verb.add_argument("--hold", type=positive, default=0, metavar="SECONDS")
         if name == "status":
             verb.add_argument("--json", action="store_true")
     return parser.parse_args(arguments)
 
 
+def run(options: argparse.Namespace) -> int:
+    from ecdaq.link import connect
+
+    with connect(
+        options.interface,
+        domain=options.domain,
+        multicast=not options.no_multicast,
+        peers=options.peer,
+        tag=options.tag,
+        security=options.security,
+    ) as link:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda *_: link.stop())
+        return options.function(link, options)
+
+
+def one_line(text: object) -> str:
+    return " ".join(str(text).split())
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
+    """Every error is one line on stderr; the exit codes are those of exit-codes.md."""
     options = parse(arguments)
     try:
-        with connect(
-            options.interface,
-            domain=options.domain,
-            multicast=not options.no_multicast,
-            peers=options.peer,
-            tag=options.tag,
-            security=options.security,
-        ) as link:
-            for number in (signal.SIGINT, signal.SIGTERM):
-                signal.signal(number, lambda *_: link.stop())
-            return options.function(link, options)
-    except (LinkError, ValueError) as error:
-        print(f"ecdaq-remote: {error}", file=sys.stderr)
-        return error.exit_code if isinstance(error, LinkError) else 2
+        return run(options)
+    except LinkError as error:
+        problem, code = str(error), error.exit_code
+    except ValueError as error:
+        problem, code = str(error), 2
     except BrokenPipeError:  # the reader of our output has ended
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
-        print(f"ecdaq-remote: {error.filename}: {error.strerror}", file=sys.stderr)
-        return 1
+        where = f"{error.filename}: " if error.filename else ""
+        problem, code = where + (error.strerror or str(error)), 1
+    except ImportError as error:
+        package = (error.name or "").partition(".")[0] or "a package"
+        problem, code = f"{package} cannot be imported: pip install ecdaq: {error}", 1
+    except KeyboardInterrupt:
+        problem, code = "interrupted before it was connected", 1
+    except Exception as error:  # of the DDS library, say: never a traceback
+        problem, code = f"failed: {type(error).__name__}: {error}", 1
+    print(f"ecdaq-remote: {one_line(problem)}", file=sys.stderr)
+    return code
 
 
 if __name__ == "__main__":
