@@ -51,9 +51,18 @@ int cli_slave_at(const struct verb *verb, int *ret_is_list)
 	return at;
 }
 
-static void help(const struct verb *verb, const struct args *args)
+const struct args_option *cli_selecting(const struct verb *verb, size_t *ret_count)
 {
 	int is_list;
+
+	*ret_count = cli_slave_at(verb, &is_list) > 0 ? SELECTING_COUNT : 0;
+	return selecting;
+}
+
+static void help(const struct verb *verb, const struct args *args)
+{
+	const struct args_option *extra;
+	size_t count;
 
 	printf("usage: ecdaq %s%s%s%s\n\n%s\n", verb->name,
 	       args->option_count > 0 ? " [OPTION...]" : "", verb->operands[0] == '\0' ? "" : " ",
@@ -65,9 +74,8 @@ static void help(const struct verb *verb, const struct args *args)
 		putchar('\n');
 	}
 	args_help(stdout, args->options, args->option_count);
-	if (cli_slave_at(verb, &is_list) > 0) {
-		args_help(stdout, selecting, SELECTING_COUNT);
-	}
+	extra = cli_selecting(verb, &count);
+	args_help(stdout, extra, count);
 }
 
 enum args_result cli_take(struct cli *cli, struct args *args, int argc, char **argv, char *error)
@@ -112,7 +120,7 @@ int cli_parse(struct cli *cli, struct args *args, int argc, char **argv, enum ex
 	case ARGS_OK:
 		return 1;
 	case ARGS_HELP:
-		help(cli->verb, args);
+		(cli->show_help != NULL ? cli->show_help : help)(cli->verb, args);
 		return 0;
 	case ARGS_VERSION:
 		puts("ecdaq " ECDAQ_VERSION);

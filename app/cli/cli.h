@@ -22,6 +22,10 @@ struct cli {
 	struct selection *selection; /* of these, for select() */
 	/** Put the selected slaves into the operands of @args: the code of a failure, reported. */
 	enum exit_code (*select)(struct cli *cli, struct args *args);
+	const struct verb *verbs; /* all of them */
+	size_t verb_count;
+	/** In place of the text of --help; NULL: none. */
+	void (*show_help)(const struct verb *verb, const struct args *args);
 	int is_dir_chosen;           /* by option, configuration or environment */
 	char dir[CONFIG_PATH_BYTES]; /* the run directory, with a slash behind it, once it was asked
 					for */
@@ -49,6 +53,9 @@ int cli_parse(struct cli *cli, struct args *args, int argc, char **argv, enum ex
  */
 int cli_slave_at(const struct verb *verb, int *ret_is_list);
 
+/** --position and --alias, with their texts but without targets, if @verb has SLAVE. */
+const struct args_option *cli_selecting(const struct verb *verb, size_t *ret_count);
+
 /** args_parse() with the global options, which go to @cli. */
 enum args_result cli_take(struct cli *cli, struct args *args, int argc, char **argv, char *error);
 
@@ -62,10 +69,17 @@ enum exit_code cli_exit_of(int errno_value);
  */
 enum exit_code cli_path(struct cli *cli, const char *file, char *ret_path);
 
+/* The exit codes of all verbs, for exit_code_help(). */
+#define CLI_EXIT_CODES                                                                             \
+	(EXIT_CODE_COMMON | EXIT_CODE_BIT(CONFIG) | EXIT_CODE_BIT(NO_SLAVE) |                      \
+	 EXIT_CODE_BIT(SLAVES) | EXIT_CODE_BIT(STATE) | EXIT_CODE_BIT(PERMISSION) |                \
+	 EXIT_CODE_BIT(NO_DAEMON) | EXIT_CODE_BIT(REFUSED))
+
 /* The verbs, one file each. */
 enum exit_code verb_aoe(struct cli *cli, int argc, char **argv);
 enum exit_code verb_channels(struct cli *cli, int argc, char **argv);
 enum exit_code verb_clear(struct cli *cli, int argc, char **argv);
+enum exit_code verb_completion(struct cli *cli, int argc, char **argv);
 enum exit_code verb_config(struct cli *cli, int argc, char **argv);
 enum exit_code verb_crc(struct cli *cli, int argc, char **argv);
 enum exit_code verb_cstruct(struct cli *cli, int argc, char **argv);
@@ -77,6 +91,7 @@ enum exit_code verb_events(struct cli *cli, int argc, char **argv);
 enum exit_code verb_firmware(struct cli *cli, int argc, char **argv);
 enum exit_code verb_foe(struct cli *cli, int argc, char **argv);
 enum exit_code verb_histogram(struct cli *cli, int argc, char **argv);
+enum exit_code verb_manual(struct cli *cli, int argc, char **argv);
 enum exit_code verb_oneshot(struct cli *cli, int argc, char **argv);
 enum exit_code verb_pdo(struct cli *cli, int argc, char **argv);
 enum exit_code verb_pcap(struct cli *cli, int argc, char **argv);

@@ -218,6 +218,10 @@ static const struct verb verbs[] = {
 	  verb_doctor },
 	{ "clear", "", "Set counters and histograms of ecdaqd to zero.", NULL, verb_clear },
 	{ "stop", "", "Stop the bus and ecdaqd in order.", NULL, verb_stop },
+	{ "completion", "", "Completion of this command line, for bash.",
+	  "source <(ecdaq completion)\n", verb_completion },
+	{ "manual", "[VERB]", "The manual page of ecdaq, or of a verb, for man.",
+	  "ecdaq manual sdo | man -l -\n", verb_manual },
 	{ "version", "", "The version of this program.", NULL, verb_version },
 };
 
@@ -240,10 +244,7 @@ static void help(void)
 	     "  --version       print the version\n"
 	     "\n"
 	     "Every verb that reads has --json: one JSON value per line.\n");
-	exit_code_help(stdout, EXIT_CODE_COMMON | EXIT_CODE_BIT(CONFIG) | EXIT_CODE_BIT(NO_SLAVE) |
-				       EXIT_CODE_BIT(SLAVES) | EXIT_CODE_BIT(STATE) |
-				       EXIT_CODE_BIT(PERMISSION) | EXIT_CODE_BIT(NO_DAEMON) |
-				       EXIT_CODE_BIT(REFUSED));
+	exit_code_help(stdout, CLI_EXIT_CODES);
 }
 
 static const struct verb *find_verb(const char *name)
@@ -286,7 +287,10 @@ static enum exit_code run(struct cli *cli, int argc, char **argv)
 int main(int argc, char **argv)
 {
 	static struct selection selection;
-	struct cli cli = { .selection = &selection, .select = selection_apply };
+	struct cli cli = { .selection = &selection,
+			   .select = selection_apply,
+			   .verbs = verbs,
+			   .verb_count = VERB_COUNT };
 	struct args args = { .operands_min = 1, .operands_usage = "command", .ends_at_operand = 1 };
 	char error[ARGS_ERROR_BYTES];
 

@@ -42,6 +42,8 @@ VERBS = {
     "doctor": "",
     "clear": "",
     "stop": "",
+    "completion": "",
+    "manual": "[VERB]",
     "version": "",
 }
 READING = [
