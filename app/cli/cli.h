@@ -87,6 +87,7 @@ enum exit_code verb_data(struct cli *cli, int argc, char **argv);
 enum exit_code verb_doctor(struct cli *cli, int argc, char **argv);
 enum exit_code verb_domains(struct cli *cli, int argc, char **argv);
 enum exit_code verb_eoe(struct cli *cli, int argc, char **argv);
+enum exit_code verb_esi(struct cli *cli, int argc, char **argv);
 enum exit_code verb_events(struct cli *cli, int argc, char **argv);
 enum exit_code verb_firmware(struct cli *cli, int argc, char **argv);
 enum exit_code verb_foe(struct cli *cli, int argc, char **argv);
@@ -111,5 +112,6 @@ enum exit_code verb_top(struct cli *cli, int argc, char **argv);
 enum exit_code verb_topology(struct cli *cli, int argc, char **argv);
 enum exit_code verb_voe(struct cli *cli, int argc, char **argv);
 enum exit_code verb_watch(struct cli *cli, int argc, char **argv);
+enum exit_code verb_xml(struct cli *cli, int argc, char **argv);
 
 #endif

@@ -176,6 +176,14 @@ static const struct verb verbs[] = {
 	  "ecdaq scan --write ecdaq.yaml\n\n"
 	  "Names, identity and alias; serial numbers, channels and PDOs as comments.\n",
 	  verb_scan },
+	{ "xml", "[SLAVE...]", "The slaves as an ESI file: what SII and CoE say of them.",
+	  "ecdaq xml piccolo0 --output piccolo.xml\n\n"
+	  "Several slaves are an EtherCATInfoList.\n",
+	  verb_xml },
+	{ "esi", "FILE|DIR...", "The devices that ESI files describe; errors with their lines.",
+	  "ecdaq esi /etc/ecdaq/esi\n\n"
+	  "Needs no ecdaqd. A folder: its files *.xml. ecdaqd uses that of bus.esi_dir.\n",
+	  verb_esi },
 	{ "config", "show|check|diff [FILE]",
 	  "The configuration: show it, check a file, compare it with the bus.",
 	  "ecdaq config show                  every option in effect, and where it is from\n"

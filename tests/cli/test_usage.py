@@ -32,6 +32,8 @@ VERBS = {
     "foe": "read|write SLAVE NAME|FILE",
     "firmware": "SLAVE FILE",
     "scan": "",
+    "xml": "[SLAVE...]",
+    "esi": "FILE|DIR...",
     "config": "show|check|diff",
     "crc": "[SLAVE...]",
     "domains": "[SLAVE...]",

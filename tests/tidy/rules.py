@@ -39,12 +39,12 @@ MODULES: dict[str, dict[str, set[str]]] = {
         "control": {"base", "config", "image"},
         "link": {"base", "wire", "image"},
         "mailbox": {"base", "wire"},
-        "bus": {"base", "wire", "config", "image", "link", "mailbox"},
+        "bus": {"base", "wire", "config", "esi", "image", "link", "mailbox"},
         "network": {"base", "wire", "mailbox"},
         "cycle": {"base", "wire", "config", "image", "link", "bus", "control"},
         "admin": {"base", "wire", "config", "image", "cycle"},
         "daemon": {"base", "wire", "config", "image", "link", "bus", "control", "cycle", "admin"}
-        | {"mailbox", "network", "program"},
+        | {"esi", "mailbox", "network", "program"},
     },
     "services": {
         "record": READERS,

@@ -94,6 +94,7 @@ struct config {
 	char remote_group[32];           /* of the socket that gives the board of remote outputs */
 	/* bus */
 	char interface[32];
+	char bus_esi_dir[CONFIG_PATH_BYTES]; /* "" = none */
 	int64_t bus_scan_timeout_ns;
 	int64_t bus_mailbox_timeout_ns;
 	int64_t bus_op_timeout_ns;

@@ -37,6 +37,17 @@ static const struct option rows[] = {
 	  .default_value = "",
 	  .prose = "Network interface of the EtherCAT segment. ecdaqd needs it here or as "
 		   "--interface." },
+	{ .name = "bus.esi_dir",
+	  .type = OPTION_TEXT,
+	  FIELD(bus_esi_dir),
+	  .default_value = "",
+	  .prose = "Folder of ESI files (*.xml) of the slaves' vendors. Read at each scan, for "
+		   "what a "
+		   "slave does not say itself: names of the device, of PDOs and entries, types, "
+		   "and the "
+		   "DC mode where its SII has none. A file that cannot be read is reported and "
+		   "passed "
+		   "over. Empty: none." },
 	{ .name = "bus.scan_timeout",
 	  .type = OPTION_DURATION,
 	  FIELD(bus_scan_timeout_ns),

@@ -121,6 +121,11 @@ void bus_listen(struct bus *bus, void (*emit)(void *ctx, const struct event *ev)
 	bus->listener = (struct bus_emit){ .call = emit, .ctx = emit_ctx };
 }
 
+void bus_use_esi(struct bus *bus, const struct bus_esi *esi)
+{
+	bus->esi = *esi;
+}
+
 void bus_sii_free(struct bus *bus)
 {
 	for (size_t i = 0; i < LIMIT_SLAVES; i++) {

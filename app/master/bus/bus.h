@@ -40,6 +40,21 @@ void bus_destroy(struct bus *bus);
 /** Set the receiver of SDO aborts and CoE emergencies from any call below; none at first. */
 void bus_listen(struct bus *bus, void (*emit)(void *ctx, const struct event *ev), void *emit_ctx);
 
+struct esi_identity;
+struct esi_library;
+
+/* Descriptions of devices by their vendors, besides what the devices say themselves. */
+struct bus_esi {
+	/* What there is of the devices @wanted; NULL: nothing. The bus uses it until the next call.
+	 */
+	const struct esi_library *(*load)(void *ctx, const struct esi_identity *wanted,
+					  size_t count);
+	void *ctx;
+};
+
+/** bus_scan() asks @esi once its slaves are known. */
+void bus_use_esi(struct bus *bus, const struct bus_esi *esi);
+
 /* --- bring-up, in this order --- */
 
 /** Find the slaves, to PRE-OP, SYNC0 of an earlier run stopped first (T09); names them. */

@@ -171,6 +171,8 @@ struct bus {
 	unsigned absent_count;                 /* optional slaves that were not found */
 	int absent;                            /* the first of them, in @wanted */
 	struct bus_emit listener;              /* of mailbox events */
+	struct bus_esi esi;                    /* load NULL: none */
+	const struct esi_library *library;     /* since the scan; NULL: none */
 	struct line *line;
 	struct mailbox_engine *mailbox;
 	struct read_ahead *ahead; /* bus/read_ahead.c; NULL: not now */
@@ -266,6 +268,17 @@ int bus_sii_load(struct bus *bus);
 
 /** Mapped entries of a slave by its SII, outputs first; how many, or -errno with a line. */
 int bus_sii_entries(struct bus *bus, size_t pos, struct pdo_entry *ret, size_t capacity);
+
+/* --- esi.c --- */
+
+/** Ask for the descriptions of the slaves, whose identities are known. 0; -ENOMEM with a line. */
+int bus_esi_load(struct bus *bus);
+/** Name of the device; "": not known. */
+const char *bus_esi_device_name(const struct bus *bus, size_t pos);
+/** DC modes to bus->parsed, where the SII has none. */
+void bus_esi_modes(struct bus *bus, size_t pos);
+/** Names and types of entries that have none. */
+void bus_esi_names(const struct bus *bus, size_t pos, struct pdo_entry *entry, size_t count);
 
 /* --- soem_slave.c --- */
 

@@ -74,6 +74,7 @@ static int read_entries(struct bus *bus, size_t pos)
 			return -EAGAIN;
 		}
 	}
+	bus_esi_names(bus, pos, entry, (size_t)(coe > 0 ? coe : sii));
 	sl->pdo_first = bus->pdo_count;
 	sl->pdo_count = (size_t)(coe > 0 ? coe : sii);
 	sl->is_mapped_by_coe = coe > 0;

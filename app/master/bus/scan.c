@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "base/bytes.h"
+#include "base/utf8.h"
 #include "bus/bus_internal.h"
 #include "bus/compare.h"
 #include "bus/eeprom.h"
@@ -116,6 +117,9 @@ static void name_device(struct bus *bus, size_t pos)
 	if (sl->info.device[0] == '\0') {
 		sii_text(sl->sii, sl->sii_len, bus->parsed.order_name, sl->info.device);
 	}
+	if (sl->info.device[0] == '\0') {
+		utf8_copy(bus_esi_device_name(bus, pos), sl->info.device, sizeof(sl->info.device));
+	}
 }
 
 static void take_identity(struct bus *bus, size_t pos)
@@ -191,6 +195,9 @@ static int describe(struct bus *bus, size_t pos)
 
 	/* Damage is reported where what it hides is needed: SYNC mode, mapping. */
 	sii_parse(sl->sii, sl->sii_len, &bus->parsed, damage, sizeof(damage));
+	if (damage[0] == '\0') {
+		bus_esi_modes(bus, pos);
+	}
 	free_sync(bus, pos);
 	take_clock(bus, pos);
 	name_device(bus, pos);
@@ -294,6 +301,7 @@ static int describe_all(struct bus *bus)
 			take_identity(bus, i);
 		}
 	}
+	r = r < 0 ? r : bus_esi_load(bus);
 	if (r < 0) {
 		return r;
 	}

@@ -9,6 +9,7 @@
 
 #include "daemon/session.h"
 #include "daemon/session_internal.h"
+#include "esi/library.h"
 #include "link/capture.h"
 
 enum {
@@ -65,6 +66,29 @@ static void attend(void *ctx)
 	}
 }
 
+static void warn_of_esi(void *ctx, const char *text)
+{
+	const struct session *s = ctx;
+	char line[FAILURE_TEXT_BYTES];
+
+	if (s->spec.hooks.warn != NULL) {
+		snprintf(line, sizeof(line), "bus.esi_dir: %.280s", text);
+		s->spec.hooks.warn(s->spec.hooks.ctx, line);
+	}
+}
+
+/* At each scan: files may have been added. */
+static const struct esi_library *load_esi(void *ctx, const struct esi_identity *wanted,
+					  size_t count)
+{
+	struct session *s = ctx;
+	const struct esi_library_report report = { .bad = warn_of_esi, .ctx = s };
+
+	esi_library_free(s->esi);
+	s->esi = esi_library_read(s->spec.cfg->bus_esi_dir, wanted, count, &report);
+	return s->esi;
+}
+
 static int open_line(struct session *s, struct failure *failure)
 {
 	struct transport transport;
@@ -91,6 +115,9 @@ static int open_line(struct session *s, struct failure *failure)
 		return failure_set(failure, EXIT_CODE_RESOURCES, r, "bus: %s", strerror(-r));
 	}
 	bus_listen(s->bus, session_bus_event, s);
+	if (s->spec.cfg->bus_esi_dir[0] != '\0') {
+		bus_use_esi(s->bus, &(struct bus_esi){ .load = load_esi, .ctx = s });
+	}
 	return 0;
 }
 

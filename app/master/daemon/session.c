@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "daemon/session_internal.h"
+#include "esi/library.h"
 #include "link/capture.h"
 
 #define ZERO(field) atomic_store_explicit(&(field), 0, memory_order_relaxed)
@@ -396,5 +397,6 @@ void session_destroy(struct session *session)
 	ring_destroy(session->frames);
 	capture_destroy(session->capture);
 	run_dir_close(&session->run);
+	esi_library_free(session->esi);
 	free(session);
 }

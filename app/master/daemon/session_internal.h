@@ -40,6 +40,7 @@ struct session {
 	struct exchange *exchange;
 	struct cycle *cycle;
 	struct control *control; /* NULL: none is configured */
+	struct esi_library *esi; /* of the newest scan; NULL: none */
 	struct board board;
 	enum config_target target;
 	int is_held;                   /* up, but not led to OP or recovered: hold.c */
