@@ -77,6 +77,14 @@ TEST(args, short_options_take_the_next_word)
 	CHECK_STR(got.text, "x");
 }
 
+TEST(args, a_value_may_follow_its_letter_without_a_blank)
+{
+	CHECK_EQ(PARSE("-tx", "a"), ARGS_OK);
+	CHECK_STR(got.text, "x");
+	CHECK_EQ(PARSE("-fx", "a"), ARGS_ERROR); /* a flag has no value */
+	CHECK_STR(error, "-fx: unknown option");
+}
+
 TEST(args, numbers_and_times_are_taken_whole)
 {
 	CHECK_EQ(PARSE("a", "--number", "2.5", "--at", "-3"), ARGS_OK);
