@@ -328,6 +328,12 @@ const struct channel *bus_channels(const struct bus *bus, size_t *ret_count)
 	return channels;
 }
 
+void bus_use_esi(struct bus *bus, const struct bus_esi *esi)
+{
+	(void)bus;
+	(void)esi;
+}
+
 const struct schedule *bus_schedule(const struct bus *bus)
 {
 	static const struct schedule schedule = { .need_ns = 50000, .allowed_ns = 400000 };
