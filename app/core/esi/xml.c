@@ -14,6 +14,12 @@
 
 enum { CHUNK_BYTES = 1 << 16 };
 
+/* Expat 2.9 has these under new names, and calls the old ones deprecated. */
+#if XML_MAJOR_VERSION == 2 && XML_MINOR_VERSION < 9
+#define XML_GetCurrentLineNumber64 XML_GetCurrentLineNumber
+#define XML_GetCurrentByteIndex64 XML_GetCurrentByteIndex
+#endif
+
 struct xml {
 	XML_Parser parser;
 	const struct xml_handler *handler;
@@ -73,7 +79,7 @@ static void limited_free(void *old)
 
 int xml_line(const struct xml *xml)
 {
-	return (int)XML_GetCurrentLineNumber(xml->parser);
+	return (int)XML_GetCurrentLineNumber64(xml->parser);
 }
 
 int xml_fail(struct xml *xml, const char *format, ...)
@@ -105,7 +111,7 @@ static void stop(struct xml *xml, int result)
 
 static void note_token(struct xml *xml)
 {
-	xml->seen = XML_GetCurrentByteIndex(xml->parser);
+	xml->seen = XML_GetCurrentByteIndex64(xml->parser);
 }
 
 static void XMLCALL on_begin(void *ctx, const XML_Char *name, const XML_Char **attribute)
