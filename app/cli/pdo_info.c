@@ -7,7 +7,9 @@
 #include <string.h>
 
 #include "base/bytes.h"
+#include "base/utf8.h"
 #include "cli/admin_client.h"
+#include "cli/esi_source.h"
 
 enum {
 	OBJECT_SM_ASSIGN = 0x1c10,
@@ -347,6 +349,37 @@ static enum exit_code add_coe(struct pdo_reader *rd)
 	return EXIT_CODE_OK;
 }
 
+/* --- ESI: names and types that both lack --- */
+
+static void add_esi(struct cli *cli, struct pdo_info *info)
+{
+	const struct esi_device *device =
+		esi_source_find(cli, info->sii.vendor, info->sii.product, info->sii.revision);
+
+	for (size_t i = 0; device != NULL && i < info->pdo_count; i++) {
+		struct pdo_info_pdo *pdo = &info->pdo[i];
+		const struct esi_pdo *known = esi_find_pdo(device, pdo->index);
+
+		if (known != NULL && pdo->name[0] == '\0') {
+			utf8_copy(known->name, pdo->name, sizeof(pdo->name));
+		}
+		for (size_t k = 0; k < pdo->count; k++) {
+			struct pdo_info_entry *e = &info->entry[pdo->first + k];
+			const struct esi_entry *found =
+				e->index == 0
+					? NULL
+					: esi_find_entry(device, pdo->index, e->index, e->subindex);
+
+			if (found != NULL && e->name[0] == '\0') {
+				utf8_copy(found->name, e->name, sizeof(e->name));
+			}
+			if (found != NULL && e->type == 0) {
+				e->type = found->type;
+			}
+		}
+	}
+}
+
 enum exit_code pdo_info_read(struct cli *cli, uint16_t pos, struct pdo_info **ret_info)
 {
 	struct pdo_reader rd = { .cli = cli, .request = { .slave_pos = pos } };
@@ -367,6 +400,7 @@ enum exit_code pdo_info_read(struct cli *cli, uint16_t pos, struct pdo_info **re
 		return result;
 	}
 	sort(rd.info);
+	add_esi(cli, rd.info);
 	*ret_info = rd.info;
 	return EXIT_CODE_OK;
 }

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The process data of one slave: its SyncManagers, the PDOs that its SII has, and which of them are
- * assigned, by CoE (0x1C10 and on, with the present mapping) or else as the SII assigns them.
+ * assigned, by CoE (0x1C10 and on, with the present mapping) or else as the SII assigns them. Names
+ * that both lack are those of ESI files (bus.esi_dir).
  * Context: blocking.
  */
 #ifndef CLI_PDO_INFO_H

@@ -145,6 +145,9 @@ def test_a_slave_without_names_has_those_of_its_esi(bus: Segment, tmp_path: Path
         segment.wait_for_op()
         names = [channel["name"] for channel in show(segment, "channels")]
         assert names == [f"el2004_0.valve_{n}_open" for n in (1, 2, 3, 4)]
+        (slave,) = show(segment, "pdo")
+        assert [pdo["name"] for pdo in slave["pdo"]] == [f"Valve {n}" for n in (1, 2, 3, 4)]
+        assert {entry["name"] for pdo in slave["pdo"] for entry in pdo["entry"]} == {"Open"}
         log = segment.log("daemon")
         assert "warning: bus.esi_dir: " in log and "a bad one.xml:2: no XML: mismatched tag" in log
     finally:
