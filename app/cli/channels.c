@@ -21,7 +21,11 @@ static void show(const struct channel *ch)
 	if (ch->scale != 1.0 || ch->offset != 0.0) {
 		printf("  * %.9g + %.9g", ch->scale, ch->offset);
 	}
-	printf("%s%s\n", ch->unit[0] == '\0' ? "" : "  ", ch->unit);
+	printf("%s%s", ch->unit[0] == '\0' ? "" : "  ", ch->unit);
+	if (image_has_range(ch)) {
+		printf("  (%.9g to %.9g)", ch->min, ch->max);
+	}
+	putchar('\n');
 }
 
 static void write_json(struct json *js, const struct channel *ch, const struct samples *samples)
@@ -44,6 +48,10 @@ static void write_json(struct json *js, const struct channel *ch, const struct s
 	json_text(js, "unit", ch->unit);
 	json_double(js, "scale", ch->scale);
 	json_double(js, "offset", ch->offset);
+	if (image_has_range(ch)) { /* an open end is null */
+		json_double(js, "min", ch->min);
+		json_double(js, "max", ch->max);
+	}
 	json_object_end(js);
 }
 

@@ -59,14 +59,16 @@ static int put_yaml(const char *value)
 static const char *open_place(struct config_command *cmd, const char *place, size_t len)
 {
 	int is_same = strncmp(cmd->place, place, len) == 0 && cmd->place[len] == '\0';
-	int is_sdo = strncmp(place, "slaves[", 7) == 0 && strstr(place, "].sdo[") != NULL;
 	size_t word = strcspn(place, "[.");
+	const char *inner = strstr(place, "]."); /* a list in an item: slaves[0].sdo[1]. */
+	size_t inner_len = inner != NULL ? strcspn(inner + 2, "[.") : 0;
+	int is_inner = inner != NULL && inner[2 + inner_len] == '[';
 
 	if (!is_same) {
 		snprintf(cmd->place, sizeof(cmd->place), "%.*s", (int)len, place);
-		if (is_sdo && strstr(cmd->place, ".sdo[0].") != NULL) {
-			puts("    sdo:");
-		} else if (!is_sdo &&
+		if (is_inner && strncmp(inner + 2 + inner_len, "[0]", 3) == 0) {
+			printf("    %.*s:\n", (int)inner_len, inner + 2);
+		} else if (!is_inner &&
 			   (place[word] == '.' || strncmp(place + word, "[0]", 3) == 0)) {
 			printf("\n%.*s:\n", (int)word, place);
 		}
@@ -74,7 +76,7 @@ static const char *open_place(struct config_command *cmd, const char *place, siz
 	if (place[word] == '.') {
 		return "  ";
 	}
-	if (is_sdo) {
+	if (is_inner) {
 		return is_same ? "        " : "      - ";
 	}
 	return is_same ? "    " : "  - ";
@@ -250,6 +252,8 @@ static const char *kind_of(const struct difference *diff)
 		return "no such output";
 	case DIFFERENCE_UNCHECKED:
 		return "not compared";
+	case DIFFERENCE_NO_CHANNEL:
+		return "no such channel";
 	}
 	return "?";
 }
@@ -325,12 +329,13 @@ static void diff_json(struct json *js, const struct difference *diff, const char
 		[DIFFERENCE_UNEXPECTED] = "unexpected", [DIFFERENCE_IDENTITY] = "identity",
 		[DIFFERENCE_PLACE] = "place",           [DIFFERENCE_LOST] = "lost",
 		[DIFFERENCE_CHANNEL] = "output",        [DIFFERENCE_UNCHECKED] = "unchecked",
+		[DIFFERENCE_NO_CHANNEL] = "channel",
 	};
 
 	json_object_begin(js, NULL);
 	json_text(js, "kind",
-		  diff->kind <= DIFFERENCE_UNCHECKED && diff->kind > 0 ? kinds[diff->kind]
-								       : "unknown");
+		  diff->kind <= DIFFERENCE_NO_CHANNEL && diff->kind > 0 ? kinds[diff->kind]
+									: "unknown");
 	json_truth(js, "note", difference_is_note(diff));
 	put_text(js, "name", diff->name);
 	put_place(js, "item", diff->item);
@@ -356,7 +361,8 @@ static enum exit_code judge(const struct config_command *cmd, const struct diffe
 
 	for (size_t i = 0; i < count; i++) {
 		real += !difference_is_note(&diff[i]);
-		if (!difference_is_note(&diff[i]) && diff[i].kind != DIFFERENCE_CHANNEL) {
+		if (!difference_is_note(&diff[i]) && diff[i].kind != DIFFERENCE_CHANNEL &&
+		    diff[i].kind != DIFFERENCE_NO_CHANNEL) {
 			code = EXIT_CODE_SLAVES;
 		}
 	}

@@ -32,6 +32,15 @@ void lines_write_head(const struct lines *lines)
 	putchar('\n');
 }
 
+/* '!': not a good sample; '?': not plausible. */
+static char mark_of(const struct sample_header *header, const struct channel *ch, uint64_t raw)
+{
+	if (lines_is_bad(header, ch)) {
+		return '!';
+	}
+	return image_is_outside(ch, image_raw_to_physical(ch, raw)) ? '?' : ' ';
+}
+
 void lines_write_text(const struct lines *lines)
 {
 	const uint8_t *image = samples_image(lines->samples);
@@ -49,7 +58,7 @@ void lines_write_text(const struct lines *lines)
 		} else {
 			text_value(ch, raw, value);
 		}
-		printf(" %15s%c", value, lines_is_bad(&header, ch) ? '!' : ' ');
+		printf(" %15s%c", value, mark_of(&header, ch, raw));
 	}
 	samples_flags_format(header.flags, flags, sizeof(flags));
 	printf("%s%s\n", flags[0] == '\0' ? "" : " ", flags);
@@ -75,6 +84,14 @@ void lines_write_json(const struct lines *lines)
 	json_array_begin(&js, "bad");
 	for (unsigned i = 0; i < lines->choice->count; i++) {
 		if (lines_is_bad(&header, chosen(lines, i))) {
+			json_text(&js, NULL, chosen(lines, i)->name);
+		}
+	}
+	json_array_end(&js);
+	json_array_begin(&js, "outside");
+	for (unsigned i = 0; i < lines->choice->count; i++) {
+		if (mark_of(&header, chosen(lines, i), image_get_raw(image, chosen(lines, i))) ==
+		    '?') {
 			json_text(&js, NULL, chosen(lines, i)->name);
 		}
 	}

@@ -11,6 +11,7 @@
 #include "cli/follow.h"
 #include "cli/screen.h"
 #include "cli/text.h"
+#include "image/entry.h"
 #include "image/image.h"
 #include "program/args_duration.h"
 #include "program/json.h"
@@ -53,10 +54,8 @@ struct oneshot {
 static int find_entry(const struct samples *samples, uint16_t slave_pos, const char *entry)
 {
 	for (uint32_t i = 0; i < samples->meta->channel_count; i++) {
-		const char *dot = strrchr(samples->channels[i].name, '.');
-
-		if (samples->channels[i].slave_pos == slave_pos && dot != NULL &&
-		    strcmp(dot + 1, entry) == 0) {
+		if (samples->channels[i].slave_pos == slave_pos &&
+		    channel_is_entry(&samples->slaves[slave_pos], &samples->channels[i], entry)) {
 			return (int)i;
 		}
 	}

@@ -73,28 +73,63 @@ static void put_pdos(FILE *out, const struct pdo_info *info)
 	}
 }
 
+/* An object of more than 64 bits is several channels: they are told apart by name. */
+static int is_only_one(const struct samples *samples, const struct channel *ch)
+{
+	unsigned count = 0;
+
+	for (uint32_t i = 0; i < samples->meta->channel_count; i++) {
+		const struct channel *other = &samples->channels[i];
+
+		count += other->slave_pos == ch->slave_pos && other->index == ch->index &&
+			 other->subindex == ch->subindex;
+	}
+	return count == 1;
+}
+
+/* An item of slaves[].channels[] that changes nothing, as a comment. */
+static void put_channel(FILE *out, const struct samples *samples, const struct channel *ch)
+{
+	const char *dot = strrchr(ch->name, '.');
+	char type[TEXT_BYTES];
+	char name[LIMIT_NAME_BYTES];
+	char unit[sizeof(ch->unit)];
+
+	text_plain(dot != NULL ? dot + 1 : ch->name, name, sizeof(name));
+	text_plain(ch->unit, unit, sizeof(unit));
+	fputs("    #  - { match: ", out);
+	if (is_only_one(samples, ch)) {
+		fprintf(out, "\"0x%04x:%02x\", name: %s", ch->index, ch->subindex, name);
+	} else {
+		fputs(name, out);
+	}
+	if (unit[0] != '\0' && strcmp(unit, ch->unit) == 0) {
+		fputs(", unit: ", out);
+		json_put_text(out, unit);
+	}
+	if (ch->scale != 1.0 || ch->offset != 0.0) {
+		fputs(", scale: ", out);
+		json_put_real(out, ch->scale);
+		fputs(", offset: ", out);
+		json_put_real(out, ch->offset);
+	}
+	image_type_format(ch, type, sizeof(type));
+	fprintf(out, " }  # %s %s\n", ch->direction == CHANNEL_OUTPUT ? "output" : "input", type);
+}
+
 static void put_channels(const struct scan_command *cmd, uint16_t pos)
 {
 	int is_open = 0;
 
 	for (uint32_t i = 0; cmd->has_channels && i < cmd->samples.meta->channel_count; i++) {
-		const struct channel *ch = &cmd->samples.channels[i];
-		char type[TEXT_BYTES];
-		char name[LIMIT_NAME_BYTES];
-		char unit[sizeof(ch->unit)];
-
-		if (ch->slave_pos != pos) {
+		if (cmd->samples.channels[i].slave_pos != pos) {
 			continue;
 		}
 		if (!is_open) {
-			fputs("    # channels:\n", cmd->out);
+			fputs("    #channels:\n", cmd->out);
 			is_open = 1;
 		}
-		image_type_format(ch, type, sizeof(type));
-		fprintf(cmd->out, "    #   %-6s %-7s %s%s%s\n",
-			ch->direction == CHANNEL_OUTPUT ? "output" : "input", type,
-			text_plain(ch->name, name, sizeof(name)), ch->unit[0] == '\0' ? "" : " ",
-			text_plain(ch->unit, unit, sizeof(unit)));
+		put_channel(cmd->out, &cmd->samples, &cmd->samples.channels[i]);
 	}
 }
 

@@ -129,7 +129,7 @@ void fake_describe(struct fake *f)
 			*ch = (struct channel){
 				.slave_pos = (uint16_t)s,
 				.index = entries[e].is_output ? 0x7000 : 0x6000,
-				.subindex = (uint8_t)(e + 1),
+				.subindex = (uint8_t)(entries[e].is_output ? e + 1 : e - 1),
 				.type = (uint8_t)entries[e].type,
 				.direction = (uint8_t)entries[e].is_output,
 				.bit_len = (uint8_t)entries[e].bits,

@@ -105,8 +105,8 @@ static void add_channel(struct meta *m, unsigned n, const char *name, unsigned s
 
 	snprintf(ch->name, sizeof(ch->name), "piccolo%u.%s", slave, name);
 	ch->slave_pos = (uint16_t)slave;
-	ch->index = 0x6000;
-	ch->subindex = (uint8_t)(n + 1);
+	ch->index = strcmp(name, "led") == 0 ? 0x7000 : 0x6000;
+	ch->subindex = (uint8_t)(n % 3 + 1);
 	ch->type = (uint8_t)type;
 	ch->direction = strcmp(name, "led") == 0 ? CHANNEL_OUTPUT : CHANNEL_INPUT;
 	ch->bit_len = (uint8_t)bits;

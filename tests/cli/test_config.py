@@ -38,6 +38,8 @@ slaves:
     sdo:
       - {index: 0x8000, subindex: 2, type: UINT, value: 10}
       - {index: 0x8001, type: REAL, value: 1.5}
+    channels:
+      - {match: "0x6000:01", name: pressure, unit: "%", scale: 0.5, max: 10}
   - name: rear
 outputs:
   - channel: rear.led
@@ -73,6 +75,8 @@ def test_show_has_value_unit_and_origin_of_every_option(file: Path) -> None:
     assert options["cycle.priority"]["origin"] == "command line"
     assert options["bus.scan_timeout"]["origin"] == "default"
     assert options["slaves[0].sdo[1].value"]["value"] == "1.5"
+    assert options["slaves[0].channels[0].match"]["value"] == "0x6000:01"
+    assert options["slaves[0].channels[0].unit"]["value"] == "%"
     assert options["slaves[1].name"]["value"] == "rear"
     assert options["outputs[0].owner"]["value"] == "remote"
     reference = (ROOT / "app/doc/reference/options.md").read_text()

@@ -159,7 +159,7 @@ def test_channels_lists_the_table(daemon: Fake) -> None:
         "slave": 0,
         "slave_name": "piccolo0",
         "index": 0x6000,
-        "subindex": 3,
+        "subindex": 1,
         "bit_offset": 144,
         "bit_length": 16,
         "unit": "V",

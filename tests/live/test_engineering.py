@@ -45,9 +45,76 @@ def test_a_scan_is_a_configuration_that_brings_the_same_bus_to_op(
     segment.wait_for_op()
     assert segment.ecdaq("config", "diff").stdout == "configuration and bus agree\n"
     again = segment.ecdaq("scan").stdout
-    assert "#   output BOOL    piccolo0.led" in again
+    assert '#  - { match: "0x7000:01", name: led }  # output BOOL' in again
+    # Its channel lists, with the comments taken off, change nothing.
+    file.write_text(again.replace("    #channels:", "    channels:").replace("    #  -", "      -"))
+    before = segment.ecdaq("channels").stdout
+    assert segment.stop("daemon") == 0
+    segment.start_daemon("--config", str(file))
+    segment.wait_for_op()
+    assert segment.ecdaq("channels").stdout == before
     identity = [line for line in text.splitlines() if "#" not in line]
     assert [line for line in again.splitlines() if "#" not in line] == identity
+    assert segment.stop("daemon") == 0
+
+
+CHANNELS = """slaves:
+  - name: front
+    channels:
+      - { match: adc, name: pressure_behind_the_second_valve_of_the_left_line,
+          unit: bar, scale: 0.5, offset: -1, min: 5000 }
+      - { match: "0x6000:02", name: turns }
+outputs:
+  - { channel: front.led, fail_safe: 1 }
+"""
+PRESSURE = "front.pressure_behind_the_second_valve_of_the_left_line"
+
+
+def test_channels_have_the_name_the_unit_and_the_scale_of_the_file(
+    make_segment: Callable[..., Segment],
+) -> None:
+    segment = make_segment(slaves="1")
+    file = segment.folder / "ecdaq.yaml"
+    file.write_text(CHANNELS)
+    segment.start_sim()
+    segment.start_daemon("--config", str(file))
+    segment.wait_for_op()
+    channels = {one["name"]: one for one in json.loads(segment.ecdaq("channels", "--json").stdout)}
+    assert list(channels)[-4:] == [PRESSURE, "front.turns", "front.sample_time", "front.status"]
+    pressure = channels[PRESSURE]
+    assert (pressure["unit"], pressure["scale"], pressure["offset"]) == ("bar", 0.5, -1)
+    assert (pressure["min"], pressure["max"]) == (5000, None)
+    assert f"{PRESSURE:28} in   UINT16" in segment.ecdaq("channels").stdout
+    one = json.loads(segment.ecdaq("watch", PRESSURE, "--count", "1", "--json").stdout)
+    raw = json.loads(segment.ecdaq("watch", PRESSURE, "--count", "1", "--json", "--raw").stdout)
+    value = one["values"][PRESSURE]
+    assert 0 <= (value + 1) * 2 <= 4095 and (value + 1) * 2 % 1 == 0
+    assert 0 <= raw["values"][PRESSURE] <= 4095
+    assert one["outside"] == ([] if one["bad"] else [PRESSURE])
+    assert f"{PRESSURE}[bar]" in segment.ecdaq("watch", PRESSURE, "--count", "1").stdout
+    assert "pressure_behind_the_second_valve_of_the_left_line" in segment.ecdaq("cstruct").stdout
+    shown = segment.ecdaq("config", "show").stdout
+    assert "unit: bar" in shown
+    assert segment.ecdaq("config", "diff").stdout == "configuration and bus agree\n"
+    assert segment.stop("daemon") == 0
+
+
+def test_an_item_that_meets_no_channel_keeps_the_bus_waiting_and_is_named(
+    make_segment: Callable[..., Segment],
+) -> None:
+    segment = make_segment(slaves="1")
+    file = segment.folder / "ecdaq.yaml"
+    file.write_text("slaves:\n  - name: front\n    channels:\n      - { match: ai_*, unit: V }\n")
+    segment.start_sim()
+    segment.start_waiting_daemon("--config", str(file))
+    wait_for("waiting", lambda: segment.status().get("waiting"), 60)
+    assert "channels: ai_*: no such channel; there are: led, oneshot_time, adc, counter" in str(
+        segment.status()
+    )
+    text = wait_for(
+        "difference", lambda: segment.ecdaq("config", "diff", check=False).stdout.strip(), 60
+    )
+    assert text.startswith(f"{file}:4: position 0 front: no such channel: expected ai_*, found led")
     assert segment.stop("daemon") == 0
 
 

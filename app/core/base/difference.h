@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Answer of ADMIN_COMPARE (base/admin_protocol.h): an array of these, in the order of slaves[],
- * then of the positions, then of outputs[]. */
+ * then of the positions, then of slaves[].channels[] and of outputs[]. */
 #ifndef BASE_DIFFERENCE_H
 #define BASE_DIFFERENCE_H
 
@@ -18,6 +18,7 @@ enum difference_kind {
 	DIFFERENCE_LOST = 6,       /* it was found, and does not answer any more */
 	DIFFERENCE_CHANNEL = 7,    /* an output is configured that does not exist */
 	DIFFERENCE_UNCHECKED = 8,  /* outputs cannot be compared: why, in found */
+	DIFFERENCE_NO_CHANNEL = 9, /* an item of slaves[].channels[] that meets no channel */
 };
 
 #define DIFFERENCE_NOWHERE UINT16_C(0xffff)

@@ -15,6 +15,7 @@ enum limits {
 	LIMIT_SYNC0_LINES = 64,   /* GPIO lines that ecdaq-sync0 watches */
 	LIMIT_FRAME_BYTES = 1514, /* Ethernet header and payload, without FCS */
 	LIMIT_NAME_BYTES = 64,    /* with the closing zero */
+	LIMIT_UNIT_BYTES = 16,    /* of a channel, the same */
 };
 
 #endif

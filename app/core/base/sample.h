@@ -15,9 +15,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "base/limits.h"
 #include "base/slave_set.h"
 
-#define SAMPLE_VERSION 3u
+#define SAMPLE_VERSION 4u
 
 enum sample_flag {
 	SAMPLE_LOST = 1u << 0,    /* no frame back before the receive deadline: inputs are stale */
@@ -68,10 +69,10 @@ enum channel_direction { CHANNEL_INPUT = 0, CHANNEL_OUTPUT = 1 }; /* from the ma
 
 /* One mapped variable. physical = raw * scale + offset, in @unit. */
 struct channel {
-	char name[64];      /* "piccolo0.adc": slave name, dot, entry name */
-	char unit[16];      /* "" where raw counts are all there is */
-	uint16_t slave_pos; /* 0-based place on the ring */
-	uint16_t index;     /* CoE object, 0x6000 */
+	char name[LIMIT_NAME_BYTES]; /* "piccolo0.adc": slave name, dot, entry name */
+	char unit[LIMIT_UNIT_BYTES]; /* "" where raw counts are all there is */
+	uint16_t slave_pos;          /* 0-based place on the ring */
+	uint16_t index;              /* CoE object, 0x6000 */
 	uint8_t subindex;
 	uint8_t type;        /* enum channel_type */
 	uint8_t direction;   /* enum channel_direction */
@@ -80,9 +81,12 @@ struct channel {
 	uint32_t reserved;
 	double scale;
 	double offset;
+	double min; /* plausible range, physical; not below max: there is none (image_has_range())
+		     */
+	double max;
 };
 
-static_assert(sizeof(struct channel) == 112, "part of the ring's format");
+static_assert(sizeof(struct channel) == 128, "part of the ring's format");
 
 /* One slave of the segment, as found. */
 struct slave_info {

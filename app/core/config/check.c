@@ -183,6 +183,56 @@ static int check_slaves(const struct config *cfg, const struct option_faults *fa
 	return 0;
 }
 
+static const char *channel_fault(const struct config *cfg, size_t i, const char **ret_key,
+				 char *reason)
+{
+	const struct config_channel *item = &cfg->channel[i];
+	const struct config_slave *slave = &cfg->slave[item->slave_pos];
+
+	*ret_key = "slaves[].channels[].match";
+	if (item->match[0] == '\0') {
+		return "is empty";
+	}
+	*ret_key = "slaves[].channels[].offset";
+	if (item->offset != 0 && item->scale == 0) {
+		return "requires scale";
+	}
+	*ret_key = "slaves[].channels[].max";
+	if (!(item->min < item->max)) {
+		return "is not above min";
+	}
+	*ret_key = "slaves[].channels[].name";
+	if (strlen(slave->name) + 1 + strlen(item->name) >= LIMIT_NAME_BYTES) {
+		snprintf(reason, OPTION_WHY_BYTES, "%s.%s is longer than %d characters",
+			 slave->name, item->name, LIMIT_NAME_BYTES - 1);
+		return reason;
+	}
+	for (size_t j = 0; j < i && item->name[0] != '\0'; j++) {
+		if (cfg->channel[j].slave_pos == item->slave_pos &&
+		    strcmp(cfg->channel[j].name, item->name) == 0) {
+			snprintf(reason, OPTION_WHY_BYTES, "%s is already used in line %d",
+				 item->name, cfg->channel[j].line);
+			return reason;
+		}
+	}
+	return NULL;
+}
+
+static int check_channels(const struct config *cfg, const struct option_faults *faults)
+{
+	char reason[OPTION_WHY_BYTES];
+
+	for (size_t i = 0; i < cfg->channel_count; i++) {
+		const char *key;
+		const char *fault = channel_fault(cfg, i, &key, reason);
+
+		if (fault != NULL && faults->add(faults->ctx, key, cfg->channel[i].line, fault)) {
+			return 1;
+		}
+	}
+	return 0;
+}
+
 static const char *output_fault(const struct config *cfg, size_t i, const char **ret_key)
 {
 	const struct config_output *output = &cfg->output[i];
@@ -247,6 +297,7 @@ int option_cross_check(const struct config *cfg, const struct option_lines *line
 
 	is_over = is_over || check_dds(cfg, lines, &all);
 	is_over = is_over || check_slaves(cfg, &all);
+	is_over = is_over || check_channels(cfg, &all);
 	is_over = is_over || check_outputs(cfg, &all);
 	return is_over || counted.count > 0 ? -EINVAL : 0;
 }

@@ -28,13 +28,22 @@ enum config_target {
 
 enum config_datagrams { CONFIG_DATAGRAMS_ONE, CONFIG_DATAGRAMS_PER_SLAVE };
 
+enum config_channel_type {
+	CONFIG_CHANNEL_DEVICE, /* as the device has it */
+	CONFIG_CHANNEL_BOOL,
+	CONFIG_CHANNEL_UINT,
+	CONFIG_CHANNEL_INT,
+	CONFIG_CHANNEL_FLOAT
+};
+
 enum config_when_full { CONFIG_WHEN_FULL_OLDEST, CONFIG_WHEN_FULL_STOP };
 enum config_sync_type { CONFIG_SYNC_TYPE_SHOW, CONFIG_SYNC_TYPE_WRITE };
 /* slaves[].assign_activate, besides words of 1 to 0xffff */
 enum { CONFIG_ASSIGN_SII = 0, CONFIG_ASSIGN_NONE = 0x10000 };
 
 enum {
-	CONFIG_LIMIT_SDOS = 4 * LIMIT_SLAVES, /* of all slaves together */
+	CONFIG_LIMIT_SDOS = 4 * LIMIT_SLAVES,     /* of all slaves together */
+	CONFIG_LIMIT_CHANNELS = 4 * LIMIT_SLAVES, /* items of slaves[].channels[], the same */
 	CONFIG_LIMIT_OUTPUTS = LIMIT_OUTPUTS,
 	CONFIG_PATH_BYTES = 256,
 };
@@ -72,6 +81,20 @@ struct config_sdo {
 	uint8_t subindex;
 	uint8_t bytes; /* 1, 2, 4, 8 */
 	uint64_t value;
+	int line;
+};
+
+/* slaves[].channels[]: what the channels that are meant are called, and what their values mean. */
+struct config_channel {
+	uint16_t slave_pos;
+	char match[LIMIT_NAME_BYTES]; /* fnmatch pattern of the device's name or of the object */
+	char name[LIMIT_NAME_BYTES];  /* without the slave's; "" = the device's */
+	char unit[LIMIT_UNIT_BYTES];  /* "" = the device's */
+	double scale;                 /* 0 = the device's, and its offset */
+	double offset;
+	enum config_channel_type type;
+	double min; /* plausible range, physical; infinite = none */
+	double max;
 	int line;
 };
 
@@ -186,6 +209,8 @@ struct config {
 	size_t slave_count;
 	struct config_sdo sdo[CONFIG_LIMIT_SDOS];
 	size_t sdo_count;
+	struct config_channel channel[CONFIG_LIMIT_CHANNELS];
+	size_t channel_count;
 	struct config_output output[CONFIG_LIMIT_OUTPUTS];
 	size_t output_count;
 	char path[CONFIG_PATH_BYTES]; /* file it came from, "" = defaults only */

@@ -109,7 +109,7 @@ static void list_one(const struct listing *listing, const struct option *option,
 	setting = find(listing->settings, key);
 	text = setting != NULL ? setting->value : default_of(listing->cfg, option);
 	if (text == NULL) {
-		return; /* required, so set; config_set() knows no items of slaves[].sdo */
+		return; /* required, so set; config_set() knows no items inside slaves[] */
 	}
 	snprintf(value, sizeof(value), "%s%s", text,
 		 number_lacks_unit(option, text) ? option->unit : "");
@@ -141,6 +141,7 @@ static void list_slaves(const struct listing *listing)
 
 	for (size_t i = 0; i < listing->cfg->slave_count; i++) {
 		size_t sdos = 0;
+		size_t channels = 0;
 
 		snprintf(shown, sizeof(shown), "slaves[%zu].", i);
 		list_options(listing, "slaves[].", shown);
@@ -148,6 +149,13 @@ static void list_slaves(const struct listing *listing)
 			if (listing->cfg->sdo[j].slave_pos == i) {
 				snprintf(shown, sizeof(shown), "slaves[%zu].sdo[%zu].", i, sdos++);
 				list_options(listing, "slaves[].sdo[].", shown);
+			}
+		}
+		for (size_t j = 0; j < listing->cfg->channel_count; j++) {
+			if (listing->cfg->channel[j].slave_pos == i) {
+				snprintf(shown, sizeof(shown), "slaves[%zu].channels[%zu].", i,
+					 channels++);
+				list_options(listing, "slaves[].channels[].", shown);
 			}
 		}
 	}

@@ -59,7 +59,13 @@ struct option_list {
 	const char *prose;
 };
 
-enum option_list_id { OPTION_LIST_SLAVES, OPTION_LIST_SDOS, OPTION_LIST_OUTPUTS, OPTION_LISTS };
+enum option_list_id {
+	OPTION_LIST_SLAVES,
+	OPTION_LIST_SDOS,
+	OPTION_LIST_CHANNELS,
+	OPTION_LIST_OUTPUTS,
+	OPTION_LISTS
+};
 extern const struct option_list option_lists[OPTION_LISTS];
 
 /* Sections of the file in their order, for the pages: name and prose. */

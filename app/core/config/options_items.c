@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Options of the items of lists: slaves[], slaves[].sdo[], outputs[]. */
+/* Options of the items of lists: slaves[], slaves[].sdo[], slaves[].channels[], outputs[]. */
 #include "config/option_rows.h"
 #include "config/sdo_value.h"
 
@@ -156,6 +156,64 @@ static const struct option rows[] = {
 	  .default_value = NULL,
 	  .prose = "Value: a number in decimal or 0x hex, a float for REAL and LREAL, true or "
 		   "false for BOOL." },
+	/* slaves[].channels[] */
+	{ .name = "slaves[].channels[].match",
+	  .type = OPTION_TEXT,
+	  CHANNEL(match),
+	  .default_value = NULL,
+	  .prose = "Which of the slave's channels: the name as the device gives it, without the "
+		   "slave's (`adc`), or the object (`0x6000:01`); * ? and [...] as in a shell. It "
+		   "must meet a channel." },
+	{ .name = "slaves[].channels[].name",
+	  .type = OPTION_NAME,
+	  CHANNEL(name),
+	  .default_value = "",
+	  .prose = "New name, without the slave's; match must meet one channel only. With the "
+		   "slave's name and the dot it has at most 63 characters. Empty: the device's." },
+	{ .name = "slaves[].channels[].unit",
+	  .type = OPTION_TEXT,
+	  CHANNEL(unit),
+	  .default_value = "",
+	  .prose = "Unit of the physical value, such as V, bar, degC. Empty: the device's." },
+	{ .name = "slaves[].channels[].scale",
+	  .type = OPTION_NUMBER,
+	  CHANNEL(scale),
+	  .default_value = "0",
+	  .min = "-1e300",
+	  .max = "1e300",
+	  .prose = "physical value = raw value * scale + offset. 0: scale and offset of the "
+		   "device." },
+	{ .name = "slaves[].channels[].offset",
+	  .type = OPTION_NUMBER,
+	  CHANNEL(offset),
+	  .default_value = "0",
+	  .min = "-1e300",
+	  .max = "1e300",
+	  .prose = "Physical value at raw value 0; requires scale." },
+	{ .name = "slaves[].channels[].type",
+	  .type = OPTION_WORD,
+	  CHANNEL(type),
+	  .default_value = "device",
+	  .words = "device|bool|uint|int|float",
+	  .prose = "How the bits are read, at the width that they have, where the device does not "
+		   "give the type or gives another one: bool 1 bit, float 32 or 64 bits. device: "
+		   "as the device describes it." },
+	{ .name = "slaves[].channels[].min",
+	  .type = OPTION_NUMBER,
+	  CHANNEL(min),
+	  .default_value = "-inf",
+	  .min = "-inf",
+	  .max = "1e300",
+	  .prose = "Smallest plausible physical value. Values outside of min and max are marked in "
+		   "`ecdaq watch`; they remain good samples, and outputs are not limited by it "
+		   "(outputs[].min)." },
+	{ .name = "slaves[].channels[].max",
+	  .type = OPTION_NUMBER,
+	  CHANNEL(max),
+	  .default_value = "inf",
+	  .min = "-1e300",
+	  .max = "inf",
+	  .prose = "Largest plausible physical value." },
 	/* outputs[] */
 	{ .name = "outputs[].channel",
 	  .type = OPTION_TEXT,

@@ -24,6 +24,10 @@ const struct option_list option_lists[OPTION_LISTS] = {
 				 "Without it, any slaves are accepted." },
 	[OPTION_LIST_SDOS] = { "slaves[].sdo", CONFIG_LIMIT_SDOS, "CONFIG_LIMIT_SDOS",
 			       "Objects written to this slave in PRE-OP, in this order." },
+	[OPTION_LIST_CHANNELS] = { "slaves[].channels", CONFIG_LIMIT_CHANNELS,
+				   "CONFIG_LIMIT_CHANNELS",
+				   "Names, units and scales of this slave's channels, applied in "
+				   "this order." },
 	[OPTION_LIST_OUTPUTS] = { "outputs", CONFIG_LIMIT_OUTPUTS, "CONFIG_LIMIT_OUTPUTS",
 				  "Output channels with rules other than the defaults: owner, "
 				  "limits, fail-safe value, timeout." },

@@ -191,6 +191,13 @@ static void write_example(const char *prefix, const char *indent, FILE *out)
 		{ "slaves[].sdo[].subindex", "2" },
 		{ "slaves[].sdo[].type", "UINT" },
 		{ "slaves[].sdo[].value", "10" },
+		{ "slaves[].channels[].match", "adc" },
+		{ "slaves[].channels[].name", "pressure" },
+		{ "slaves[].channels[].unit", "bar" },
+		{ "slaves[].channels[].scale", "0.0025" },
+		{ "slaves[].channels[].offset", "-1" },
+		{ "slaves[].channels[].min", "0" },
+		{ "slaves[].channels[].max", "6" },
 		{ "outputs[].channel", "piccolo0.led" },
 		{ "outputs[].max", "1" },
 		{ "outputs[].min", "0" },
@@ -231,6 +238,9 @@ void pages_write_sample(FILE *out)
 	write_comment("#    #", option_lists[OPTION_LIST_SDOS].prose, out);
 	fputs("#    sdo:\n", out);
 	write_example("slaves[].sdo[].", "      ", out);
+	write_comment("#    #", option_lists[OPTION_LIST_CHANNELS].prose, out);
+	fputs("#    channels:\n", out);
+	write_example("slaves[].channels[].", "      ", out);
 	fputc('\n', out);
 	write_comment("#", option_lists[OPTION_LIST_OUTPUTS].prose, out);
 	fputs("#outputs:\n", out);

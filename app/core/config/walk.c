@@ -191,6 +191,26 @@ static int read_sdo(struct walk *walk, const yaml_node_t *node, unsigned slave, 
 	return 0;
 }
 
+static int read_channel(struct walk *walk, const yaml_node_t *node, unsigned slave, unsigned index)
+{
+	struct config_channel *channel = &walk->cfg->channel[walk->cfg->channel_count];
+	char shown[48];
+	struct scope scope = { .pattern = "slaves[].channels[].", .shown = shown, .base = channel };
+	int r;
+
+	snprintf(shown, sizeof(shown), "slaves[%u].channels[%u].", slave, index);
+	memset(channel, 0, sizeof(*channel));
+	channel->slave_pos = (uint16_t)slave;
+	channel->line = line_of(node);
+	r = read_item(walk, &scope, node);
+	if (r < 0) {
+		memset(channel, 0, sizeof(*channel));
+		return r;
+	}
+	walk->cfg->channel_count++;
+	return 0;
+}
+
 static int read_output(struct walk *walk, const yaml_node_t *node, unsigned index)
 {
 	struct config_output *output = &walk->cfg->output[index];
@@ -202,6 +222,14 @@ static int read_output(struct walk *walk, const yaml_node_t *node, unsigned inde
 	output->line = line_of(node);
 	walk->cfg->output_count = index + 1;
 	return read_item(walk, &scope, node);
+}
+
+/* Items of list @id so far: those of slaves[] share one bound. */
+static size_t used_of(const struct config *cfg, enum option_list_id id, size_t index)
+{
+	return id == OPTION_LIST_SDOS       ? cfg->sdo_count
+	       : id == OPTION_LIST_CHANNELS ? cfg->channel_count
+					    : index;
 }
 
 static int read_list(struct walk *walk, const struct scope *scope, enum option_list_id id,
@@ -223,7 +251,7 @@ static int read_list(struct walk *walk, const struct scope *scope, enum option_l
 	for (yaml_node_item_t *i = node->data.sequence.items.start;
 	     (first == 0 || goes_on(walk)) && i < node->data.sequence.items.top; i++, index++) {
 		const yaml_node_t *item = yaml_document_get_node(walk->doc, *i);
-		size_t used = id == OPTION_LIST_SDOS ? walk->cfg->sdo_count : index;
+		size_t used = used_of(walk->cfg, id, index);
 
 		if (used >= list->limit) {
 			snprintf(reason, sizeof(reason), "more than %s = %zu items",
@@ -236,6 +264,9 @@ static int read_list(struct walk *walk, const struct scope *scope, enum option_l
 			break;
 		case OPTION_LIST_SDOS:
 			r = read_sdo(walk, item, scope->slave, index);
+			break;
+		case OPTION_LIST_CHANNELS:
+			r = read_channel(walk, item, scope->slave, index);
 			break;
 		case OPTION_LIST_OUTPUTS:
 			r = read_output(walk, item, index);

@@ -108,6 +108,16 @@ double image_get_physical(const uint8_t *image, const struct channel *ch)
 	return image_raw_to_physical(ch, image_get_raw(image, ch));
 }
 
+int image_is_outside(const struct channel *ch, double physical)
+{
+	return image_has_range(ch) && !(physical >= ch->min && physical <= ch->max);
+}
+
+int image_has_range(const struct channel *ch)
+{
+	return ch->min < ch->max && (isfinite(ch->min) || isfinite(ch->max));
+}
+
 static uint64_t float_to_raw(const struct channel *ch, double value)
 {
 	uint64_t raw = 0;

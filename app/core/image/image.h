@@ -23,6 +23,11 @@ void image_set_raw(uint8_t *image, const struct channel *ch, uint64_t raw);
 double image_raw_to_physical(const struct channel *ch, uint64_t raw);
 double image_get_physical(const uint8_t *image, const struct channel *ch);
 
+/** 1 if the channel has a plausible range and @physical is not within it. */
+int image_is_outside(const struct channel *ch, double physical);
+/** 1 if the channel has a plausible range: one bound at least. */
+int image_has_range(const struct channel *ch);
+
 /**
  * The raw bits for @physical, rounded to nearest. 0; -ERANGE if the type cannot hold it; -EINVAL
  * for a NaN, and for a BOOL that is neither 0 nor 1 (as raw): it is neither rounded nor limited

@@ -7,6 +7,7 @@
 
 #include "base/clock.h"
 #include "base/slave_set.h"
+#include "image/entry.h"
 #include "image/image.h"
 
 /* Far beyond any that there will be: sums of times do not overflow with it. */
@@ -149,9 +150,9 @@ int channel_table_find_entry(const struct channel_table *table, uint32_t slave, 
 {
 	for (uint32_t n = 0; n < table->count[slave]; n++) {
 		const struct channel *ch = channel_table_at(table, slave, n);
-		const char *dot = strrchr(ch->name, '.');
 
-		if (ch->direction == direction && dot != NULL && strcmp(dot + 1, entry) == 0) {
+		if (ch->direction == direction &&
+		    channel_is_entry(&table->slaves[slave], ch, entry)) {
 			return (int)(ch - table->channels);
 		}
 	}

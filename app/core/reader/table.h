@@ -35,7 +35,7 @@ void channel_table_destroy(struct channel_table *table);
 const struct channel *channel_table_at(const struct channel_table *table, uint32_t slave,
 				       uint32_t n);
 /**
- * Index of the channel of @slave whose entry (the part behind the last dot of its name) is @entry;
+ * Index of the channel of @slave whose entry (channel_is_entry()) is @entry;
  * -ENOENT. @direction: enum channel_direction.
  */
 int channel_table_find_entry(const struct channel_table *table, uint32_t slave, const char *entry,

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "config/output.h"
+#include "image/entry.h"
 #include "image/image.h"
 
 /* One item of a set, resolved. */
@@ -167,10 +168,9 @@ static int find_oneshot(const struct admin_target *t, uint16_t slave_pos)
 {
 	for (size_t i = 0; i < t->channel_count; i++) {
 		const struct channel *ch = &t->channels[i];
-		const char *entry = strrchr(ch->name, '.');
 
 		if (ch->slave_pos == slave_pos && ch->direction == CHANNEL_OUTPUT &&
-		    entry != NULL && strcmp(entry + 1, ONESHOT_ENTRY) == 0) {
+		    channel_is_entry(&t->slaves[slave_pos], ch, ONESHOT_ENTRY)) {
 			return (int)i;
 		}
 	}

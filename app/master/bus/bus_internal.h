@@ -24,8 +24,6 @@
 #include "wire/sii.h"
 
 enum {
-	PICCOLO_VENDOR = 0x00000002,
-	PICCOLO_PRODUCT = 0x04570862,
 	PICCOLO_OBJECT_ADC = 0x6000,
 	PICCOLO_SUBINDEX_ADC = 1,
 	PICCOLO_SUBINDEX_COUNTER = 2,
@@ -227,11 +225,6 @@ static inline uint16_t soem_index(size_t pos)
 static inline const struct config_slave *bus_config_slave(const struct bus *bus, size_t pos)
 {
 	return pos < bus->cfg->slave_count ? &bus->cfg->slave[pos] : NULL;
-}
-
-static inline int is_piccolo(const struct slave_info *info)
-{
-	return info->vendor == PICCOLO_VENDOR && info->product == PICCOLO_PRODUCT;
 }
 
 mono_t bus_now(const struct bus *bus);

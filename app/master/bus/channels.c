@@ -9,8 +9,10 @@
 
 #include "bus/bus_internal.h"
 #include "bus/names.h"
+#include "image/entry.h"
 
 #define PIECE_BITS 64u
+enum { PIECE_SUFFIX_BYTES = 4 }; /* _0 to _3, and the zero */
 
 /* 12 bits over the range of the converter's reference. */
 #define PICCOLO_ADC_VOLT 3.3
@@ -37,7 +39,7 @@ static uint8_t type_of(const struct pdo_entry *e, unsigned bits)
 /* What the FB1111-Piccolo's values mean; other slaves' stay raw. */
 static void apply_meaning(struct slave_info *slave, struct channel *ch, size_t number)
 {
-	if (!is_piccolo(slave) || ch->index != PICCOLO_OBJECT_ADC) {
+	if (!slave_is_piccolo(slave) || ch->index != PICCOLO_OBJECT_ADC) {
 		return;
 	}
 	if (ch->subindex == PICCOLO_SUBINDEX_ADC) {
@@ -47,6 +49,14 @@ static void apply_meaning(struct slave_info *slave, struct channel *ch, size_t n
 	if (ch->subindex == PICCOLO_SUBINDEX_COUNTER) {
 		slave->counter_channel = (int32_t)number;
 	}
+}
+
+/* Room for the name of an entry behind the slave's, with the closing zero. */
+static size_t entry_name_bytes(const struct slave_info *slave)
+{
+	static_assert(sizeof(slave->name) + PIECE_SUFFIX_BYTES + 16 <= LIMIT_NAME_BYTES,
+		      "beside the longest slave's name there is room for an entry's");
+	return LIMIT_NAME_BYTES - 1 - strlen(slave->name);
 }
 
 static void fill(struct channel *ch, const struct slave_info *slave, const struct pdo_entry *e,
@@ -61,8 +71,8 @@ static void fill(struct channel *ch, const struct slave_info *slave, const struc
 		.bit_len = e->bit_len,
 		.scale = 1.0,
 	};
-	static_assert(sizeof(slave->name) + PDO_NAME_BYTES <= sizeof(ch->name), "a name fits");
-	snprintf(ch->name, sizeof(ch->name), "%.31s.%.31s", slave->name, name);
+	snprintf(ch->name, sizeof(ch->name), "%s.%.*s", slave->name,
+		 (int)entry_name_bytes(slave) - 1, name);
 }
 
 /* An entry of more than 64 bits becomes several channels, name_0 first. Returns how many. */
@@ -76,7 +86,8 @@ static size_t put_entry(struct channel *ch, const struct slave_info *slave,
 		char piece_name[PDO_NAME_BYTES];
 
 		if (pieces > 1) {
-			snprintf(piece_name, sizeof(piece_name), "%.28s_%u", name, i);
+			snprintf(piece_name, sizeof(piece_name), "%.*s_%u",
+				 (int)entry_name_bytes(slave) - PIECE_SUFFIX_BYTES, name, i);
 		}
 		fill(&ch[i], slave, e, pieces > 1 ? piece_name : name);
 		ch[i].bit_offset = bit_offset + i * PIECE_BITS;
@@ -98,7 +109,7 @@ int channels_add(struct slave_info *slave, const struct pdo_entry *entry, size_t
 	if (name == NULL) {
 		return -ENOMEM;
 	}
-	name_entries(entry, entry_count, name);
+	name_entries(entry, entry_count, entry_name_bytes(slave), name);
 	slave->counter_channel = -1;
 	slave->input_bits = 0;
 	slave->output_bits = 0;
@@ -122,4 +133,20 @@ int channels_add(struct slave_info *slave, const struct pdo_entry *entry, size_t
 	table->count = n;
 	free(name);
 	return 0;
+}
+
+size_t channels_of(const struct channel *channel, size_t count, uint16_t slave_pos,
+		   size_t *ret_first)
+{
+	size_t first = 0;
+	size_t n = 0;
+
+	while (first < count && channel[first].slave_pos != slave_pos) {
+		first++;
+	}
+	while (first + n < count && channel[first + n].slave_pos == slave_pos) {
+		n++;
+	}
+	*ret_first = first;
+	return n;
 }

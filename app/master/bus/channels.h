@@ -30,4 +30,9 @@ struct channels_table {
 int channels_add(struct slave_info *slave, const struct pdo_entry *entry, size_t entry_count,
 		 const struct channels_place *place, struct channels_table *table);
 
+/** How many channels the slave has in a table that channels_add() made; they are together, from
+ * @ret_first on. */
+size_t channels_of(const struct channel *channel, size_t count, uint16_t slave_pos,
+		   size_t *ret_first);
+
 #endif

@@ -214,6 +214,7 @@ void compare_apply(const struct config *cfg, const int *config, size_t found_cou
 	*bound = *cfg;
 	bound->slave_count = 0;
 	bound->sdo_count = 0;
+	bound->channel_count = 0;
 	bound->output_count = 0;
 	for (size_t j = 0; j < found_count && config[j] >= 0; j++) {
 		bound->slave[bound->slave_count++] = cfg->slave[config[j]];
@@ -224,6 +225,14 @@ void compare_apply(const struct config *cfg, const int *config, size_t found_cou
 		if (pos >= 0) {
 			bound->sdo[bound->sdo_count] = cfg->sdo[i];
 			bound->sdo[bound->sdo_count++].slave_pos = (uint16_t)pos;
+		}
+	}
+	for (size_t i = 0; i < cfg->channel_count; i++) {
+		int pos = find_position(config, found_count, cfg->channel[i].slave_pos);
+
+		if (pos >= 0) {
+			bound->channel[bound->channel_count] = cfg->channel[i];
+			bound->channel[bound->channel_count++].slave_pos = (uint16_t)pos;
 		}
 	}
 	for (size_t i = 0; i < cfg->output_count; i++) {

@@ -7,6 +7,8 @@
 #include <string.h>
 
 #include "bus/bus_internal.h"
+#include "bus/channel_rules.h"
+#include "bus/channels.h"
 #include "bus/compare.h"
 #include "bus/guests.h"
 #include "image/image.h"
@@ -346,6 +348,47 @@ int differences_of_slaves(const struct config *cfg, const struct slave_info *fou
 	return r;
 }
 
+/* --- channels --- */
+
+static int meets_a_channel(const struct channel_rules_of *of, const struct config_channel *item)
+{
+	for (size_t i = 0; i < of->count; i++) {
+		if (channel_rule_matches(item, of->slave, &of->channel[i])) {
+			return 1;
+		}
+	}
+	return 0;
+}
+
+int differences_of_channels(const struct config *cfg, const struct slave_info *slave,
+			    struct channel *channel, size_t channel_count, struct differences *list)
+{
+	struct channel_rules_of of = { .cfg = cfg, .slave = slave };
+	size_t first;
+
+	of.count = channels_of(channel, channel_count, slave->slave_pos, &first);
+	of.channel = channel + first;
+	for (size_t i = 0; i < cfg->channel_count; i++) {
+		const struct config_channel *item = &cfg->channel[i];
+		struct difference *diff;
+
+		if (item->slave_pos != slave->slave_pos || meets_a_channel(&of, item)) {
+			continue;
+		}
+		diff = add(list, DIFFERENCE_NO_CHANNEL);
+		if (diff == NULL) {
+			return -ENOMEM;
+		}
+		diff->position = slave->slave_pos;
+		diff->line = (uint32_t)item->line;
+		snprintf(diff->name, sizeof(diff->name), "%s", slave->name);
+		snprintf(diff->property, sizeof(diff->property), "channels");
+		snprintf(diff->expected, sizeof(diff->expected), "%s", item->match);
+		channel_rules_list(&of, diff->found, sizeof(diff->found));
+	}
+	return 0;
+}
+
 /* --- outputs --- */
 
 static struct difference *add_output(const struct config *cfg, struct differences *list,
@@ -488,6 +531,15 @@ int differences_of_bus(const struct bus *bus, const struct config *cfg, struct d
 	r = r < 0 ? r : add_guests(bus, list);
 	if (r < 0) {
 		return r;
+	}
+	/* A channel table without a plan: slaves[].channels[] could not be applied to it. */
+	for (size_t i = 0;
+	     i < bus->slave_count && bus->plan.slave_count == 0 && bus->channel_count > 0; i++) {
+		r = differences_of_channels(bus->cfg, &bus->info[i], bus->channel,
+					    bus->channel_count, list);
+		if (r < 0) {
+			return r;
+		}
 	}
 	/* With a channel table, the slaves fit: the outputs of those that are absent are left out.
 	 */

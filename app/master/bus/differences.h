@@ -29,13 +29,19 @@ void differences_free(struct differences *list);
 int differences_of_slaves(const struct config *cfg, const struct slave_info *found,
 			  const uint16_t *id, size_t found_count, struct differences *list);
 
+/** Items of slaves[].channels[] that meet none of the channels of @slave, which have the names of
+ * the device. @cfg by position. 0 or -ENOMEM. */
+int differences_of_channels(const struct config *cfg, const struct slave_info *slave,
+			    struct channel *channel, size_t channel_count,
+			    struct differences *list);
+
 /** outputs[] that are no output channels. @slave_count of @slaves: those of the channels. */
 int differences_of_outputs(const struct config *cfg, const struct channel *channels,
 			   size_t channel_count, struct differences *list);
 
 /**
  * All of @bus against @cfg as it was configured: slaves, those that were lost since, new devices,
- * outputs. @bus NULL: no slave was found. 0 or -ENOMEM.
+ * channels, outputs. @bus NULL: no slave was found. 0 or -ENOMEM.
  */
 int differences_of_bus(const struct bus *bus, const struct config *cfg, struct differences *list);
 

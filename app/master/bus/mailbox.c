@@ -10,6 +10,7 @@
 #include "base/bytes.h"
 #include "bus/bus_internal.h"
 #include "bus/guests.h"
+#include "image/entry.h"
 #include "wire/sdo_abort.h"
 
 /* Boxes that no frame can carry: a slave without a mailbox. */
@@ -313,7 +314,7 @@ void bus_startup_begin(struct bus *bus, size_t pos)
 			     .done = startup_sdo_done,
 			     .ctx = bus },
 	};
-	if (bus->slave[pos].mode != CONFIG_MODE_UNSET && !is_piccolo(&bus->slave[pos].info)) {
+	if (bus->slave[pos].mode != CONFIG_MODE_UNSET && !slave_is_piccolo(&bus->slave[pos].info)) {
 		su->state = STARTUP_FAILED;
 		su->request.result = -ENOTSUP;
 		return;
@@ -337,7 +338,7 @@ static int fail_startup(struct bus *bus, size_t pos)
 	const struct config_sdo *sdo = &sl->startup.sdo;
 	const struct mailbox_request *rq = &sl->startup.request;
 
-	if (sl->mode != CONFIG_MODE_UNSET && !is_piccolo(&sl->info)) {
+	if (sl->mode != CONFIG_MODE_UNSET && !slave_is_piccolo(&sl->info)) {
 		return bus_fail_slave(
 			bus, pos, -ENOTSUP,
 			"mode is an option of the FB1111-Piccolo; this is vendor 0x%08x "

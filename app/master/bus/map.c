@@ -12,6 +12,7 @@
 
 #include "base/bytes.h"
 #include "bus/bus_internal.h"
+#include "bus/channel_rules.h"
 #include "bus/channels.h"
 #include "bus/plan.h"
 #include "bus/registers.h"
@@ -175,6 +176,38 @@ static int build_channels(struct bus *bus, struct layout *lay)
 	}
 	bus->channel_count = table.count;
 	return 0;
+}
+
+static struct channel_rules_of rules_of(const struct bus *bus, size_t pos)
+{
+	size_t first;
+	size_t count = channels_of(bus->channel, bus->channel_count, (uint16_t)pos, &first);
+
+	return (struct channel_rules_of){ .cfg = bus->cfg,
+					  .slave = &bus->slave[pos].info,
+					  .channel = &bus->channel[first],
+					  .count = count };
+}
+
+/* slaves[].channels[]: all are checked before the first is applied, so that the names of the
+ * device are there to compare with after a failure. */
+static int apply_channel_rules(struct bus *bus)
+{
+	char unused[BUS_ERROR_BYTES];
+	int r = 0;
+
+	for (size_t i = 0; i < bus->slave_count && r >= 0; i++) {
+		const struct channel_rules_of of = rules_of(bus, i);
+
+		r = channel_rules_check(&of, bus->error != NULL ? bus->error : unused,
+					BUS_ERROR_BYTES);
+	}
+	for (size_t i = 0; i < bus->slave_count && r >= 0; i++) {
+		const struct channel_rules_of of = rules_of(bus, i);
+
+		r = channel_rules_apply(&of);
+	}
+	return r;
 }
 
 static int build_plan(struct bus *bus, const struct plan_area *area, size_t area_count)
@@ -349,6 +382,7 @@ int bus_map(struct bus *bus, char *error)
 	}
 	ecx_config_map_group(&bus->context, (void *)(uintptr_t)image, 0);
 	r = build_channels(bus, &lay);
+	r = r < 0 ? r : apply_channel_rules(bus);
 	if (r >= 0) {
 		r = build_plan(bus, lay.area, lay.area_count);
 	}

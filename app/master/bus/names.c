@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "bus/names.h"
 
+#include <assert.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -71,24 +72,31 @@ static int is_shared(const struct pdo_entry *entry, size_t count, char (*name)[P
 	return 0;
 }
 
-static void name_plain(const struct pdo_entry *e, char *ret_name)
+static void name_plain(const struct pdo_entry *e, char *ret_name, size_t name_bytes)
 {
-	name_sanitise(e->name, ret_name, PDO_NAME_BYTES);
+	name_sanitise(e->name, ret_name, name_bytes);
 	if (ret_name[0] == '\0') {
-		snprintf(ret_name, PDO_NAME_BYTES, "x%04x_%02x", e->index, e->subindex);
+		snprintf(ret_name, name_bytes, "x%04x_%02x", e->index, e->subindex);
 	}
 }
 
-static void name_with_pdo(const struct pdo_entry *e, char *name)
+/* "FRONT_NAME", cut behind. */
+static void name_with_prefix(char *name, const char *front, size_t name_bytes)
+{
+	char joined[2 * PDO_NAME_BYTES];
+
+	snprintf(joined, sizeof(joined), "%s_%s", front, name);
+	joined[name_bytes - 1] = '\0';
+	memcpy(name, joined, strlen(joined) + 1);
+}
+
+static void name_with_pdo(const struct pdo_entry *e, char *name, size_t name_bytes)
 {
 	char pdo[PDO_NAME_BYTES];
-	char joined[2 * PDO_NAME_BYTES];
 
 	name_sanitise(e->pdo_name, pdo, sizeof(pdo));
 	if (pdo[0] != '\0') {
-		snprintf(joined, sizeof(joined), "%s_%s", pdo, name);
-		joined[PDO_NAME_BYTES - 1] = '\0';
-		memcpy(name, joined, strlen(joined) + 1);
+		name_with_prefix(name, pdo, name_bytes);
 	}
 }
 
@@ -96,20 +104,19 @@ static void name_with_pdo(const struct pdo_entry *e, char *name)
  * Modular devices (ETG.5001) number their modules' objects in steps of 0x10 from 0x6000 and 0x7000,
  * and often give their PDOs no names: the place of the module is used instead.
  */
-static void name_with_slot(const struct pdo_entry *e, char *name)
+static void name_with_slot(const struct pdo_entry *e, char *name, size_t name_bytes)
 {
-	char joined[2 * PDO_NAME_BYTES];
+	char slot[16];
 
 	if (e->pdo_name[0] == '\0' && e->index >= MODULES_FIRST && e->index <= MODULES_LAST) {
-		snprintf(joined, sizeof(joined), "slot%u_%s", (e->index & 0xfffu) / 0x10 + 1, name);
-		joined[PDO_NAME_BYTES - 1] = '\0';
-		memcpy(name, joined, strlen(joined) + 1);
+		snprintf(slot, sizeof(slot), "slot%u", (e->index & 0xfffu) / 0x10 + 1);
+		name_with_prefix(name, slot, name_bytes);
 	}
 }
 
-static void name_with_suffix(char *name, const char *suffix)
+static void name_with_suffix(char *name, const char *suffix, size_t name_bytes)
 {
-	size_t room = PDO_NAME_BYTES - 1 - strlen(suffix);
+	size_t room = name_bytes - 1 - strlen(suffix);
 	size_t len = strlen(name);
 
 	if (len > room) {
@@ -118,22 +125,24 @@ static void name_with_suffix(char *name, const char *suffix)
 	memcpy(name + len, suffix, strlen(suffix) + 1);
 }
 
-static void name_with_index(const struct pdo_entry *e, char *name)
+static void name_with_index(const struct pdo_entry *e, char *name, size_t name_bytes)
 {
 	char suffix[16];
 
 	snprintf(suffix, sizeof(suffix), "_%04x_%02x", e->index, e->subindex);
-	name_with_suffix(name, suffix);
+	name_with_suffix(name, suffix, name_bytes);
 }
 
-void name_entries(const struct pdo_entry *entry, size_t count, char (*ret_name)[PDO_NAME_BYTES])
+void name_entries(const struct pdo_entry *entry, size_t count, size_t name_bytes,
+		  char (*ret_name)[PDO_NAME_BYTES])
 {
-	void (*const widen[])(const struct pdo_entry *, char *) = { name_with_pdo, name_with_slot,
-								    name_with_index };
+	void (*const widen[])(const struct pdo_entry *, char *,
+			      size_t) = { name_with_pdo, name_with_slot, name_with_index };
 	uint8_t shared[PDO_LIMIT];
 
+	assert(name_bytes >= 16 && name_bytes <= PDO_NAME_BYTES);
 	for (size_t i = 0; i < count; i++) {
-		name_plain(&entry[i], ret_name[i]);
+		name_plain(&entry[i], ret_name[i], name_bytes);
 	}
 	for (size_t w = 0; w < sizeof(widen) / sizeof(widen[0]); w++) {
 		for (size_t i = 0; i < count; i++) {
@@ -141,7 +150,7 @@ void name_entries(const struct pdo_entry *entry, size_t count, char (*ret_name)[
 		}
 		for (size_t i = 0; i < count; i++) {
 			if (shared[i]) {
-				widen[w](&entry[i], ret_name[i]);
+				widen[w](&entry[i], ret_name[i], name_bytes);
 			}
 		}
 	}
@@ -150,8 +159,8 @@ void name_entries(const struct pdo_entry *entry, size_t count, char (*ret_name)[
 			char suffix[16];
 
 			snprintf(suffix, sizeof(suffix), "_%u", n);
-			name_plain(&entry[i], ret_name[i]);
-			name_with_suffix(ret_name[i], suffix);
+			name_plain(&entry[i], ret_name[i], name_bytes);
+			name_with_suffix(ret_name[i], suffix, name_bytes);
 		}
 	}
 }

@@ -19,8 +19,9 @@ void name_slave(const char *device, int is_piccolo, size_t pos, char *ret_name, 
 /**
  * Names of @count entries of one slave, without the slave's name: the entry's own; where several
  * share it, the PDO's in front; where that is not enough, index and subindex behind; at last a
- * number.
+ * number. Each has less than @name_bytes (16 to PDO_NAME_BYTES) bytes.
  */
-void name_entries(const struct pdo_entry *entry, size_t count, char (*ret_name)[PDO_NAME_BYTES]);
+void name_entries(const struct pdo_entry *entry, size_t count, size_t name_bytes,
+		  char (*ret_name)[PDO_NAME_BYTES]);
 
 #endif

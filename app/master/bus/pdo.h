@@ -7,7 +7,7 @@
 
 #include "base/limits.h"
 
-enum { PDO_LIMIT = LIMIT_CHANNELS, PDO_NAME_BYTES = 32 };
+enum { PDO_LIMIT = LIMIT_CHANNELS, PDO_NAME_BYTES = LIMIT_NAME_BYTES };
 
 struct pdo_entry {
 	uint16_t pdo;   /* 0x1600, 0x1A00 */

@@ -16,6 +16,7 @@
 #include "bus/identity.h"
 #include "bus/names.h"
 #include "bus/registers.h"
+#include "image/entry.h"
 
 /* SYNC pulses of a master that was killed; a slave whose SYNC unit its PDI owns is freed in
  * free_sync(). */
@@ -204,7 +205,7 @@ static int describe(struct bus *bus, size_t pos)
 	sl->is_lrw_forbidden = (sl->esc_features & ESC_FEATURE_NO_LRW) != 0 ||
 			       (bus->parsed.general_flags & SII_GENERAL_NOT_LRW) != 0;
 	if (sl->info.name[0] == '\0') {
-		name_slave(sl->info.device, is_piccolo(&sl->info), pos, sl->info.name,
+		name_slave(sl->info.device, slave_is_piccolo(&sl->info), pos, sl->info.name,
 			   sizeof(sl->info.name));
 	}
 	bus_soem_describe(bus, pos);

@@ -10,7 +10,7 @@ static void copy_string(const struct bus_slave *sl, uint8_t number, char ret_nam
 	char text[SII_NAME_BYTES];
 
 	sii_text(sl->sii, sl->sii_len, number, text);
-	snprintf(ret_name, PDO_NAME_BYTES, "%.31s", text);
+	snprintf(ret_name, PDO_NAME_BYTES, "%.*s", PDO_NAME_BYTES - 1, text);
 }
 
 /* The entries of one direction's PDOs that have a SyncManager. Returns the new count or -E2BIG. */

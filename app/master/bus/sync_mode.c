@@ -9,6 +9,7 @@
 #include <stdio.h>
 
 #include "bus/bus_internal.h"
+#include "image/entry.h"
 
 enum {
 	PICCOLO_PERIODIC = 0x0300,
@@ -136,7 +137,7 @@ int bus_sync_mode(struct bus *bus, size_t pos, const char *damage)
 	if (setting == CONFIG_ASSIGN_NONE) {
 		return 0;
 	}
-	if (setting == CONFIG_ASSIGN_SII && is_piccolo(&sl->info)) {
+	if (setting == CONFIG_ASSIGN_SII && slave_is_piccolo(&sl->info)) {
 		sl->assign_activate =
 			sl->mode == CONFIG_MODE_ONESHOT ? PICCOLO_ONE_SHOT : PICCOLO_PERIODIC;
 		return 0;

@@ -76,8 +76,8 @@ static void put_channel(ecdaq_ChannelsV1 *m, uint32_t i, const struct channel *c
 	m->scale._buffer[i] = ch->scale;
 	m->offset._buffer[i] = ch->offset;
 	m->owner._buffer[i] = dds_string_dup(is_output ? config_output_owner(rules) : "");
-	m->minimum._buffer[i] = rules != NULL ? rules->min : 0;
-	m->maximum._buffer[i] = rules != NULL ? rules->max : 0;
+	m->minimum._buffer[i] = rules != NULL ? rules->min : ch->min;
+	m->maximum._buffer[i] = rules != NULL ? rules->max : ch->max;
 	m->fail_safe._buffer[i] = rules != NULL ? rules->fail_safe : 0;
 	m->timeout_ns._buffer[i] = rules != NULL ? rules->timeout_ns : 0;
 }

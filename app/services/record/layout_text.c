@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "image/image.h"
 #include "program/json.h"
 #include "record/layout.h"
 #include "record/messages.h"
@@ -152,6 +153,12 @@ static void put_json_channel(FILE *out, const struct layout_topic *topic,
 	json_put_real(out, ch->scale);
 	fprintf(out, ",\"offset\":");
 	json_put_real(out, ch->offset);
+	if (image_has_range(ch)) { /* an open end is null */
+		fprintf(out, ",\"min\":");
+		json_put_real(out, ch->min);
+		fprintf(out, ",\"max\":");
+		json_put_real(out, ch->max);
+	}
 	fputc('}', out);
 }
 

@@ -7,10 +7,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "image/image.h"
 #include "program/json.h"
 #include "record/messages.h"
 
-enum { PAIRS_PER_FIELD = 4, NUMBERS = 20, NUMBER_BYTES = 24 };
+enum { PAIRS_PER_FIELD = 6, NUMBERS = 20, NUMBER_BYTES = 24 };
 
 /* A small list of pairs whose values are numbers, made on the spot. */
 struct numbers {
@@ -99,6 +100,15 @@ static void add_field_pairs(struct field_pairs *p, const struct layout_field *f)
 	add_key(p, f->name, "unit", f->channel->unit);
 	add_key(p, f->name, "scale", scale);
 	add_key(p, f->name, "offset", offset);
+	if (image_has_range(f->channel)) {
+		char *min = next_text(p);
+		char *max = next_text(p);
+
+		json_real_format(f->channel->min, min, sizeof(p->text[0]));
+		json_real_format(f->channel->max, max, sizeof(p->text[0]));
+		add_key(p, f->name, "min", min);
+		add_key(p, f->name, "max", max);
+	}
 }
 
 static int put_topic_channel(struct mcap_writer *w, const struct layout_topic *topic, int schema_id)

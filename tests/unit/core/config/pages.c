@@ -72,6 +72,7 @@ TEST(config, every_option_has_sound_bounds_and_a_default_within_them)
 	static union {
 		struct config cfg;
 		struct option_sdo sdo;
+		struct config_channel channel;
 	} base;
 	char why[OPTION_WHY_BYTES];
 
@@ -96,18 +97,24 @@ TEST(config, every_option_has_sound_bounds_and_a_default_within_them)
 	}
 }
 
+/* "slaves[].sdo[]" of "slaves[].sdo[].index"; 0: in no list */
+static size_t item_len(const char *name)
+{
+	const char *end = strrchr(name, ']');
+
+	return end == NULL ? 0 : (size_t)(end - name);
+}
+
 TEST(config, no_two_options_fill_the_same_field)
 {
 	for (size_t i = 0; i < option_count(); i++) {
 		for (size_t j = 0; j < i; j++) {
 			const struct option *a = option_at(i);
 			const struct option *b = option_at(j);
-			size_t a_list = strcspn(a->name, "[");
-			int is_same_base =
-				strncmp(a->name, b->name, a_list + 1) == 0 ||
-				(a->name[a_list] == '\0' && strchr(b->name, '[') == NULL);
+			size_t list_len = item_len(a->name);
 
-			if (strstr(a->name, "sdo[]") != NULL || !is_same_base) {
+			if (item_len(b->name) != list_len ||
+			    strncmp(a->name, b->name, list_len) != 0) {
 				continue;
 			}
 			if (a->offset < b->offset + b->bytes && b->offset < a->offset + a->bytes) {

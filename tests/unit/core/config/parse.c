@@ -332,3 +332,54 @@ TEST(config, assign_activate_is_a_word_of_the_esi_or_sii_or_none)
 	CHECK_EQ(cfg.slave[2].assign_activate, CONFIG_ASSIGN_SII);
 	CHECK_EQ(cfg.slave[3].assign_activate, 0xffff);
 }
+
+TEST(config, channels_belong_to_their_slave_and_start_from_what_the_device_gives)
+{
+	static struct config cfg;
+
+	parse_ok("slaves:\n"
+		 "- channels:\n"
+		 "  - match: adc\n"
+		 "- name: rear\n"
+		 "  channels:\n"
+		 "  - { match: 'ai_*', unit: '%', scale: 1e-3, offset: -2, type: INT, min: 0 }\n"
+		 "  - { match: 0x6000:01, name: p }\n",
+		 &cfg);
+	CHECK_EQ(cfg.channel_count, 3);
+	CHECK_STR(cfg.channel[0].match, "adc");
+	CHECK_EQ(cfg.channel[0].slave_pos, 0);
+	CHECK(cfg.channel[0].scale == 0 && cfg.channel[0].offset == 0);
+	CHECK(isinf(cfg.channel[0].min) && isinf(cfg.channel[0].max));
+	CHECK_EQ(cfg.channel[0].type, CONFIG_CHANNEL_DEVICE);
+	CHECK_EQ(cfg.channel[1].slave_pos, 1);
+	CHECK_EQ(cfg.channel[1].line, 6);
+	CHECK_STR(cfg.channel[1].unit, "%");
+	CHECK(cfg.channel[1].scale == 0.001 && cfg.channel[1].offset == -2);
+	CHECK_EQ(cfg.channel[1].type, CONFIG_CHANNEL_INT);
+	CHECK(cfg.channel[1].min == 0 && isinf(cfg.channel[1].max));
+	CHECK_STR(cfg.channel[2].match, "0x6000:01");
+	CHECK_STR(cfg.channel[2].name, "p");
+}
+
+TEST(config, channels_that_cannot_be_meant_are_refused_with_their_line)
+{
+	parse_fails("slaves:\n- channels:\n  - { name: x }\n",
+		    "t.yaml:3: slaves[0].channels[0].match: is missing");
+	parse_fails("slaves:\n- channels:\n  - { match: '' }\n",
+		    "t.yaml:3: slaves[].channels[].match: is empty");
+	parse_fails("slaves:\n- channels:\n  - { match: a, offset: 1 }\n",
+		    "t.yaml:3: slaves[].channels[].offset: requires scale");
+	parse_fails("slaves:\n- channels:\n  - { match: a, min: 2, max: 2 }\n",
+		    "t.yaml:3: slaves[].channels[].max: is not above min");
+	parse_fails("slaves:\n- channels:\n  - { match: a, name: x }\n  - { match: b, name: x }\n",
+		    "t.yaml:4: slaves[].channels[].name: x is already used in line 3");
+	parse_fails("slaves:\n- channels:\n  - { match: a, name: a.b }\n",
+		    "t.yaml:3: slaves[0].channels[0].name: expected letters, digits, _ and - "
+		    "only, not \"a.b\"");
+	parse_fails("slaves:\n- channels:\n  - { match: a, unit: 0123456789abcdef }\n",
+		    "t.yaml:3: slaves[0].channels[0].unit: is longer than 15 bytes");
+	parse_fails("slaves:\n- name: n0123456789\n  channels:\n  - { match: a, name: "
+		    "x123456789012345678901234567890123456789012345678901 }\n",
+		    "t.yaml:4: slaves[].channels[].name: n0123456789.x12345678901234567890123456789"
+		    "0123456789012345678901 is longer than 63 characters");
+}

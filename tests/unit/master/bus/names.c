@@ -18,8 +18,29 @@ TEST(names, text_becomes_lower_snake_case)
 	check_sanitised("adc", "adc");
 	check_sanitised("", "");
 	check_sanitised("\xff\x80--", "");
-	check_sanitised("0123456789012345678901234567890123456789",
-			"0123456789012345678901234567890");
+	check_sanitised("01234567890123456789012345678901234567890123456789012345678901234567",
+			"012345678901234567890123456789012345678901234567890123456789012");
+}
+
+static struct pdo_entry entry(const char *pdo, const char *name, uint16_t index, uint8_t subindex)
+{
+	struct pdo_entry e = { .index = index, .subindex = subindex, .bit_len = 1 };
+
+	snprintf(e.pdo_name, sizeof(e.pdo_name), "%s", pdo);
+	snprintf(e.name, sizeof(e.name), "%s", name);
+	return e;
+}
+
+TEST(names, a_name_is_cut_only_where_the_channel_has_no_room)
+{
+	static const char text[] = "RTD Inputs Channel 1.Status Sensor Wire Broken Or Short";
+	const struct pdo_entry e[] = { entry("", text, 0x6000, 3) };
+	char name[1][PDO_NAME_BYTES];
+
+	name_entries(e, 1, 63 - 6, name);
+	CHECK_STR(name[0], "rtd_inputs_channel_1_status_sensor_wire_broken_or_short");
+	name_entries(e, 1, 21, name);
+	CHECK_STR(name[0], "rtd_inputs_channel_1");
 }
 
 TEST(names, slave_is_named_after_its_device_and_place)
@@ -36,15 +57,6 @@ TEST(names, slave_is_named_after_its_device_and_place)
 	CHECK_STR(name, "slave3");
 }
 
-static struct pdo_entry entry(const char *pdo, const char *name, uint16_t index, uint8_t subindex)
-{
-	struct pdo_entry e = { .index = index, .subindex = subindex, .bit_len = 1 };
-
-	snprintf(e.pdo_name, sizeof(e.pdo_name), "%s", pdo);
-	snprintf(e.name, sizeof(e.name), "%s", name);
-	return e;
-}
-
 TEST(names, entries_take_the_pdo_in_front_only_where_they_share_a_name)
 {
 	const struct pdo_entry e[] = {
@@ -56,7 +68,7 @@ TEST(names, entries_take_the_pdo_in_front_only_where_they_share_a_name)
 	};
 	char name[5][PDO_NAME_BYTES];
 
-	name_entries(e, 5, name);
+	name_entries(e, 5, 32, name);
 	CHECK_STR(name[0], "channel_1_output");
 	CHECK_STR(name[1], "channel_2_output");
 	CHECK_STR(name[2], "ready");
@@ -73,7 +85,7 @@ TEST(names, index_and_number_make_the_last_ones_differ)
 	};
 	char name[4][PDO_NAME_BYTES];
 
-	name_entries(e, 4, name);
+	name_entries(e, 4, 32, name);
 	for (int i = 0; i < 4; i++) {
 		for (int k = 0; k < i; k++) {
 			CHECK(strcmp(name[i], name[k]) != 0);
@@ -92,7 +104,7 @@ TEST(names, modules_without_pdo_names_are_distinguished_by_their_slots)
 	};
 	char name[8][PDO_NAME_BYTES];
 
-	name_entries(e, 8, name);
+	name_entries(e, 8, 32, name);
 	CHECK_STR(name[0], "slot1_channel_1_data");
 	CHECK_STR(name[1], "channel_2_data");
 	CHECK_STR(name[2], "slot2_channel_1_data");
