@@ -14,12 +14,6 @@
 
 enum { CHUNK_BYTES = 1 << 16 };
 
-/* Expat 2.9 has these under new names, and calls the old ones deprecated. */
-#if XML_MAJOR_VERSION == 2 && XML_MINOR_VERSION < 9
-#define XML_GetCurrentLineNumber64 XML_GetCurrentLineNumber
-#define XML_GetCurrentByteIndex64 XML_GetCurrentByteIndex
-#endif
-
 struct xml {
 	XML_Parser parser;
 	const struct xml_handler *handler;
@@ -47,17 +41,18 @@ static void *limited_realloc(void *old, size_t bytes)
 {
 	union block *block = old == NULL ? NULL : (union block *)old - 1;
 	size_t before = block == NULL ? 0 : block->bytes;
+	union block *grown;
 
 	if (bytes > XML_LIMIT_MEMORY_BYTES || allocated - before + bytes > XML_LIMIT_MEMORY_BYTES) {
 		return NULL;
 	}
-	block = realloc(block, sizeof(*block) + bytes);
-	if (block == NULL) {
+	grown = realloc(block, sizeof(*block) + bytes);
+	if (grown == NULL) {
 		return NULL;
 	}
 	allocated += bytes - before;
-	block->bytes = bytes;
-	return block + 1;
+	grown->bytes = bytes;
+	return grown + 1;
 }
 
 static void *limited_malloc(size_t bytes)
@@ -75,11 +70,36 @@ static void limited_free(void *old)
 	}
 }
 
+/* --- where it is --- */
+
+/* Expat 2.9 has both functions under new names, and calls the old ones deprecated. */
+#if XML_MAJOR_VERSION > 2 || XML_MINOR_VERSION >= 9
+static int64_t line_of(XML_Parser parser)
+{
+	return (int64_t)XML_GetCurrentLineNumber64(parser);
+}
+
+static int64_t byte_of(XML_Parser parser)
+{
+	return XML_GetCurrentByteIndex64(parser);
+}
+#else
+static int64_t line_of(XML_Parser parser)
+{
+	return (int64_t)XML_GetCurrentLineNumber(parser);
+}
+
+static int64_t byte_of(XML_Parser parser)
+{
+	return XML_GetCurrentByteIndex(parser);
+}
+#endif
+
 /* --- failures --- */
 
 int xml_line(const struct xml *xml)
 {
-	return (int)XML_GetCurrentLineNumber64(xml->parser);
+	return (int)line_of(xml->parser);
 }
 
 int xml_fail(struct xml *xml, const char *format, ...)
@@ -111,7 +131,7 @@ static void stop(struct xml *xml, int result)
 
 static void note_token(struct xml *xml)
 {
-	xml->seen = XML_GetCurrentByteIndex64(xml->parser);
+	xml->seen = byte_of(xml->parser);
 }
 
 static void XMLCALL on_begin(void *ctx, const XML_Char *name, const XML_Char **attribute)
