@@ -19,6 +19,8 @@
 
 /* So many rows of bars an octave: each holds a quarter of it. */
 enum { ROWS_PER_OCTAVE = 4, BUCKETS_PER_ROW = (1 << HISTOGRAM_SUB_BITS) / ROWS_PER_OCTAVE };
+/* Columns before a bar. */
+enum { BAR_INDENT = 43 };
 enum { ROWS = HISTOGRAM_BUCKETS / BUCKETS_PER_ROW };
 
 static const struct histogram *find(const struct status_page *page, const char *name)
@@ -69,7 +71,7 @@ static void gather(const struct histogram *h, struct rows *ret)
 
 void bars_print(const struct histogram *h)
 {
-	int width = screen_size().columns - 42;
+	int width = screen_size().columns - BAR_INDENT;
 	uint64_t below = 0;
 	struct rows rows;
 	char from[TEXT_BYTES];

@@ -2,19 +2,24 @@
 #include "cli/report.h"
 
 #include <inttypes.h>
+#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
 #include "base/clock.h"
 #include "base/event.h"
 #include "base/sync0.h"
+#include "cli/fit.h"
 #include "cli/running.h"
+#include "cli/screen.h"
 #include "cli/source.h"
 #include "cli/sync0_source.h"
 #include "cli/text.h"
 #include "wire/al.h"
 
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
+
+enum { LABEL_COLUMNS = 11 };
 
 void report_gather(struct cli *cli, const struct status_page *page,
 		   const struct record_status *record, struct report *ret_report)
@@ -84,6 +89,16 @@ static void write_link(const struct status_page *page, FILE *out)
 	}
 }
 
+static enum screen_colour colour_of_bus(const struct status_page *page)
+{
+	uint32_t state = GET(page->bus_state);
+
+	if (state == BUS_FAILED || state == BUS_RECOVERING || GET(page->is_waiting)) {
+		return SCREEN_BAD;
+	}
+	return state == GET(page->bus_target) ? SCREEN_GOOD : SCREEN_WARN;
+}
+
 static void write_head(const struct report *report, FILE *out)
 {
 	const struct status_page *page = report->page;
@@ -94,8 +109,9 @@ static void write_head(const struct report *report, FILE *out)
 		fprintf(out, "ecdaqd has ended (process %" PRId64 " is gone): last known state\n",
 			page->pid);
 	}
-	fprintf(out, "ecdaqd %.32s   %s%s", page->version, bus_state_to_str(GET(page->bus_state)),
-		GET(page->is_waiting) ? ", waiting" : "");
+	fprintf(out, "ecdaqd %.32s   %s%s%s%s", page->version, screen_colour(colour_of_bus(page)),
+		bus_state_to_str(GET(page->bus_state)), GET(page->is_waiting) ? ", waiting" : "",
+		screen_colour(SCREEN_PLAIN));
 	if (GET(page->bus_target) != BUS_OP || GET(page->is_waiting)) {
 		fprintf(out, ", target %s", bus_state_to_str(GET(page->bus_target)));
 	}
@@ -230,35 +246,6 @@ static void write_times(const struct status_page *page, FILE *out)
 	}
 }
 
-static void write_slave(const struct status_page *page, uint32_t index, FILE *out)
-{
-	const struct slave_status *slave = &page->slave[index];
-	struct slave_info info = source_slave(page, index);
-	uint32_t code = GET(slave->al_status_code);
-	char state[24];
-	char diff[TEXT_BYTES] = "-";
-	uint64_t rx = 0;
-	uint64_t links = 0;
-
-	report_al_format(GET(slave->al_state), state, sizeof(state));
-	for (int port = 0; port < 4; port++) {
-		rx += GET(slave->rx_errors[port]);
-		links += GET(slave->lost_links[port]);
-	}
-	if (info.has_dc) {
-		text_ns(GET(slave->dc_diff_ns), diff);
-	}
-	fprintf(out, "%3u %-16s %-13s %12" PRIu64 " %10" PRIu64 " %10s %6" PRIu64 " %6" PRIu64 "%s",
-		index, info.name, GET(slave->is_lost) ? "LOST" : state,
-		GET(page->cycle.slave_good[index]), GET(page->cycle.slave_bad[index]),
-		info.is_dc_reference ? "reference" : diff, rx, links,
-		GET(slave->are_errors_short) ? "+" : "");
-	if (code != 0) {
-		fprintf(out, "  0x%04x %s", code, al_status_code_to_str((uint16_t)code));
-	}
-	fputc('\n', out);
-}
-
 static void write_recorder(const struct report *report, FILE *out)
 {
 	const struct record_status *record = report->record;
@@ -349,16 +336,50 @@ static void write_message(const struct status_page *page, FILE *out)
 	char plain[sizeof(page->message)];
 
 	if (page->message[0] != '\0') {
-		fprintf(out, "message    %s\n", text_plain(page->message, plain, sizeof(plain)));
+		fprintf(out, "message    %s%s%s\n", screen_colour(SCREEN_WARN),
+			text_plain(page->message, plain, sizeof(plain)),
+			screen_colour(SCREEN_PLAIN));
 	}
 }
 
-void report_write_screen(const struct report *report, FILE *out)
+/* In place of the lines of cycle, times and services, where there is not room for them. */
+static void write_short(const struct report *report, FILE *out)
 {
-	uint32_t count = source_slave_count(report->page);
+	const struct cycle_stats *st = &report->page->cycle;
+	char wake[TEXT_BYTES];
+	char trip[TEXT_BYTES];
 
+	fprintf(out, "cycle      %" PRIu64, GET(st->cycle_number));
+	if (report->has_wkc) {
+		fprintf(out, "   WKC %u/%u", report->wkc, report->wkc_expected);
+	}
+	fprintf(out, "   DC %s%s   lost %" PRIu64 "   late %" PRIu64 "   overruns %" PRIu64 "\n",
+		dc_state_to_str(GET(st->dc_state)),
+		GET(st->is_fail_safe) ? "   outputs FAIL-SAFE" : "", GET(st->frames_lost),
+		GET(st->frames_late), GET(st->overruns));
+	fprintf(out, "samples    good %" PRIu64 "   bad %" PRIu64, GET(st->samples_good),
+		GET(st->samples_bad));
+	if (GET(st->round_trip.count) > 0) {
+		fprintf(out, "   p99.9 wake %s, round trip %s",
+			text_ns(histogram_percentile(&st->wake_latency, 999000), wake),
+			text_ns(histogram_percentile(&st->round_trip, 999000), trip));
+	}
+	if (report->record != NULL) {
+		fprintf(out, "   recorder %s, %" PRIu64 " gaps",
+			record_state_to_str(GET(report->record->state)),
+			GET(report->record->recorded_gaps));
+	}
+	fputc('\n', out);
+}
+
+static void write_head_lines(const struct report *report, enum report_detail detail, FILE *out)
+{
 	write_head(report, out);
 	write_message(report->page, out);
+	if (detail == REPORT_SHORT) {
+		write_short(report, out);
+		return;
+	}
 	write_degraded(report->page, out);
 	write_cycle(report, out);
 	write_control(report->page, out);
@@ -366,13 +387,30 @@ void report_write_screen(const struct report *report, FILE *out)
 	write_recorder(report, out);
 	write_dds(report, out);
 	write_sync0(report, out);
-	if (count > 0) {
-		fprintf(out, "%3s %-16s %-13s %12s %10s %10s %6s %6s\n", "pos", "slave", "state",
-			"good", "bad", "dc diff", "rx err", "links");
+}
+
+void report_write_head(const struct report *report, enum report_detail detail, int columns,
+		       FILE *out)
+{
+	char *text = NULL;
+	size_t len = 0;
+	FILE *lines = open_memstream(&text, &len);
+
+	if (lines == NULL) {
+		return;
 	}
-	for (uint32_t i = 0; i < count; i++) {
-		write_slave(report->page, i, out);
+	write_head_lines(report, detail, lines);
+	if (fclose(lines) == 0) {
+		fit_write(text, columns, LABEL_COLUMNS, out);
 	}
+	free(text);
+}
+
+void report_write_screen(const struct report *report, int columns, FILE *out)
+{
+	report_write_head(report, REPORT_FULL, columns, out);
+	report_write_slaves_heading(report, columns, out);
+	report_write_slaves(report, REPORT_BY_POSITION, columns, out);
 }
 
 void report_write_summary(const struct report *report, FILE *out)

@@ -35,8 +35,32 @@ void report_gather(struct cli *cli, const struct status_page *page,
 
 void report_release(const struct report *report);
 
-/** The screen of `ecdaq status` and `ecdaq top`. */
-void report_write_screen(const struct report *report, FILE *out);
+enum report_detail { REPORT_FULL, REPORT_SHORT };
+enum report_sort {
+	REPORT_BY_POSITION,
+	REPORT_BY_TROUBLE, /* lost, not in the state of the bus, with errors; then by position */
+	REPORT_BY_NAME,
+	REPORT_BY_BAD,    /* most bad samples first */
+	REPORT_BY_ERRORS, /* most receive errors and lost links first */
+	REPORT_SORT_COUNT,
+};
+
+/** "trouble" and the like; NULL for a number out of range. */
+const char *report_sort_to_str(unsigned sort);
+
+/**
+ * Bus, cycle, times, recorder, services. @columns: what lines must fit; 0: any width. REPORT_SHORT:
+ * the figures that trouble shows in, in half of the lines.
+ */
+void report_write_head(const struct report *report, enum report_detail detail, int columns,
+		       FILE *out);
+/** The heading of report_write_slaves(); nothing without slaves. */
+void report_write_slaves_heading(const struct report *report, int columns, FILE *out);
+/** One slave a line; where @columns are few, its AL status code may have a line below. */
+void report_write_slaves(const struct report *report, enum report_sort sort, int columns,
+			 FILE *out);
+/** The screen of `ecdaq status`: all of these. */
+void report_write_screen(const struct report *report, int columns, FILE *out);
 /** A few lines for the end of a run. */
 void report_write_summary(const struct report *report, FILE *out);
 /** One JSON object, without the end of the line; doc/reference/cli.md lists its keys. */

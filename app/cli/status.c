@@ -3,6 +3,7 @@
 #include "base/args.h"
 #include "cli/cli.h"
 #include "cli/report.h"
+#include "cli/screen.h"
 #include "cli/source.h"
 
 enum exit_code verb_status(struct cli *cli, int argc, char **argv)
@@ -37,7 +38,7 @@ enum exit_code verb_status(struct cli *cli, int argc, char **argv)
 	} else if (is_summary) {
 		report_write_summary(&report, stdout);
 	} else {
-		report_write_screen(&report, stdout);
+		report_write_screen(&report, screen_columns(), stdout);
 	}
 	report_release(&report);
 	source_record_close(record);

@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "base/clock.h"
@@ -18,7 +19,7 @@
 
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
 
-enum { FOOTER_BYTES = 3 * CONFIG_PATH_BYTES };
+enum { FOOTER_BYTES = 3 * CONFIG_PATH_BYTES, FOOTER_ROWS = 3, SLAVES_MIN = 6 };
 
 struct top {
 	struct cli *cli;
@@ -26,6 +27,10 @@ struct top {
 	int64_t wait_ns; /* for ecdaqd to appear */
 	const char *leave_text;
 	char footer[FOOTER_BYTES];
+	const char *sort_word; /* --sort; NULL: the default */
+	unsigned sort;         /* enum report_sort */
+	int detail;            /* enum report_detail, or -1: what the rows have room for */
+	struct screen_scroll scroll;
 	int is_json;
 	int is_live;    /* a screen, not lines */
 	uint64_t count; /* of updates; 0: no end */
@@ -69,17 +74,28 @@ static void program_path(char path[CONFIG_PATH_BYTES])
 	}
 }
 
-/* What q does, and the line for a second terminal where that must name the run directory. */
-static void make_footer(struct top *top)
+/* What q does, where the list is, and the line for a second terminal where that must name the run
+ * directory. */
+static void make_footer(struct top *top, int columns)
 {
 	static const char head[] = "2nd terminal: ";
 	char program[CONFIG_PATH_BYTES];
+	const struct screen_scroll *scroll = &top->scroll;
 	const char *dir = top->cli->dir;
 	int dir_len = (int)strlen(dir);
-	int columns = screen_size().columns;
-	int used = snprintf(top->footer, FOOTER_BYTES, "%s   Ctrl-Z: suspend", top->leave_text);
+	int used = snprintf(top->footer, FOOTER_BYTES, "%s   Ctrl-Z: suspend   ?: keys",
+			    top->leave_text);
 	int len;
 
+	if (scroll->count > scroll->visible) {
+		char place[64];
+		int place_len =
+			snprintf(place, sizeof(place), "   rows %d-%d of %d", scroll->first + 1,
+				 scroll->first + scroll->visible, scroll->count);
+
+		used = used + place_len > columns ? (int)strlen(top->leave_text) : used;
+		used += snprintf(top->footer + used, (size_t)(FOOTER_BYTES - used), "%s", place);
+	}
 	if (!top->cli->is_dir_chosen) {
 		return;
 	}
@@ -91,20 +107,101 @@ static void make_footer(struct top *top)
 		 dir_len, dir);
 }
 
-static void show_screen(const struct top *top, const struct report *report)
+/* What @write writes, or NULL without memory. Free with free(). */
+static char *text_of(const struct report *report, const struct top *top, enum report_detail detail,
+		     void (*write)(const struct report *report, const struct top *top,
+				   enum report_detail detail, FILE *out))
 {
 	char *text = NULL;
 	size_t len = 0;
 	FILE *out = open_memstream(&text, &len);
 
 	if (out == NULL) {
-		return;
+		return NULL;
 	}
-	report_write_screen(report, out);
-	if (fclose(out) == 0) {
-		screen_draw(text, top->footer);
+	write(report, top, detail, out);
+	if (fclose(out) != 0) {
+		free(text);
+		return NULL;
 	}
-	free(text);
+	return text;
+}
+
+static void write_head(const struct report *report, const struct top *top,
+		       enum report_detail detail, FILE *out)
+{
+	(void)top;
+	report_write_head(report, detail, screen_size().columns, out);
+	report_write_slaves_heading(report, screen_size().columns, out);
+}
+
+static void write_body(const struct report *report, const struct top *top,
+		       enum report_detail detail, FILE *out)
+{
+	(void)detail;
+	report_write_slaves(report, (enum report_sort)top->sort, screen_size().columns, out);
+}
+
+static int line_count(const char *text)
+{
+	int count = 0;
+
+	for (; *text != '\0'; text++) {
+		count += *text == '\n';
+	}
+	return count;
+}
+
+/* The head, with all lines if there is room for them and for some slaves. */
+static char *make_head(const struct top *top, const struct report *report, int slave_lines)
+{
+	int rows = screen_size().rows - FOOTER_ROWS;
+	int is_full = top->detail != REPORT_SHORT;
+	char *head = text_of(report, top, is_full ? REPORT_FULL : REPORT_SHORT, write_head);
+
+	if (head != NULL && top->detail < 0 &&
+	    line_count(head) + (slave_lines < SLAVES_MIN ? slave_lines : SLAVES_MIN) > rows) {
+		free(head);
+		head = text_of(report, top, REPORT_SHORT, write_head);
+	}
+	return head;
+}
+
+static void show_screen(struct top *top, const struct report *report)
+{
+	char *body = text_of(report, top, REPORT_FULL, write_body);
+	char *head = body == NULL ? NULL : make_head(top, report, line_count(body));
+	struct screen_frame frame = {
+		.head = head,
+		.body = body,
+		.footer = top->footer,
+		.keys = "  s                next order of the slaves: trouble, name, bad, errors, "
+			"position\n"
+			"  d                details: all, few, what fits\n",
+		.scroll = &top->scroll,
+	};
+
+	if (head != NULL && body != NULL) {
+		int first = top->scroll.first;
+		int visible = top->scroll.visible;
+
+		make_footer(top, screen_size().columns);
+		screen_draw(&frame);
+		if (top->scroll.first != first || top->scroll.visible != visible) {
+			make_footer(top, screen_size().columns);
+			screen_draw(&frame);
+		}
+	}
+	free(head);
+	free(body);
+}
+
+static int64_t now_ns(void)
+{
+	struct timespec ts;
+
+	clock_gettime(CLOCK_MONOTONIC, &ts);
+	return (int64_t)ts.tv_sec * NS_PER_S + ts.tv_nsec;
 }
 
 static void show_line(struct top *top, const struct report *report)
@@ -149,32 +246,66 @@ static void show(struct top *top, const struct report *report)
 	} else {
 		show_line(top, report);
 	}
-	top->shown++;
+}
+
+static void take_key(struct top *top, int key)
+{
+	if (screen_scroll_key(&top->scroll, key)) {
+		return;
+	}
+	if (key == 's') {
+		top->sort = (top->sort + 1) % REPORT_SORT_COUNT;
+		top->scroll.first = 0;
+	} else if (key == 'd') {
+		top->detail = top->detail < 0              ? REPORT_FULL
+			      : top->detail == REPORT_FULL ? REPORT_SHORT
+							   : -1;
+	}
+}
+
+/* The interval; keys and a new size take effect in it. */
+static void wait_interval(struct top *top, const struct report *report)
+{
+	int64_t until_ns = now_ns() + top->interval_ns;
+
+	while (!screen_is_over()) {
+		int64_t left_ns = until_ns - now_ns();
+
+		if (left_ns <= 0) {
+			return;
+		}
+		take_key(top, screen_wait(left_ns));
+		if (top->is_live && !screen_is_over() && now_ns() < until_ns) {
+			show_screen(top, report);
+		}
+	}
 }
 
 static enum exit_code follow(struct top *top, const struct status_page **page)
 {
 	const struct record_status *record;
 	struct report report;
+	int is_last;
 
 	do {
 		/* The recorder may come, go and come back. */
 		record = source_record(top->cli);
 		report_gather(top->cli, *page, record, &report);
 		show(top, &report);
+		top->shown++;
+		is_last = !report.is_running || top->shown == top->count;
+		if (!is_last) {
+			wait_interval(top, &report);
+		}
 		report_release(&report);
 		source_record_close(record);
-		if (!report.is_running || top->shown == top->count) {
-			break;
-		}
-		screen_wait(top->interval_ns);
-	} while (!screen_is_over() && refresh(top, page));
+	} while (!is_last && !screen_is_over() && refresh(top, page));
 	screen_end();
 	/* Leave the last state in the terminal: the other screen buffer is gone. */
 	if (top->is_live && !screen_is_over()) {
 		record = source_record(top->cli);
 		report_gather(top->cli, *page, record, &report);
-		report_write_screen(&report, stdout);
+		report_write_screen(&report, screen_columns(), stdout);
 		report_release(&report);
 		source_record_close(record);
 	}
@@ -214,6 +345,22 @@ static void wait_for_page(struct top *top)
 	}
 }
 
+static enum exit_code parse_sort(struct top *top)
+{
+	if (top->sort_word == NULL) {
+		return EXIT_CODE_OK;
+	}
+	for (unsigned i = 0; report_sort_to_str(i) != NULL; i++) {
+		if (strcmp(report_sort_to_str(i), top->sort_word) == 0) {
+			top->sort = i;
+			return EXIT_CODE_OK;
+		}
+	}
+	return cli_fail(top->cli, EXIT_CODE_USAGE,
+			"--sort: %s: expected trouble, position, name, bad or errors",
+			top->sort_word);
+}
+
 enum exit_code verb_top(struct cli *cli, int argc, char **argv)
 {
 	struct top top = {
@@ -222,6 +369,8 @@ enum exit_code verb_top(struct cli *cli, int argc, char **argv)
 		.is_live = screen_is_terminal(),
 		.wait_ns = screen_is_terminal() ? 10 * NS_PER_S : 0,
 		.leave_text = "q: leave",
+		.sort = REPORT_BY_TROUBLE,
+		.detail = -1,
 	};
 	const struct args_option options[] = {
 		{ "interval", 'i', args_duration, &top.interval_ns, "T",
@@ -229,16 +378,22 @@ enum exit_code verb_top(struct cli *cli, int argc, char **argv)
 		{ "count", 'n', args_count, &top.count, "N", "end after N updates" },
 		{ "wait", 0, args_duration, &top.wait_ns, "T",
 		  "how long to wait for ecdaqd to start (10s on a terminal, else 0s)" },
+		{ "sort", 0, args_text, &top.sort_word, "ORDER",
+		  "of the slaves: trouble, position, name, bad or errors (trouble)" },
 		{ "json", 0, args_flag, &top.is_json, NULL,
 		  "a line of JSON each update, as from status" },
 		{ "leave-text", 0, args_text, &top.leave_text, "TEXT",
 		  "what q does, for the last line (q: leave)" },
 	};
-	struct args args = { .options = options, .option_count = 5 };
+	struct args args = { .options = options, .option_count = 6 };
 	const struct status_page *page;
 	enum exit_code result;
 
 	if (!cli_parse(cli, &args, argc, argv, &result)) {
+		return result;
+	}
+	result = parse_sort(&top);
+	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	top.is_live = top.is_live && !top.is_json;
@@ -252,7 +407,6 @@ enum exit_code verb_top(struct cli *cli, int argc, char **argv)
 		return result;
 	}
 	if (top.is_live) {
-		make_footer(&top);
 		screen_begin();
 	}
 	result = follow(&top, &page);

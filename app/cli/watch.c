@@ -129,7 +129,8 @@ static void draw(struct watch *watch)
 	snprintf(footer, sizeof(footer), "q: leave   cycle %" PRIu64 "   missed %" PRIu64,
 		 watch->next_cycle - 1, watch->missed);
 	if (fclose(out) == 0) {
-		screen_draw(text, footer);
+		screen_draw(&(struct screen_frame){
+			.head = text, .body = "", .footer = footer, .keys = "" });
 	}
 	free(text);
 	watch->drawn_ns = now_ns();

@@ -14,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from ecdaq import Fake
 from made_machine import Machine
 from recording import PRODUCER, RECORD, Bench
+from terminal import Terminal
 
 
 @pytest.fixture
@@ -59,3 +60,10 @@ def bench(run_dir: Path, tmp_path: Path) -> Iterator[Bench]:
     made.folder.mkdir()
     yield made
     made.close()
+
+
+@pytest.fixture
+def terminal() -> Iterator[Terminal]:
+    one = Terminal(24, 90)
+    yield one
+    one.close()

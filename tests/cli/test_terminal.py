@@ -5,116 +5,18 @@ from __future__ import annotations
 
 import fcntl
 import os
-import pty
 import re
-import select
 import signal
 import struct
 import subprocess
 import sys
 import termios
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from ecdaq import ECDAQ, FAKE, NO_DAEMON, OK, ROOT, Fake, environment, wait_until
-
-ENTER, LEAVE = "\x1b[?1049h", "\x1b[?1049l"
-
-
-def own_terminal() -> None:
-    """In a child: a session of its own, with standard input as its terminal."""
-    os.setsid()
-    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
-
-
-class Terminal:
-    """A pseudo terminal with a program on it."""
-
-    def __init__(self, rows: int, columns: int) -> None:
-        self.master, self.slave = pty.openpty()
-        fcntl.ioctl(self.slave, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
-        self.before = termios.tcgetattr(self.slave)
-        self.text = ""
-        self.process: subprocess.Popen[bytes] | None = None
-
-    def start(self, daemon: Fake, *words: str, cwd: str | None = None) -> None:
-        self.process = subprocess.Popen(
-            [ECDAQ, *words],
-            env=environment(daemon.run_dir, LANG="C.UTF-8"),
-            stdin=self.slave,
-            stdout=self.slave,
-            stderr=subprocess.PIPE,
-            cwd=cwd,
-        )
-
-    def start_shell(self, run_dir: Path, **more: str) -> None:
-        """An interactive shell with job control; its prompt is "READY> "."""
-        self.process = subprocess.Popen(
-            ["bash", "--norc", "--noprofile", "--noediting", "-i"],
-            env=environment(run_dir, LANG="C.UTF-8", PS1="READY> ", **more),
-            stdin=self.slave,
-            stdout=self.slave,
-            stderr=self.slave,
-            preexec_fn=own_terminal,
-            cwd=ROOT,
-        )
-        self.wait_for("READY> ")
-
-    def wait_for_new(self, pattern: str) -> str:
-        """Wait for @pattern in what comes from now on."""
-        self.text = ""
-        self.wait_for(pattern)
-        return self.text
-
-    def has_keys(self) -> bool:
-        """Are keys given one by one, without echo?"""
-        return termios.tcgetattr(self.slave)[3] & (termios.ICANON | termios.ECHO) == 0
-
-    def read_some(self) -> bool:
-        if not select.select([self.master], [], [], 0.05)[0]:
-            return False
-        self.text += os.read(self.master, 65536).decode(errors="replace")
-        return True
-
-    def wait_until(self, condition: Callable[[], bool]) -> None:
-        """Of what was drawn."""
-        deadline = time.monotonic() + 60
-        while not condition():
-            assert time.monotonic() < deadline, self.text[-2000:]
-            self.read_some()
-
-    def wait_for(self, pattern: str) -> None:
-        self.wait_until(lambda: re.search(pattern, self.text) is not None)
-
-    def press(self, keys: str) -> None:
-        os.write(self.master, keys.encode())
-
-    def end(self) -> tuple[int, str]:
-        """Wait for the program's end: its exit code and standard error."""
-        assert self.process is not None and self.process.stderr is not None
-        deadline = time.monotonic() + 60
-        while self.process.poll() is None:
-            assert time.monotonic() < deadline
-            self.read_some()
-        while self.read_some():
-            pass
-        return self.process.returncode, self.process.stderr.read().decode()
-
-    def is_restored(self) -> bool:
-        left = self.text.rfind(LEAVE) > self.text.rfind(ENTER) >= 0
-        return left and termios.tcgetattr(self.slave) == self.before
-
-    def close(self) -> None:
-        if self.process is not None:
-            self.process.kill()
-            self.process.wait(20)
-            if self.process.stderr is not None:
-                self.process.stderr.close()
-        os.close(self.master)
-        os.close(self.slave)
-
+from terminal import ENTER, LEAVE, Terminal, screens
 
 # Stand-ins for what `./build.sh run` starts; the view is the real one.
 DAEMON = """#!/bin/sh
@@ -124,20 +26,6 @@ exec {fake} "$ECDAQ_RUN_DIR" SPEED=10 <> "$ECDAQ_RUN_DIR/never"
 OTHER = """#!/bin/sh
 exec sleep infinity
 """
-
-
-@pytest.fixture
-def terminal() -> Iterator[Terminal]:
-    one = Terminal(24, 90)
-    yield one
-    one.close()
-
-
-def screens(text: str) -> list[list[str]]:
-    """What was drawn, frame by frame, without the sequences."""
-    frames = text.split("\x1b[H")[1:]
-    plain = [re.sub(r"\x1b\[[0-9;?]*[A-Za-z]|\r", "", frame) for frame in frames]
-    return [frame.split("\n") for frame in plain]
 
 
 def test_top_redraws_periodically_and_ends_with_q(daemon: Fake, terminal: Terminal) -> None:
@@ -185,15 +73,15 @@ def test_top_ends_with_ecdaqd_and_leaves_the_last_state(daemon: Fake, terminal: 
 def test_the_last_lines_explain_q_and_the_command_for_a_second_terminal(
     daemon: Fake, terminal: Terminal
 ) -> None:
-    fcntl.ioctl(terminal.slave, termios.TIOCSWINSZ, struct.pack("HHHH", 12, 400, 0, 0))
+    fcntl.ioctl(terminal.slave, termios.TIOCSWINSZ, struct.pack("HHHH", 8, 400, 0, 0))
     terminal.start(daemon, "top", "--interval", "20ms", "--leave-text", "q: stop it all")
     terminal.wait_for(r"(?s)(\x1b\[H.*){4}")
     frame = screens(terminal.text)[1]
     terminal.press("q")
     assert terminal.end() == (OK, "")
-    # Twelve rows are too few for the status: the last lines are there all the same.
-    assert len(frame) == 12
-    assert frame[-2] == "q: stop it all   Ctrl-Z: suspend"
+    # Eight rows are too few for the status: the last lines are there all the same.
+    assert len(frame) == 8
+    assert frame[-2] == "q: stop it all   Ctrl-Z: suspend   ?: keys   rows 1-1 of 2"
     label, _, command = frame[-1].partition(": ")
     assert label == "2nd terminal"
     assert f"--run-dir {daemon.run_dir} status" in command

@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: MIT
+"""The live views: they fit the terminal, and their keys act."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+
+import pytest
+from ecdaq import BUILD, OK, USAGE, Fake, fails, works
+from terminal import ENTER, Terminal, screens
+
+UP, DOWN, PAGE_DOWN, END = "\x1b[A", "\x1b[B", "\x1b[6~", "\x1b[F"
+WIDTHS = (60, 80, 200)
+
+
+@pytest.fixture(scope="module")
+def many(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Fake]:
+    """64 slaves."""
+    program = BUILD / "tests" / "cli" / "test_fake_daemon_64"
+    fake = Fake(tmp_path_factory.mktemp("run64"), program=program)
+    yield fake
+    fake.close()
+
+
+def screen_with(terminal: Terminal, condition: Callable[[list[str]], bool]) -> list[str]:
+    """The first picture of now on, complete, for which it is true."""
+    terminal.text = ""
+    found: list[list[str]] = []
+
+    def is_there() -> bool:
+        found.extend(one for one in screens(terminal.text)[:-1] if condition(one))
+        return found != []
+
+    terminal.wait_until(is_there)
+    return found[0]
+
+
+def drawn_anew(terminal: Terminal, pattern: str = "") -> list[str]:
+    """What is shown when a view that draws on a change only has drawn."""
+    terminal.wait_until(
+        lambda: terminal.text.endswith("\x1b[J") and re.search(pattern, terminal.text) is not None
+    )
+    return screens(terminal.text)[-1]
+
+
+def leave(terminal: Terminal) -> None:
+    terminal.text = ENTER
+    terminal.press("q")
+    assert terminal.end() == (OK, "")
+    assert terminal.is_restored()
+
+
+def slaves_of(screen: list[str]) -> list[int]:
+    """Positions in the table, from its top."""
+    rows = [re.match(r" *(\d+) \S+ +(?:OP|SAFE-OP|LOST)", line) for line in screen]
+    return [int(row.group(1)) for row in rows if row]
+
+
+def fits(screen: list[str], rows: int, columns: int) -> None:
+    assert len(screen) <= rows
+    assert [line for line in screen if len(line) > columns] == []
+
+
+@pytest.mark.parametrize("columns", WIDTHS)
+def test_top_fits_and_its_table_does_not_move(
+    daemon: Fake, terminal: Terminal, columns: int
+) -> None:
+    terminal.resize(40, columns)
+    terminal.start(daemon, "top", "--interval", "20ms")
+    terminal.wait_for(r"(?s)(\x1b\[H.*){6}")
+    shown = screens(terminal.text)[:5]
+    leave(terminal)
+    headings = set()
+    for screen in shown:
+        fits(screen, 40, columns)
+        assert slaves_of(screen) == [1, 0]  # trouble first
+        heading = next(line for line in screen if line.startswith("pos slave"))
+        first, second = (screen[screen.index(heading) + i] for i in (1, 2))
+        assert first.split()[:3] == ["1", "piccolo1", "OP"]
+        headings.add(heading)
+        # The words of the AL status code, behind the slave or below it.
+        assert "0x001b SyncManager watchdog" in f"{first} {second}"
+        assert not any(line.endswith((" lo", " larg", " rides")) for line in screen)
+    assert len(headings) == 1
+    text = " ".join(" ".join(line.split()) for line in shown[0])
+    for field in ("largest difference 42 ns", "page faults 0", "rides 0", "computed time"):
+        assert field in text
+
+
+@pytest.mark.parametrize("columns", WIDTHS)
+def test_64_slaves_are_reached_by_scrolling(many: Fake, terminal: Terminal, columns: int) -> None:
+    terminal.resize(24, columns)
+    terminal.start(many, "top", "--interval", "20ms", "--sort", "position")
+    first = screen_with(terminal, lambda s: "rows 1-" in " ".join(s))
+    fits(first, 24, columns)
+    visible = len(slaves_of(first))
+    assert visible >= 8 and slaves_of(first)[0] == 0
+    terminal.press(DOWN)
+    screen_with(terminal, lambda s: slaves_of(s)[:1] == [1])
+    terminal.press("jj")
+    screen_with(terminal, lambda s: "rows 4-" in " ".join(s))
+    terminal.press("k" + UP)
+    screen_with(terminal, lambda s: slaves_of(s)[:1] == [1])
+    terminal.press(PAGE_DOWN)
+    screen_with(terminal, lambda s: slaves_of(s)[:1] > [5])
+    terminal.press(END)
+    last = screen_with(terminal, lambda s: slaves_of(s)[-1:] == [63])
+    fits(last, 24, columns)
+    terminal.press("g")
+    screen_with(terminal, lambda s: slaves_of(s)[:1] == [0])
+    leave(terminal)
+
+
+def test_a_bad_slave_is_on_top_and_s_changes_the_order(many: Fake, terminal: Terminal) -> None:
+    terminal.resize(24, 80)
+    terminal.start(many, "top", "--interval", "20ms")
+    assert slaves_of(screen_with(terminal, lambda s: slaves_of(s) != []))[:3] == [1, 0, 2]
+    # By name, bad samples, errors, position, trouble.
+    for wanted in ([0, 1, 10], [0, 1, 2], [1, 0, 2], [0, 1, 2], [1, 0, 2]):
+        terminal.press("s")
+        screen_with(terminal, lambda s, wanted=wanted: slaves_of(s)[:3] == wanted)
+    leave(terminal)
+    fails(many("top", "--sort", "size"), USAGE, "--sort: size: expected trouble, position")
+
+
+def test_a_new_size_is_used_at_once(many: Fake, terminal: Terminal) -> None:
+    terminal.resize(50, 200)
+    terminal.start(many, "top", "--interval", "60s")
+    drawn_anew(terminal, "rows 1-")
+    for rows, columns in ((24, 60), (60, 120)):
+        terminal.text = ""
+        terminal.resize(rows, columns)
+        screen = drawn_anew(terminal)
+        fits(screen, rows, columns)
+        assert len(screen) == rows
+    leave(terminal)
+
+
+def test_question_mark_shows_the_keys_and_any_key_returns(many: Fake, terminal: Terminal) -> None:
+    terminal.start(many, "top", "--interval", "60s")
+    drawn_anew(terminal, "rows 1-")
+    terminal.text = ""
+    terminal.press("?")
+    text = "\n".join(drawn_anew(terminal))
+    for words in ("q, Ctrl-C", "Ctrl-Z", "PgUp", "next order", "details"):
+        assert words in text
+    assert "piccolo1" not in text
+    terminal.text = ""
+    terminal.press("x")
+    terminal.wait_for("piccolo1")
+    leave(terminal)
+
+
+COLOUR = re.compile(r"\x1b\[[0-9;]*m")
+
+
+def test_colour_is_shown_on_a_terminal_only_and_not_with_no_color(
+    daemon: Fake, terminal: Terminal
+) -> None:
+    terminal.start(daemon, "status")
+    assert terminal.end() == (OK, "") and COLOUR.search(terminal.text)
+    for more in ({"NO_COLOR": "1"}, {"TERM": "dumb"}):
+        terminal.text = ""
+        terminal.start(daemon, "status", **more)
+        assert terminal.end() == (OK, "") and "piccolo1" in terminal.text
+        assert not COLOUR.search(terminal.text)
+    terminal.text = ""
+    terminal.start(daemon, "status", NO_COLOR="")
+    assert terminal.end() == (OK, "") and COLOUR.search(terminal.text)
+    assert "\x1b" not in works(daemon("status"))
+
+
+@pytest.mark.parametrize("columns", WIDTHS)
+def test_status_on_a_terminal_fits(many: Fake, terminal: Terminal, columns: int) -> None:
+    terminal.resize(24, columns)
+    terminal.start(many, "status")
+    assert terminal.end() == (OK, "")
+    lines = COLOUR.sub("", terminal.text).replace("\r", "").split("\n")
+    assert max(len(line) for line in lines) <= columns
+    assert slaves_of(lines) == list(range(64))
+
+
+@pytest.mark.parametrize("columns", WIDTHS)
+def test_a_histogram_fits(daemon: Fake, terminal: Terminal, columns: int) -> None:
+    terminal.resize(24, columns)
+    terminal.start(daemon, "histogram", "wake")
+    assert terminal.end() == (OK, "")
+    assert max(len(line) for line in terminal.text.replace("\r", "").split("\n")) <= columns
