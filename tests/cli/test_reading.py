@@ -287,7 +287,31 @@ def test_events_are_listed_oldest_first(daemon: Fake) -> None:
     assert events[0]["slave"] is None
     assert re.match(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z$", events[0]["utc"])
     text = works(daemon("events", "--level", "error"))
-    assert re.match(r"\S+Z  error    slave 1: lost\n$", text)
+    assert re.match(r"\S+Z  error    slave 1 piccolo1: lost\n$", text)
+    assert events[1]["name"] == "piccolo1" and events[0]["name"] is None
+
+
+def test_events_that_repeat_are_one_line_and_each_with_all_or_json(daemon: Fake) -> None:
+    kind = ("--kind", "frame_lost,overrun")
+    wait_until(lambda: len(json_lines(daemon("events", "--json", *kind))) >= 3)
+    assert {e["event"] for e in json_lines(daemon("events", "--json", *kind))} == {"frame_lost"}
+    first, *rest = works(daemon("events", *kind)).splitlines()
+    assert re.search(r"Z  warning  \d+ frames lost in \d+\.\d s, cycle \d+ to \d+$", first)
+    assert len(rest) < 3  # 10 s each
+    lines = works(daemon("events", "--all", *kind)).splitlines()
+    assert len(lines) >= 3
+    assert all(re.search(r"cycle \d+: frame lost \(1 in a row\)$", line) for line in lines)
+    # What does not repeat is before them, as it happened.
+    kinds = [line.split("  ")[1].strip() for line in works(daemon("events")).splitlines()]
+    assert kinds[:3] == ["info", "error", "warning"]
+
+
+def test_events_of_one_slave_are_selected_by_its_name(daemon: Fake) -> None:
+    for word in ("piccolo1", "1", "alias:1001"):
+        lines = json_lines(daemon("events", "--json", "--slave", word))
+        assert [(e["event"], e["slave"]) for e in lines] == [("slave_lost", 1)]
+    assert works(daemon("events", "--slave", "piccolo0")) == ""
+    assert len(works(daemon("events", "--kind", "slave_*")).splitlines()) == 1
 
 
 def test_events_can_be_followed_to_the_end(daemon: Fake) -> None:

@@ -167,6 +167,8 @@ def test_versions_agree() -> None:
         (["pcap", "--json"], "--json requires --output"),
         (["pcap", "--count", "0"], "--count"),
         (["events", "--level", "loud"], "--level: loud: expected info"),
+        (["events", "--kind", "frame"], "--kind: frame: no such event"),
+        (["top", "--sort", "size"], "--sort: size: expected trouble"),
         (["line\nbreak"], "line?break: unknown command"),
     ],
 )
