@@ -7,7 +7,7 @@
 
 #include "cli/source.h"
 
-enum { CHOOSE_LIMIT = 64 };
+enum { CHOOSE_LIMIT = 512 };
 
 struct choice {
 	uint32_t channel[CHOOSE_LIMIT]; /* places in the channel table */

@@ -47,9 +47,7 @@ enum follow_result follow_next(struct follow *follow, uint64_t *ret_lost)
 {
 	enum follow_result result = FOLLOW_IDLE;
 
-	if (follow->is_idle) {
-		screen_wait(follow->idle_ns);
-	}
+	follow->key = follow->is_idle ? screen_wait(follow->idle_ns) : 0;
 	if (screen_is_over()) {
 		return FOLLOW_OVER;
 	}

@@ -14,6 +14,7 @@ struct follow {
 	const struct status_page *page; /* NULL: cannot be read */
 	int64_t idle_ns;                /* how long to sleep when there is nothing */
 	int is_idle;
+	int key; /* typed since the call before (cli/screen.h), or 0 */
 };
 
 enum follow_result {

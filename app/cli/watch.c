@@ -11,15 +11,19 @@
 #include "base/clock.h"
 #include "cli/choose.h"
 #include "cli/cli.h"
+#include "cli/fit.h"
 #include "cli/follow.h"
 #include "cli/lines.h"
 #include "cli/plot.h"
 #include "cli/screen.h"
+#include "cli/value_table.h"
 #include "image/image.h"
 #include "program/args_duration.h"
 #include "program/json.h"
 
 #define DRAW_PERIOD_NS (NS_PER_S / 15)
+
+enum { PANELS_LIMIT = 64 };
 
 struct watch {
 	struct cli *cli;
@@ -28,9 +32,13 @@ struct watch {
 	struct choice choice;
 	struct plot *plot; /* NULL: lines */
 	const char *titles[CHOOSE_LIMIT];
+	struct value_table table;
+	unsigned sort; /* enum value_table_sort */
+	struct screen_scroll scroll;
 	int is_json;
 	int is_plot;
-	int is_live; /* the plot has the terminal */
+	int is_table; /* values in place */
+	int is_live;  /* plot or table has the terminal */
 	int is_raw;
 	int needs_head;
 	uint64_t count; /* of samples; 0: no end */
@@ -62,7 +70,7 @@ static void print_gap(struct watch *watch, uint64_t missed, const char *why)
 	struct json js;
 
 	watch->missed += missed;
-	if (watch->is_plot) {
+	if (watch->is_plot || watch->is_table) {
 		return;
 	}
 	if (!watch->is_json) {
@@ -136,10 +144,79 @@ static void draw(struct watch *watch)
 	watch->drawn_ns = now_ns();
 }
 
+/* --- values in place --- */
+
+static void write_table_head(const struct watch *watch, int columns, FILE *out)
+{
+	struct sample_header header = samples_header(&watch->follow.samples);
+	char flags[128];
+	char line[256];
+
+	samples_flags_format(header.flags, flags, sizeof(flags));
+	snprintf(line, sizeof(line), "cycle %" PRIu64 "   WKC %u/%u   missed %" PRIu64 "%s%s\n",
+		 header.cycle, header.wkc, header.wkc_expected, watch->missed,
+		 flags[0] == '\0' ? "" : "   ", flags);
+	fit_write(line, columns, 2, out);
+	value_table_write_heading(&watch->table, columns, out);
+}
+
+static void draw_table(struct watch *watch)
+{
+	static const char *const sorts[VALUE_TABLE_SORT_COUNT] = {
+		[VALUE_TABLE_AS_GIVEN] = "as given",
+		[VALUE_TABLE_BAD_FIRST] = "bad first",
+		[VALUE_TABLE_BY_NAME] = "by name",
+	};
+	int columns = screen_size().columns;
+	char footer[128];
+	char *text[2] = { NULL, NULL };
+	size_t len;
+	FILE *head = open_memstream(&text[0], &len);
+	FILE *body = open_memstream(&text[1], &len);
+
+	if (head != NULL && body != NULL) {
+		write_table_head(watch, columns, head);
+		value_table_write(&watch->table, (enum value_table_sort)watch->sort, columns,
+				  now_ns(), body);
+	}
+	if (head != NULL && fclose(head) == 0 && body != NULL && fclose(body) == 0) {
+		snprintf(footer, sizeof(footer), "q: leave   ?: keys   %s   %u channels",
+			 sorts[watch->sort], watch->choice.count);
+		screen_draw(&(struct screen_frame){
+			.head = text[0],
+			.body = text[1],
+			.footer = footer,
+			.keys = "  s                next order: as given, bad first, by name\n",
+			.scroll = &watch->scroll,
+		});
+	}
+	free(text[0]);
+	free(text[1]);
+	watch->drawn_ns = now_ns();
+}
+
+static void take_key(struct watch *watch, int key)
+{
+	if (!watch->is_table || key == SCREEN_KEY_NONE) {
+		return;
+	}
+	if (key == 's') {
+		watch->sort = (watch->sort + 1) % VALUE_TABLE_SORT_COUNT;
+	} else {
+		screen_scroll_key(&watch->scroll, key);
+	}
+	watch->drawn_ns = 0; /* at once */
+}
+
 static void draw_if_due(struct watch *watch)
 {
-	if (watch->is_live && watch->next_cycle > 0 &&
-	    now_ns() - watch->drawn_ns >= DRAW_PERIOD_NS) {
+	if (!watch->is_live || watch->next_cycle == 0 ||
+	    now_ns() - watch->drawn_ns < DRAW_PERIOD_NS) {
+		return;
+	}
+	if (watch->is_table) {
+		draw_table(watch);
+	} else {
 		draw(watch);
 	}
 }
@@ -157,6 +234,10 @@ static enum exit_code begin_plot(struct watch *watch)
 	uint64_t period_ns = watch->follow.samples.meta->period_ns;
 	uint64_t back = period_ns == 0 ? 0 : (uint64_t)watch->window_ns / period_ns;
 
+	if (watch->choice.count > PANELS_LIMIT) {
+		return cli_fail(watch->cli, EXIT_CODE_FAILED, "--plot: more than %d channels",
+				PANELS_LIMIT);
+	}
 	for (unsigned i = 0; i < watch->choice.count; i++) {
 		watch->titles[i] = chosen(watch, i)->name;
 	}
@@ -204,6 +285,11 @@ static enum exit_code look_up(struct watch *watch)
 	}
 	watch->next_cycle = 0;
 	watch->needs_head = !watch->is_plot && !watch->is_json;
+	if (watch->is_table) {
+		value_table_init(&watch->table, &watch->follow.samples, &watch->choice,
+				 watch->is_raw);
+		watch->follow.idle_ns = 20 * NS_PER_MS;
+	}
 	return watch->is_plot ? begin_plot(watch) : EXIT_CODE_OK;
 }
 
@@ -221,6 +307,9 @@ static void take(struct watch *watch)
 	}
 	if (watch->is_plot) {
 		add_to_plot(watch, &header);
+		draw_if_due(watch);
+	} else if (watch->is_table) {
+		value_table_take(&watch->table);
 		draw_if_due(watch);
 	} else if (watch->is_json) {
 		lines_write_json(&lines);
@@ -255,7 +344,10 @@ static enum exit_code run(struct watch *watch)
 	enum exit_code result;
 
 	while (watch->count == 0 || watch->shown < watch->count) {
-		switch (follow_next(&watch->follow, &lost)) {
+		enum follow_result next = follow_next(&watch->follow, &lost);
+
+		take_key(watch, watch->follow.key);
+		switch (next) {
 		case FOLLOW_SAMPLE:
 			take(watch);
 			break;
@@ -315,14 +407,15 @@ static enum exit_code begin(struct watch *watch)
 
 enum exit_code verb_watch(struct cli *cli, int argc, char **argv)
 {
-	struct watch watch = { .cli = cli, .every = 1, .window_ns = 5 * NS_PER_S };
+	struct watch watch = { .cli = cli, .window_ns = 5 * NS_PER_S };
 	const struct args_option options[] = {
 		{ "plot", 'p', args_flag, &watch.is_plot, NULL,
 		  "scrolling curves, one panel per channel" },
 		{ "window", 'w', args_duration, &watch.window_ns, "T",
 		  "time across the plot (5s)" },
 		{ "count", 'n', args_count, &watch.count, "N", "end after N samples" },
-		{ "every", 0, args_count, &watch.every, "N", "only every N-th cycle" },
+		{ "every", 0, args_count, &watch.every, "N",
+		  "a line every N-th cycle, also on a terminal" },
 		{ "rate", 0, args_number, &watch.rate_hz, "HZ", "about HZ samples per second" },
 		{ "raw", 0, args_flag, &watch.is_raw, NULL,
 		  "raw counts, not in the channel's unit" },
@@ -342,9 +435,12 @@ enum exit_code verb_watch(struct cli *cli, int argc, char **argv)
 	if (watch.is_plot && watch.is_json) {
 		return cli_fail(cli, EXIT_CODE_USAGE, "--plot and --json exclude each other");
 	}
-	if (watch.rate_hz > 0 && watch.every > 1) {
+	if (watch.rate_hz > 0 && watch.every > 0) {
 		return cli_fail(cli, EXIT_CODE_USAGE, "--rate and --every exclude each other");
 	}
-	watch.is_live = watch.is_plot && screen_is_terminal();
+	watch.is_table = screen_is_terminal() && !watch.is_plot && !watch.is_json &&
+			 watch.every == 0 && watch.rate_hz <= 0 && watch.count == 0;
+	watch.every = watch.every == 0 ? 1 : watch.every;
+	watch.is_live = watch.is_table || (watch.is_plot && screen_is_terminal());
 	return begin(&watch);
 }

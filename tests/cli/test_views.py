@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 import re
+import signal
 from collections.abc import Callable, Iterator
 
 import pytest
-from ecdaq import BUILD, OK, USAGE, Fake, fails, works
+from ecdaq import BUILD, OK, Fake, works
 from terminal import ENTER, Terminal, screens
 
 UP, DOWN, PAGE_DOWN, END = "\x1b[A", "\x1b[B", "\x1b[6~", "\x1b[F"
@@ -121,7 +122,6 @@ def test_a_bad_slave_is_on_top_and_s_changes_the_order(many: Fake, terminal: Ter
         terminal.press("s")
         screen_with(terminal, lambda s, wanted=wanted: slaves_of(s)[:3] == wanted)
     leave(terminal)
-    fails(many("top", "--sort", "size"), USAGE, "--sort: size: expected trouble, position")
 
 
 def test_a_new_size_is_used_at_once(many: Fake, terminal: Terminal) -> None:
@@ -187,3 +187,71 @@ def test_a_histogram_fits(daemon: Fake, terminal: Terminal, columns: int) -> Non
     terminal.start(daemon, "histogram", "wake")
     assert terminal.end() == (OK, "")
     assert max(len(line) for line in terminal.text.replace("\r", "").split("\n")) <= columns
+
+
+@pytest.mark.parametrize("columns", WIDTHS)
+def test_events_fit_and_are_coloured(daemon: Fake, terminal: Terminal, columns: int) -> None:
+    terminal.resize(24, columns)
+    terminal.start(daemon, "events", "--all")
+    assert terminal.end() == (OK, "")
+    assert "\x1b[1;31merror" in terminal.text
+    lines = COLOUR.sub("", terminal.text).replace("\r", "").split("\n")
+    assert max(len(line) for line in lines) <= columns
+    joined = " ".join(" ".join(lines).split())
+    assert "slave 1 piccolo1: lost" in joined and "started: 2 slaves, period 1000000 ns" in joined
+
+
+def values_of(screen: list[str]) -> dict[str, list[str]]:
+    rows = [line.split() for line in screen if re.match(r"[\w~]+[.~]", line)]
+    return {row[0]: row[1:] for row in rows}
+
+
+@pytest.mark.parametrize("columns", WIDTHS)
+def test_watch_on_a_terminal_is_a_table_of_values_in_place(
+    daemon: Fake, terminal: Terminal, columns: int
+) -> None:
+    terminal.resize(24, columns)
+    terminal.start(daemon, "watch", "piccolo0.adc", "piccolo1.*")
+    terminal.wait_for(r"(?s)(\x1b\[H.*){6}")
+    shown = screens(terminal.text)[:5]
+    leave(terminal)
+    for screen in shown:
+        fits(screen, 24, columns)
+        assert screen[0].startswith("cycle ")
+        assert screen[1].split() == ["channel", "value", "unit", "age"]
+        assert [line[:8] for line in screen[2:-1]] == ["piccolo0"] + 6 * ["piccolo1"]
+    values = [values_of(screen) for screen in shown]
+    first = values[0]["piccolo0.adc"]
+    assert 0.4 < float(first[0]) < 1.6 and first[1] == "V" and first[2] in ("good", "BAD")
+    assert re.match(r"\d+\.\d$", first[3]) and first[4] == "s"
+    assert any(len(row[0]) == 18 for row in values[0].values())  # sample_time, whole
+    assert len({one["piccolo1.counter"][0] for one in values}) > 1
+    assert len({screen[2].index("V") for screen in shown}) == 1
+
+
+def test_many_values_scroll_and_bad_ones_come_first(many: Fake, terminal: Terminal) -> None:
+    terminal.resize(24, 60)
+    terminal.start(many, "watch", "*")
+    first = screen_with(terminal, lambda s: "384 channels" in s[-1])
+    assert len(first) == 24 and next(iter(values_of(first))) == "piccolo0.led"
+    terminal.press(END)
+    screen_with(terminal, lambda s: "piccolo63.status" in values_of(s))
+    terminal.press("gs")
+    screen_with(terminal, lambda s: "bad first" in s[-1])
+    # Each 64th cycle of the fake ecdaqd is lost, with all of its values.
+    bad = screen_with(terminal, lambda s: "lost" in s[0])
+    assert {row[-3] for row in values_of(bad).values()} == {"BAD"}
+    leave(terminal)
+
+
+@pytest.mark.parametrize("option", ["--count=3", "--every=1", "--rate=100", "--json"])
+def test_watch_prints_lines_on_a_terminal_if_told_which(
+    daemon: Fake, terminal: Terminal, option: str
+) -> None:
+    terminal.start(daemon, "watch", "piccolo0.adc", option)
+    terminal.wait_for(r"(?s)(\n.*){3}")
+    if option != "--count=3":
+        assert terminal.process is not None
+        terminal.process.send_signal(signal.SIGINT)
+    code, _ = terminal.end()
+    assert code == OK and ENTER not in terminal.text
