@@ -16,6 +16,7 @@
 #include "cli/lines.h"
 #include "cli/plot.h"
 #include "cli/screen.h"
+#include "cli/text.h"
 #include "cli/value_table.h"
 #include "image/image.h"
 #include "program/args_duration.h"
@@ -32,6 +33,8 @@ struct watch {
 	struct choice choice;
 	struct plot *plot; /* NULL: lines */
 	const char *titles[CHOOSE_LIMIT];
+	const char *units[CHOOSE_LIMIT];
+	int is_paused;
 	struct value_table table;
 	unsigned sort; /* enum value_table_sort */
 	struct screen_scroll scroll;
@@ -117,10 +120,41 @@ static void add_to_plot(struct watch *watch, const struct sample_header *header)
 	}
 }
 
+/* "   dt 12.5 ms (80 Hz)" with cursors, else nothing. */
+static void format_cursors(const struct watch *watch, char *buf, size_t buf_len)
+{
+	char dt[TEXT_BYTES];
+	int64_t ns = plot_cursors_ns(watch->plot);
+
+	buf[0] = '\0';
+	if (plot_cursors_are_on(watch->plot) && ns != 0) {
+		snprintf(buf, buf_len, "   dt %s (%.4g Hz)", text_ns(ns, dt),
+			 1e9 / fabs((double)ns));
+	} else if (plot_cursors_are_on(watch->plot)) {
+		snprintf(buf, buf_len, "   dt 0");
+	}
+}
+
+static void format_footer(const struct watch *watch, int columns, char *buf, size_t buf_len)
+{
+	char cursors[64];
+	char counts[64];
+	int used;
+
+	format_cursors(watch, cursors, sizeof(cursors));
+	used = snprintf(buf, buf_len, "q: leave   ?: keys   %s%s",
+			watch->is_paused ? "PAUSED" : "space: pause", cursors);
+	if (snprintf(counts, sizeof(counts), "   cycle %" PRIu64 "   missed %" PRIu64,
+		     watch->next_cycle == 0 ? 0 : watch->next_cycle - 1,
+		     watch->missed) <= columns - used) {
+		snprintf(buf + used, buf_len - (size_t)used, "%s", counts);
+	}
+}
+
 static void draw(struct watch *watch)
 {
 	struct screen_size size = screen_size();
-	char footer[128];
+	char footer[256];
 	char *text = NULL;
 	size_t len = 0;
 	FILE *out;
@@ -133,12 +167,19 @@ static void draw(struct watch *watch)
 	if (out == NULL) {
 		return;
 	}
+	plot_resize(watch->plot, size.columns);
 	plot_write(watch->plot, size.rows - 1, out);
-	snprintf(footer, sizeof(footer), "q: leave   cycle %" PRIu64 "   missed %" PRIu64,
-		 watch->next_cycle - 1, watch->missed);
+	format_footer(watch, size.columns, footer, sizeof(footer));
 	if (fclose(out) == 0) {
 		screen_draw(&(struct screen_frame){
-			.head = text, .body = "", .footer = footer, .keys = "" });
+			.head = text,
+			.body = "",
+			.footer = footer,
+			.keys = "  space            pause, continue\n"
+				"  c                cursors A and B, their distance; off\n"
+				"  Tab              move the other cursor\n"
+				"  left, right      move it by a dot; < and >: by 10\n",
+		});
 	}
 	free(text);
 	watch->drawn_ns = now_ns();
@@ -195,12 +236,55 @@ static void draw_table(struct watch *watch)
 	watch->drawn_ns = now_ns();
 }
 
+/* A live plot starts with the samples of its window that are in the ring, also after a pause. */
+static void seek_back(struct watch *watch)
+{
+	struct reader *reader = watch->follow.samples.reader;
+	uint64_t period_ns = watch->follow.samples.meta->period_ns;
+	uint64_t back = period_ns == 0 ? 0 : (uint64_t)watch->window_ns / period_ns;
+	uint64_t newest = reader_newest(reader);
+	uint64_t oldest = reader_oldest(reader);
+
+	reader_seek(reader, newest - oldest < back ? oldest : newest - back);
+	watch->next_cycle = 0;
+}
+
+static void take_plot_key(struct watch *watch, int key)
+{
+	switch (key) {
+	case ' ':
+		watch->is_paused = !watch->is_paused;
+		if (!watch->is_paused) {
+			seek_back(watch);
+		}
+		break;
+	case 'c':
+		plot_cursors_toggle(watch->plot);
+		break;
+	case '\t':
+		plot_cursors_switch(watch->plot);
+		break;
+	case SCREEN_KEY_LEFT:
+	case SCREEN_KEY_RIGHT:
+		plot_cursors_move(watch->plot, key == SCREEN_KEY_LEFT ? -1 : 1);
+		break;
+	case '<':
+	case '>':
+		plot_cursors_move(watch->plot, key == '<' ? -10 : 10);
+		break;
+	default:
+		break;
+	}
+}
+
 static void take_key(struct watch *watch, int key)
 {
-	if (!watch->is_table || key == SCREEN_KEY_NONE) {
+	if (!watch->is_live || key == SCREEN_KEY_NONE) {
 		return;
 	}
-	if (key == 's') {
+	if (watch->is_plot) {
+		take_plot_key(watch, key);
+	} else if (key == 's') {
 		watch->sort = (watch->sort + 1) % VALUE_TABLE_SORT_COUNT;
 	} else {
 		screen_scroll_key(&watch->scroll, key);
@@ -226,13 +310,11 @@ static enum exit_code begin_plot(struct watch *watch)
 	struct plot_spec spec = {
 		.panels = watch->choice.count,
 		.titles = watch->titles,
+		.units = watch->units,
 		.window_ns = watch->window_ns,
 		.columns = screen_size().columns,
 		.style = screen_is_utf8() ? PLOT_BRAILLE : PLOT_ASCII,
 	};
-	struct reader *reader = watch->follow.samples.reader;
-	uint64_t period_ns = watch->follow.samples.meta->period_ns;
-	uint64_t back = period_ns == 0 ? 0 : (uint64_t)watch->window_ns / period_ns;
 
 	if (watch->choice.count > PANELS_LIMIT) {
 		return cli_fail(watch->cli, EXIT_CODE_FAILED, "--plot: more than %d channels",
@@ -240,18 +322,15 @@ static enum exit_code begin_plot(struct watch *watch)
 	}
 	for (unsigned i = 0; i < watch->choice.count; i++) {
 		watch->titles[i] = chosen(watch, i)->name;
+		watch->units[i] = watch->is_raw ? "" : chosen(watch, i)->unit;
 	}
 	plot_destroy(watch->plot);
 	watch->plot = plot_create(&spec);
 	if (watch->plot == NULL) {
 		return cli_fail(watch->cli, EXIT_CODE_FAILED, "out of memory");
 	}
-	/* A live plot starts with the samples that are in the ring. */
 	if (watch->is_live) {
-		uint64_t newest = reader_newest(reader);
-		uint64_t oldest = reader_oldest(reader);
-
-		reader_seek(reader, newest - oldest < back ? oldest : newest - back);
+		seek_back(watch);
 		watch->follow.idle_ns = 20 * NS_PER_MS;
 	}
 	return EXIT_CODE_OK;
@@ -338,14 +417,29 @@ static enum exit_code ended(const struct watch *watch)
 	return EXIT_CODE_OK;
 }
 
+/* Paused: the same values, at any size and with cursors. */
+static void watch_picture(struct watch *watch)
+{
+	take_key(watch, screen_wait(DRAW_PERIOD_NS));
+	draw(watch);
+}
+
 static enum exit_code run(struct watch *watch)
 {
 	uint64_t lost = 0;
 	enum exit_code result;
 
 	while (watch->count == 0 || watch->shown < watch->count) {
-		enum follow_result next = follow_next(&watch->follow, &lost);
+		enum follow_result next;
 
+		if (watch->is_paused) {
+			watch_picture(watch);
+			if (screen_is_over()) {
+				return EXIT_CODE_OK;
+			}
+			continue;
+		}
+		next = follow_next(&watch->follow, &lost);
 		take_key(watch, watch->follow.key);
 		switch (next) {
 		case FOLLOW_SAMPLE:

@@ -255,3 +255,45 @@ def test_watch_prints_lines_on_a_terminal_if_told_which(
         terminal.process.send_signal(signal.SIGINT)
     code, _ = terminal.end()
     assert code == OK and ENTER not in terminal.text
+
+
+@pytest.mark.parametrize("columns", WIDTHS)
+def test_a_plot_fits_and_has_units_and_round_ticks(
+    daemon: Fake, terminal: Terminal, columns: int
+) -> None:
+    terminal.resize(24, columns)
+    terminal.start(daemon, "watch", "--plot", "piccolo0.adc", "piccolo1.adc", "--window", "1s")
+    terminal.wait_for(r"(?s)(\x1b\[H.*){4}")
+    screen = screens(terminal.text)[2]
+    leave(terminal)
+    fits(screen, 24, columns)
+    assert re.match(r"piccolo0\.adc   now \S+ V   min 0\.(49|50)\d*   max 1\.(49|5)\d*$", screen[0])
+    labels = [float(line.split("|")[0]) for line in screen[1:10] if line.split("|")[0].strip()]
+    assert max(labels) in (1.5, 2.0) and {label * 2 % 1 for label in labels} == {0.0}
+    assert re.search(r"-0\.5 s.*now$", screen[-2])
+
+
+def test_a_paused_plot_stays_at_any_size_and_cursors_measure_it(
+    daemon: Fake, terminal: Terminal
+) -> None:
+    terminal.resize(24, 80)
+    terminal.start(daemon, "watch", "--plot", "piccolo0.adc", "--window", "1s")
+    screen_with(terminal, lambda s: "now " in s[0])
+    terminal.press(" ")
+    paused = screen_with(terminal, lambda s: "PAUSED" in s[-1])
+    terminal.resize(24, 120)
+    wide = screen_with(terminal, lambda s: max(map(len, s)) > 100)
+    assert wide[0] == paused[0]
+    terminal.resize(24, 80)
+    assert screen_with(terminal, lambda s: max(map(len, s)) <= 80) == paused
+    terminal.press("c")
+    on = screen_with(terminal, lambda s: "dy " in s[0])
+    assert re.match(r"piccolo0\.adc   A \S+   B \S+   dy \S+ V$", on[0])
+    assert re.search(r"dt 33\d\.?\d* ms \((2\.9|3\.0)\d* Hz\)", on[-1]) and "A" in on[-3]
+    # B from a third of the window to its right end.
+    terminal.press("\t" + 20 * "\x1b[C")
+    moved = screen_with(terminal, lambda s: on[-3].index("B") < s[-3].find("B"))
+    assert moved[0] != on[0]
+    terminal.press("c ")
+    screen_with(terminal, lambda s: "PAUSED" not in s[-1] and "now " in s[0] and s[0] != paused[0])
+    leave(terminal)

@@ -63,18 +63,17 @@ TEST(plot, ramp_goes_from_the_lower_left_to_the_upper_right)
 	struct plot *plot = make(1, PLOT_ASCII);
 
 	for (int i = 0; i < 40; i++) {
-		plot_add(plot, 0, i * NS_PER_MS, i);
+		plot_add(plot, 0, i * NS_PER_MS + NS_PER_MS / 2, i);
 	}
 	CHECK_EQ(lines_of(plot, 13, lines), 13);
 	CHECK_STR(lines[0], "first   now 39   min 0   max 39");
-	CHECK(strncmp(lines[1], "        39|", 11) == 0);
+	CHECK(strncmp(lines[1], "        40|", 11) == 0);
 	CHECK(strncmp(lines[10], "         0|", 11) == 0);
 	CHECK_EQ(lines[1][11 + 39], '*');
 	CHECK_EQ(lines[1][11], ' ');
 	CHECK_EQ(lines[10][11], '*');
 	CHECK_EQ(lines[10][11 + 39], ' ');
-	CHECK(strstr(lines[12], "-0.04 s") != NULL);
-	CHECK(strstr(lines[12], "-0.02 s") != NULL);
+	CHECK(strstr(lines[12], "-20 ms") != NULL);
 	CHECK(strstr(lines[12], "now") != NULL);
 	plot_destroy(plot);
 }
@@ -190,5 +189,95 @@ TEST(plot, extreme_values_do_no_harm)
 	plot_add(plot, 0, INT64_MAX, -1.7e308);
 	plot_add(plot, 0, -5, 1);
 	CHECK(lines_of(plot, -3, lines) > 0);
+	plot_destroy(plot);
+}
+
+TEST(plot, ticks_are_round_and_where_their_values_are)
+{
+	struct plot *plot = make(1, PLOT_ASCII);
+
+	for (int i = 0; i < 40; i++) {
+		plot_add(plot, 0, i * NS_PER_MS + NS_PER_MS / 2, i % 2 == 0 ? 0.49963 : 1.4997);
+	}
+	CHECK_EQ(lines_of(plot, 13, lines), 13);
+	CHECK(strncmp(lines[1], "       1.5|", 11) == 0);
+	CHECK(strncmp(lines[10], "       0.0|", 11) == 0);
+	for (int row = 1; row <= 10; row++) {
+		char *end;
+		double value = strtod(lines[row], &end);
+
+		/* A label is a multiple of a half, or there is none. */
+		CHECK(*end == '|' || end == lines[row]);
+		CHECK(end == lines[row] || fabs(value * 2 - round(value * 2)) < 1e-9);
+	}
+	plot_destroy(plot);
+}
+
+TEST(plot, units_are_beside_the_values)
+{
+	static const char *const titles[] = { "volts" };
+	static const char *const units[] = { "V" };
+	struct plot_spec spec = {
+		.panels = 1,
+		.titles = titles,
+		.units = units,
+		.window_ns = 40 * NS_PER_MS,
+		.columns = 52,
+		.style = PLOT_ASCII,
+	};
+	struct plot *plot = plot_create(&spec);
+
+	CHECK(plot != NULL);
+	plot_add(plot, 0, 0, 1.25);
+	lines_of(plot, 13, lines);
+	CHECK_STR(lines[0], "volts   now 1.25 V   min 1.25   max 1.25");
+	plot_destroy(plot);
+}
+
+TEST(plot, another_width_shows_the_same_values)
+{
+	struct plot *plot = make(1, PLOT_ASCII);
+
+	for (int i = 0; i < 4000; i++) {
+		plot_add(plot, 0, i * NS_PER_US * 10, i == 2005 ? 100 : 0);
+	}
+	plot_resize(plot, 92); /* 80 dots */
+	CHECK_EQ(lines_of(plot, 13, lines), 13);
+	CHECK_STR(lines[0], "first   now 0   min 0   max 100");
+	CHECK_EQ(lines[1][11 + 40], '*');
+	CHECK_EQ(lines[1][11 + 39], ' ');
+	for (int row = 0; row < 13; row++) {
+		CHECK(strlen(lines[row]) <= 92);
+	}
+	plot_resize(plot, 32); /* 20 dots */
+	lines_of(plot, 13, lines);
+	CHECK_EQ(lines[1][11 + 10], '*');
+	plot_destroy(plot);
+}
+
+TEST(plot, cursors_give_both_values_and_the_distance)
+{
+	struct plot *plot = make(1, PLOT_ASCII);
+
+	for (int i = 0; i < 40; i++) {
+		plot_add(plot, 0, i * NS_PER_MS + NS_PER_MS / 2, i);
+	}
+	CHECK(!plot_cursors_are_on(plot));
+	plot_cursors_toggle(plot);
+	plot_cursors_move(plot, -1000); /* A: to the left edge */
+	plot_cursors_switch(plot);
+	plot_cursors_move(plot, 1000); /* B: to the right edge */
+	lines_of(plot, 13, lines);
+	CHECK_STR(lines[0], "first   A 0   B 39   dy 39");
+	CHECK_EQ(lines[11][11], 'A');
+	CHECK_EQ(lines[11][11 + 39], 'B');
+	CHECK(llabs(plot_cursors_ns(plot) - 39 * NS_PER_MS) < NS_PER_MS / 10);
+	plot_cursors_move(plot, -10);
+	lines_of(plot, 13, lines);
+	CHECK_STR(lines[0], "first   A 0   B 29   dy 29");
+	CHECK(llabs(plot_cursors_ns(plot) - 29 * NS_PER_MS) < NS_PER_MS / 10);
+	/* Their distance is a time: it is the same at any width. */
+	plot_resize(plot, 92);
+	CHECK(llabs(plot_cursors_ns(plot) - 29 * NS_PER_MS) < NS_PER_MS / 10);
 	plot_destroy(plot);
 }
