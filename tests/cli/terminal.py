@@ -13,7 +13,7 @@ import struct
 import subprocess
 import termios
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from ecdaq import ECDAQ, ROOT, Fake, environment
@@ -51,6 +51,16 @@ class Terminal:
             stdout=self.slave,
             stderr=subprocess.PIPE,
             cwd=cwd,
+        )
+
+    def start_on(self, words: Sequence[str | Path]) -> None:
+        """ecdaq without an ecdaqd, its standard error on the terminal, too."""
+        self.process = subprocess.Popen(
+            [ECDAQ, *words],
+            env=environment(None, LANG="C.UTF-8"),
+            stdin=self.slave,
+            stdout=self.slave,
+            stderr=self.slave,
         )
 
     def start_shell(self, run_dir: Path, **more: str) -> None:

@@ -9,6 +9,7 @@
 #include "base/args.h"
 #include "config/config.h"
 #include "program/error.h"
+#include "program/progress.h"
 #include "record/log_common.h"
 
 struct arguments {
@@ -18,6 +19,7 @@ struct arguments {
 	const char *output;
 	struct log_export_options export;
 	int is_json;
+	int is_progress;
 };
 
 /* Options that a command takes. */
@@ -28,7 +30,7 @@ enum {
 	TAKES_EXPORT = 1 << 2,
 };
 
-enum { OPTIONS = 9 };
+enum { OPTIONS = 10 };
 
 static const char program[] = "ecdaq: log";
 
@@ -58,6 +60,8 @@ static void help(FILE *out)
 	      "  --raw            raw values (default: physical, raw * scale + offset)\n"
 	      "  --output FILE    file to write (export: default is standard output)\n"
 	      "  --json           JSON (export: one object per line)\n"
+	      "  --progress       check, export: progress also where standard error is no "
+	      "terminal\n"
 	      "\n",
 	      out);
 	exit_code_help(out, EXIT_CODE_COMMON | EXIT_CODE_BIT(CONFIG));
@@ -80,6 +84,7 @@ static size_t select_options(unsigned takes, struct arguments *a, struct args_op
 		{ TAKES_ALL, { "config", 0, args_text, &a->config_path, "FILE", NULL } },
 		{ TAKES_ALL, { "run-dir", 0, args_text, &a->run_dir, "DIR", NULL } },
 		{ TAKES_ALL, { "json", 0, args_flag, &a->is_json, NULL, NULL } },
+		{ TAKES_ALL, { "progress", 0, args_flag, &a->is_progress, NULL, NULL } },
 		{ TAKES_DIR, { "dir", 0, args_text, &a->dir, "DIR", NULL } },
 		{ TAKES_OUTPUT, { "output", 0, args_text, &a->output, "FILE", NULL } },
 		{ TAKES_EXPORT, { "channels", 0, args_text, &a->export.channels, "LIST", NULL } },
@@ -190,6 +195,7 @@ static int run_export(const struct arguments *a, char **operands, int count)
 	options.paths = count > 0 ? (const char *const *)operands : paths;
 	options.path_count = count > 0 ? (size_t)count : 1;
 	options.format = format_of(a);
+	options.output = a->output;
 	if (a->output != NULL) {
 		out = fopen(a->output, "we");
 		if (out == NULL) {
@@ -233,6 +239,9 @@ static int run_command(const struct command *command, struct arguments *a, const
 	}
 	if (a->export.from > a->export.to) {
 		return usage("--from: is after --to");
+	}
+	if (a->is_progress) {
+		progress_always();
 	}
 	return command->run(a, args.operands, args.operand_count);
 }

@@ -35,6 +35,7 @@ int log_recover(const char *path, const char *output, enum log_format format, FI
 struct log_export_options {
 	const char *const *paths;
 	size_t path_count;
+	const char *output;   /* name of the file that is written; NULL: none */
 	const char *channels; /* names, separated by commas; NULL: all */
 	uint64_t from;        /* cycles, both included */
 	uint64_t to;

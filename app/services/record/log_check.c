@@ -9,6 +9,7 @@
 
 #include "program/exit_code.h"
 #include "program/json.h"
+#include "program/progress.h"
 #include "record/log.h"
 #include "record/log_common.h"
 #include "record/store.h"
@@ -62,6 +63,7 @@ static void read_file(struct checked *c)
 	if (c->error < 0) {
 		return;
 	}
+	log_file_watch(&file, c->path);
 	c->error = mcap_scan_create(&file.source, &visitor, &scan);
 	if (c->error == 0) {
 		c->found = *mcap_scan_findings(scan);
@@ -293,6 +295,7 @@ static int put_result(const struct check *ck, enum log_format format, FILE *out,
 int log_check(const char *const *paths, size_t count, enum log_format format, FILE *out, FILE *err)
 {
 	struct check ck = { .count = 0 };
+	int64_t start_ns = progress_now_ns();
 	int result = EXIT_CODE_OK;
 
 	for (size_t i = 0; i < count && result == EXIT_CODE_OK; i++) {
@@ -310,6 +313,7 @@ int log_check(const char *const *paths, size_t count, enum log_format format, FI
 			qsort(ck.file, ck.count, sizeof(ck.file[0]), by_sequence);
 		}
 		result = put_result(&ck, format, out, err);
+		progress_done(start_ns, "%zu files checked", ck.count);
 		if (log_finish_output(out, err) != EXIT_CODE_OK) {
 			result = EXIT_CODE_FAILED;
 		}

@@ -18,11 +18,14 @@ int log_fail_errno(FILE *err, const char *what, int error);
 struct log_file {
 	int fd;
 	struct mcap_source source;
+	struct mcap_source plain; /* below source, with log_file_watch() */
 };
 
 /** 0 or -errno. @file stays where it is until log_file_close(). */
 int log_file_open(const char *path, struct log_file *file);
 void log_file_close(struct log_file *file);
+/** Show how far the reading of @file is (program/progress.h) until it is closed. */
+void log_file_watch(struct log_file *file, const char *path);
 
 /** "X.part" to "X.mcap", in place. 1, or 0 if @path is not a .part. */
 int log_part_to_final(char *path);

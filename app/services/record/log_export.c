@@ -8,6 +8,7 @@
 #include <sys/stat.h>
 
 #include "program/exit_code.h"
+#include "program/progress.h"
 #include "record/columns.h"
 #include "record/log.h"
 #include "record/log_common.h"
@@ -124,6 +125,7 @@ static int export_file(struct export *ex, const char *path)
 	if (r < 0) {
 		return log_fail_errno(ex->err, path, r);
 	}
+	log_file_watch(&file, path);
 	r = mcap_reader_create(&file.source, &reader);
 	if (r < 0) {
 		log_file_close(&file);
@@ -165,7 +167,9 @@ static int export_directory(struct export *ex, const char *dir)
 int log_export(const struct log_export_options *options, FILE *out, FILE *err)
 {
 	struct export ex = { .options = options, .out = out, .err = err };
+	int64_t start_ns = progress_now_ns();
 	int result = EXIT_CODE_OK;
+	off_t bytes;
 
 	for (size_t i = 0; i < options->path_count && !ex.is_hopeless; i++) {
 		const char *path = options->paths[i];
@@ -181,5 +185,15 @@ int log_export(const struct log_export_options *options, FILE *out, FILE *err)
 				  "there is no such cycle");
 	}
 	columns_destroy(ex.first);
-	return log_finish_output(out, err) != EXIT_CODE_OK ? EXIT_CODE_FAILED : result;
+	if (log_finish_output(out, err) != EXIT_CODE_OK) {
+		return EXIT_CODE_FAILED;
+	}
+	bytes = ftello(out); /* -1: a pipe */
+	if (bytes >= 0 && options->output != NULL) {
+		progress_done(start_ns, "%s: %" PRIu64 " rows, %.1f MiB", options->output, ex.rows,
+			      (double)bytes / (1024.0 * 1024.0));
+	} else {
+		progress_done(start_ns, "%" PRIu64 " rows", ex.rows);
+	}
+	return result;
 }
