@@ -37,6 +37,28 @@ void value_table_take(struct value_table *table)
 	}
 }
 
+static uint64_t raw_of(const struct value_table *table, unsigned i)
+{
+	return image_get_raw(samples_image(table->samples), chosen(table, i));
+}
+
+enum value_state { STATE_GOOD, STATE_OUTSIDE, STATE_BAD };
+
+static const char *const state_name[] = { [STATE_GOOD] = "good",
+					  [STATE_OUTSIDE] = "out",
+					  [STATE_BAD] = "BAD" };
+
+static enum value_state state_of(const struct value_table *table, unsigned i)
+{
+	const struct channel *ch = chosen(table, i);
+
+	if (table->is_bad[i]) {
+		return STATE_BAD;
+	}
+	return image_is_outside(ch, image_raw_to_physical(ch, raw_of(table, i))) ? STATE_OUTSIDE
+										 : STATE_GOOD;
+}
+
 static int name_columns(const struct value_table *table, int columns)
 {
 	int longest = (int)strlen("channel");
@@ -52,7 +74,7 @@ static int name_columns(const struct value_table *table, int columns)
 
 struct place {
 	const char *name; /* NULL: as given */
-	int is_bad;
+	enum value_state state;
 	unsigned i;
 };
 
@@ -61,8 +83,8 @@ static int compare_places(const void *a, const void *b)
 	const struct place *x = a;
 	const struct place *y = b;
 
-	if (x->is_bad != y->is_bad) {
-		return y->is_bad - x->is_bad;
+	if (x->state != y->state) {
+		return (int)y->state - (int)x->state;
 	}
 	if (x->name != NULL && strcmp(x->name, y->name) != 0) {
 		return strcmp(x->name, y->name);
@@ -76,7 +98,7 @@ static void order_of(const struct value_table *table, enum value_table_sort sort
 	for (unsigned i = 0; i < table->choice->count; i++) {
 		order[i] = (struct place){
 			.name = sort == VALUE_TABLE_BY_NAME ? chosen(table, i)->name : NULL,
-			.is_bad = sort == VALUE_TABLE_BAD_FIRST && table->is_bad[i],
+			.state = sort == VALUE_TABLE_BAD_FIRST ? state_of(table, i) : STATE_GOOD,
 			.i = i,
 		};
 	}
@@ -87,7 +109,8 @@ static void write_row(const struct value_table *table, unsigned i, int name_widt
 		      FILE *out)
 {
 	const struct channel *ch = chosen(table, i);
-	uint64_t raw = image_get_raw(samples_image(table->samples), ch);
+	enum value_state state = state_of(table, i);
+	uint64_t raw = raw_of(table, i);
 	const char *unit = table->is_raw ? "" : ch->unit;
 	size_t unit_len = fit_cut(unit, strlen(unit), UNIT_COLUMNS);
 	char unit_text[sizeof(ch->unit) + 1];
@@ -110,8 +133,8 @@ static void write_row(const struct value_table *table, unsigned i, int name_widt
 		fit_name(ch->name, name_width, name, sizeof(name)), VALUE_COLUMNS,
 		fit_name(value, VALUE_COLUMNS, short_value, sizeof(short_value)), unit_text,
 		UNIT_COLUMNS - fit_width(unit_text), "",
-		screen_colour(table->is_bad[i] ? SCREEN_BAD : SCREEN_GOOD), STATE_COLUMNS,
-		table->is_bad[i] ? "BAD" : "good", screen_colour(SCREEN_PLAIN), AGE_COLUMNS, age);
+		screen_colour(state == STATE_GOOD ? SCREEN_GOOD : SCREEN_BAD), STATE_COLUMNS,
+		state_name[state], screen_colour(SCREEN_PLAIN), AGE_COLUMNS, age);
 }
 
 void value_table_write_heading(const struct value_table *table, int columns, FILE *out)
