@@ -44,6 +44,7 @@ struct fake {
 	int has_branches;    /* of five slaves, at ports 3 and 1 of the first */
 	uint64_t page_faults;
 	long beyond;       /* slaves that ecdaq-sync0 has no line for; -1: it does not run */
+	double adc_max;    /* plausible range of the first adc from 0 to here; 0: it has none */
 	unsigned control;  /* calls of a control program; 0: there is none */
 	uint32_t degraded; /* bit per enum event_rt */
 	struct meta meta;

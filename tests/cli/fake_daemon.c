@@ -7,7 +7,7 @@
  *
  * usage: test_fake_daemon RUN_DIR [SPEED=N] [JUMP=1] [RECORDER=0]
  * [ADMIN=mute|garbage|none|differs|half] [MODE=octal] [SLAVES=N] [BRANCHES=1] [BITS=1] [NOISY=1]
- * [ALIAS=N] [FAULTS=N] [BEYOND=N]
+ * [ALIAS=N] [FAULTS=N] [BEYOND=N] [ADC_MAX=V]
  * [DEGRADED=BITS] JUMP: every hundredth cycle number is followed by a gap of five. Each 64th frame
  * is lost. The admin socket: piccolo1.led belongs to the control program; objects 0x1018:1,
  * 0x1008:0, 0x8000:2 exist, 0x8000:1 cannot be written now; a one-shot time must be in the future.
@@ -132,6 +132,8 @@ static void parse(struct fake *f, int argc, char **argv)
 			f->is_noisy = value[0] == '1';
 		} else if (strcmp(argv[i], "BEYOND") == 0) {
 			f->beyond = strtol(value, NULL, 10);
+		} else if (strcmp(argv[i], "ADC_MAX") == 0) {
+			f->adc_max = strtod(value, NULL);
 		} else if (strcmp(argv[i], "FAULTS") == 0) {
 			f->page_faults = strtoull(value, NULL, 10);
 		} else if (strcmp(argv[i], "CONTROL") == 0) {

@@ -53,6 +53,7 @@ static void describe_more(struct fake *f)
 {
 	struct channel *adc = &f->meta.channel[2];
 
+	adc->max = f->adc_max;
 	if (f->has_bits) {
 		make_bits(f->meta.channel);
 	}

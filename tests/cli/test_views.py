@@ -229,6 +229,26 @@ def test_watch_on_a_terminal_is_a_table_of_values_in_place(
     assert len({screen[2].index("V") for screen in shown}) == 1
 
 
+def test_a_value_outside_of_its_plausible_range_is_marked_and_comes_first(
+    fake: Callable[..., Fake], terminal: Terminal
+) -> None:
+    """The simulated voltage goes from 0.5 V to 1.5 V; the others have no range."""
+    terminal.start(fake("SPEED=10", "ADC_MAX=1"), "watch", "piccolo1.adc", "piccolo0.adc")
+    terminal.press("s")
+
+    def is_outside(screen: list[str]) -> bool:
+        return values_of(screen).get("piccolo0.adc", [""] * 3)[-3] == "out"
+
+    found = values_of(screen_with(terminal, lambda s: "bad first" in s[-1] and is_outside(s)))
+    assert list(found) == ["piccolo0.adc", "piccolo1.adc"]
+    assert float(found["piccolo0.adc"][0]) > 1 and found["piccolo1.adc"][-3] == "good"
+    inside = values_of(
+        screen_with(terminal, lambda s: not is_outside(s) and len(values_of(s)) == 2)
+    )
+    assert inside["piccolo0.adc"][-3] == "BAD" or float(inside["piccolo0.adc"][0]) <= 1
+    leave(terminal)
+
+
 def test_many_values_scroll_and_bad_ones_come_first(many: Fake, terminal: Terminal) -> None:
     terminal.resize(24, 60)
     terminal.start(many, "watch", "*")
