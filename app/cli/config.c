@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* ecdaq config show, ecdaq config check, ecdaq config diff */
+/* ecdaq config show, check, diff, schema */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,6 +11,7 @@
 #include "cli/admin_client.h"
 #include "cli/cli.h"
 #include "cli/config_file.h"
+#include "cli/schema.h"
 #include "cli/text.h"
 #include "config/effective.h"
 #include "program/json.h"
@@ -437,23 +438,31 @@ static enum exit_code compare(struct config_command *cmd)
 
 /* --- all --- */
 
+static enum exit_code write_schema(struct config_command *cmd)
+{
+	json_init(&cmd->js, stdout);
+	schema_write(&cmd->js);
+	return EXIT_CODE_OK;
+}
+
 static enum exit_code run(struct config_command *cmd, const struct args *args)
 {
 	const char *word = args->operands[0];
 	int is_show = strcmp(word, "show") == 0;
+	int is_diff = strcmp(word, "diff") == 0;
 	enum exit_code result;
 
-	if (strcmp(word, "diff") == 0) {
+	if (is_diff || strcmp(word, "schema") == 0) {
 		if (args->operand_count > 1 || cmd->set.count > 0) {
-			return cli_fail(cmd->cli, EXIT_CODE_USAGE,
-					"diff: takes no file and no --set: it compares what ecdaqd "
-					"was started with");
+			return cli_fail(cmd->cli, EXIT_CODE_USAGE, "%s: takes no file and no --set%s",
+					word,
+					is_diff ? ": it compares what ecdaqd was started with" : "");
 		}
-		return compare(cmd);
+		return is_diff ? compare(cmd) : write_schema(cmd);
 	}
 	if (!is_show && strcmp(word, "check") != 0) {
-		return cli_fail(cmd->cli, EXIT_CODE_USAGE, "%s: expected show, check or diff",
-				word);
+		return cli_fail(cmd->cli, EXIT_CODE_USAGE,
+				"%s: expected show, check, diff or schema", word);
 	}
 	result = config_file_find(cmd->cli, args->operand_count > 1 ? args->operands[1] : NULL,
 				  &cmd->set, &cmd->file);

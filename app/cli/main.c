@@ -184,13 +184,14 @@ static const struct verb verbs[] = {
 	  "ecdaq esi /etc/ecdaq/esi\n\n"
 	  "Needs no ecdaqd. A folder: its files *.xml. ecdaqd uses that of bus.esi_dir.\n",
 	  verb_esi },
-	{ "config", "show|check|diff [FILE]",
+	{ "config", "show|check|diff|schema [FILE]",
 	  "The configuration: show it, check a file, compare it with the bus.",
 	  "ecdaq config show                  every option in effect, and where it is from\n"
 	  "ecdaq config check ecdaq.yaml      every problem of a file\n"
 	  "ecdaq config diff                  every difference between what ecdaqd was started "
 	  "with\n"
-	  "                                   and what is on the bus, in any state\n\n"
+	  "                                   and what is on the bus, in any state\n"
+	  "ecdaq config schema                JSON Schema of the file, for editors\n\n"
 	  "Without FILE that of --config, else of the ecdaqd that is running.\n",
 	  verb_config },
 	{ "crc", "[SLAVE...]", "Error counters in the registers of the slaves, port by port.",

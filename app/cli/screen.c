@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "cli/screen.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <poll.h>
 #include <signal.h>
@@ -374,6 +375,7 @@ static void read_typed(void)
 
 static int take_bytes(size_t len, int key)
 {
+	assert(len <= typed_len);
 	typed_len -= len;
 	memmove(typed, typed + len, typed_len);
 	return key;

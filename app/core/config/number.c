@@ -59,6 +59,16 @@ static const struct unit *units_of(const struct option *option)
 	return unit_find(size_units, option->unit) != NULL ? size_units : NULL;
 }
 
+enum number_family number_unit_family(const struct option *option)
+{
+	const struct unit *units = units_of(option);
+
+	if (units == NULL) {
+		return NUMBER_PLAIN;
+	}
+	return units == time_units ? NUMBER_OF_TIME : NUMBER_OF_SIZE;
+}
+
 static int fail_unit(const struct option *option, const char *suffix, char *reason)
 {
 	const struct unit *units = units_of(option);
