@@ -454,9 +454,9 @@ static enum exit_code run(struct config_command *cmd, const struct args *args)
 
 	if (is_diff || strcmp(word, "schema") == 0) {
 		if (args->operand_count > 1 || cmd->set.count > 0) {
-			return cli_fail(cmd->cli, EXIT_CODE_USAGE, "%s: takes no file and no --set%s",
-					word,
-					is_diff ? ": it compares what ecdaqd was started with" : "");
+			return cli_fail(
+				cmd->cli, EXIT_CODE_USAGE, "%s: takes no file and no --set%s", word,
+				is_diff ? ": it compares what ecdaqd was started with" : "");
 		}
 		return is_diff ? compare(cmd) : write_schema(cmd);
 	}

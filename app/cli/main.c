@@ -9,6 +9,7 @@
 
 #include "base/args.h"
 #include "cli/cli.h"
+#include "cli/screen.h"
 #include "cli/selection.h"
 #include "program/exit_code.h"
 
@@ -266,10 +267,13 @@ static const struct verb *find_verb(const char *name)
 	return NULL;
 }
 
-/* What was written must have arrived: a full disk is a failure. */
+/* What was written must have arrived: a full disk is a failure. A write that Ctrl-C interrupted is
+ * none. */
 static enum exit_code finish(const struct cli *cli, enum exit_code result)
 {
-	if ((fflush(stdout) != 0 || ferror(stdout)) && result == EXIT_CODE_OK) {
+	int is_lost = fflush(stdout) != 0 || ferror(stdout);
+
+	if (is_lost && !screen_is_over() && result == EXIT_CODE_OK) {
 		return cli_fail(cli, EXIT_CODE_FAILED, "standard output: %s", strerror(errno));
 	}
 	return result;

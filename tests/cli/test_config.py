@@ -150,7 +150,7 @@ def test_what_is_set_over_the_file_is_checked_too(file: Path) -> None:
     ("words", "message"),
     [
         ([], "missing show|check|diff"),
-        (["print"], "print: expected show, check or diff"),
+        (["print"], "print: expected show, check, diff or schema"),
         (["diff", "a.yaml"], "diff: takes no file and no --set"),
         (["diff", "--set", "cycle.period=1ms"], "diff: takes no file and no --set"),
     ],

@@ -133,8 +133,9 @@ def test_a_new_size_is_used_at_once(many: Fake, terminal: Terminal) -> None:
         terminal.resize(rows, columns)
         # The size before may be drawn once more in between.
         terminal.wait_until(
-            lambda rows=rows: terminal.text.endswith("\x1b[J")
-            and len(screens(terminal.text)[-1]) == rows
+            lambda rows=rows: (
+                terminal.text.endswith("\x1b[J") and len(screens(terminal.text)[-1]) == rows
+            )
         )
         fits(screens(terminal.text)[-1], rows, columns)
     leave(terminal)
