@@ -2,8 +2,8 @@
 /*
  * The one option table (options.c, with the rows in options_*.c): parser, --set, sample file and
  * reference page all come from it. Defaults and bounds are written as in the file ("1ms") and go
- * through the same parser as the file. Private to config/, to the generator of the pages and to cli/schema.c.
- * Context: blocking.
+ * through the same parser as the file. Private to config/, to the generator of the pages and to
+ * cli/schema.c. Context: blocking.
  */
 #ifndef CONFIG_OPTION_H
 #define CONFIG_OPTION_H
