@@ -20,6 +20,7 @@ usage: ./build.sh VERB [OPTION...]
   lint     formatting, static analysis, shell and Python checks
   measure  measure on this machine and write the pages of app/doc/results/
   clean    remove what was built
+  deb      build Debian packages of the programs, for a PC or a board with Debian 12
   image    build the disk image of the SBC, or of the QEMU machine
   boot     boot that image in QEMU
   help     print this, or the options of a verb: ./build.sh help VERB
@@ -70,6 +71,7 @@ the images are built with what time the processors have left:
   sim      the whole master on virtual time; also under ASan+UBSan
   fuzz     every fuzz target: its corpus, then some seconds of search
   recipes  the image's recipes and layers, parsed by BitBake, and their rules
+  deb      the Debian packages: built, and installed, upgraded and removed in a chroot; needs root
   live     everything over a veth pair, in real time
   dds      samples and commands over DDS between two namespaces
   docs     the commands of README and of the tutorials, in a fresh clone
@@ -145,6 +147,11 @@ usage: ./build.sh clean [--all]
 
 Removes build/. With --all also the unpacked SOEM sources and ~/.cache/ecdaq/.
 USAGE
+}
+
+help_deb()
+{
+	"$root/app/tools/deb/build-deb.sh" --help
 }
 
 help_image()
@@ -268,6 +275,13 @@ do_measure()
 	exec "$PYTHON" "$root/app/tools/measure.py" "$@"
 }
 
+do_deb()
+{
+	"$root/app/tools/deb/build-deb.sh" --check "$@"
+	need_packages deb
+	exec "$root/app/tools/deb/build-deb.sh" "$@"
+}
+
 # BitBake's library has an environment of its own: it needs Python, but none of the tests' packages.
 do_image()
 {
@@ -285,11 +299,11 @@ do_boot()
 	exec "$root/app/tools/image/boot.sh" "$@"
 }
 
-verbs="run test build sim fuzz lint measure clean image boot"
+verbs="run test build sim fuzz lint measure clean deb image boot"
 verb=${1:-help}
 [ $# -eq 0 ] || shift
 case $verb in
-build | test | run | sim | fuzz | lint | measure | clean | image | boot)
+build | test | run | sim | fuzz | lint | measure | clean | deb | image | boot)
 	for argument in "$@"; do
 		if [ "$argument" = --help ] && [ "$verb" != sim ]; then
 			"help_$verb"
@@ -300,7 +314,7 @@ build | test | run | sim | fuzz | lint | measure | clean | image | boot)
 	;;
 help | --help | -h)
 	case ${1:-help} in
-	build | test | run | sim | fuzz | lint | measure | clean | image | boot | help) "help_${1:-help}" ;;
+	build | test | run | sim | fuzz | lint | measure | clean | deb | image | boot | help) "help_${1:-help}" ;;
 	*) usage_error "no verb '$1'; there are: $verbs help" ;;
 	esac
 	;;

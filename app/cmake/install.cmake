@@ -16,10 +16,12 @@ add_library(ecdaq_client STATIC ${client_object})
 set_target_properties(ecdaq_client PROPERTIES OUTPUT_NAME ecdaq EXPORT_NAME static LINKER_LANGUAGE C)
 target_link_libraries(ecdaq_client INTERFACE m)
 
+# The number of the binary interface: one more where a program that is linked already would not run any longer.
+set(client_abi 1)
 set(client_symbols ${CMAKE_CURRENT_SOURCE_DIR}/cmake/libecdaq.map)
 add_library(ecdaq_client_shared SHARED ${client_objects})
 set_target_properties(ecdaq_client_shared PROPERTIES OUTPUT_NAME ecdaq EXPORT_NAME ecdaq LINKER_LANGUAGE C
-	VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR} LINK_DEPENDS ${client_symbols})
+	VERSION ${client_abi}.${PROJECT_VERSION} SOVERSION ${client_abi} LINK_DEPENDS ${client_symbols})
 target_link_options(ecdaq_client_shared PRIVATE "-Wl,--version-script=${client_symbols}")
 target_link_libraries(ecdaq_client_shared PRIVATE m)
 

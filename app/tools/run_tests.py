@@ -355,6 +355,7 @@ GROUPS: dict[str, list[Suite]] = {
     ],
     "fuzz": [Suite("fuzz", "fuzz", run_fuzz)],
     "recipes": [pytest("recipes", "release")],
+    "deb": [pytest("deb", "release")],
     "live": [ctest("live", "release"), pytest("live", "release")],
     "dds": [pytest("dds", "release", "-s")],
     "docs": [pytest("docs", "release")],
@@ -391,7 +392,7 @@ GROUPS: dict[str, list[Suite]] = {
 ON_REQUEST = ("control", "sync0", "coverage", "long", "wire")
 # These mostly wait, and run beside the computing ones. The rest measure time: each alone.
 WAITING = ("cli", "docs")
-COMPUTING = ("unit", "tidy", "kit", "replay", "sim", "fuzz", "recipes")
+COMPUTING = ("unit", "tidy", "kit", "replay", "sim", "fuzz", "recipes", "deb")
 
 
 class Builder:

@@ -11,7 +11,20 @@ from pathlib import Path
 import pytest
 from project import ROOT
 
-VERBS = ["run", "test", "build", "sim", "fuzz", "lint", "measure", "clean", "image", "boot", "help"]
+VERBS = [
+    "run",
+    "test",
+    "build",
+    "sim",
+    "fuzz",
+    "lint",
+    "measure",
+    "clean",
+    "deb",
+    "image",
+    "boot",
+    "help",
+]
 
 
 def build_sh(*arguments: str, **env: str) -> subprocess.CompletedProcess[str]:

@@ -12,6 +12,7 @@ with ecdaq.connect(interface="eth0") as link:
 import importlib
 from typing import TYPE_CHECKING, Any
 
+import ecdaq._private_path  # noqa: F401, before any foreign package
 from ecdaq.errors import (
     InterfaceError,
     LinkError,
