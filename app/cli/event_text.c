@@ -2,29 +2,40 @@
 #include "cli/event_text.h"
 
 #include <inttypes.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "base/clock.h"
 #include "cli/source.h"
-#include "cli/text.h"
 #include "wire/al.h"
 
 #define FOLD_NS (10 * NS_PER_S)
+
+/* Put a text behind what @buf has, cut where it is full. */
+__attribute__((format(printf, 2, 3))) static void append(char buf[EVENT_TEXT_BYTES],
+							 const char *format, ...)
+{
+	size_t used = strlen(buf);
+	va_list args;
+
+	va_start(args, format);
+	vsnprintf(buf + used, EVENT_TEXT_BYTES - used, format, args);
+	va_end(args);
+}
 
 /* Put @more behind the first @what in @buf, if there is room. */
 static void insert_behind(char buf[EVENT_TEXT_BYTES], const char *what, const char *more)
 {
 	char *found = strstr(buf, what);
-	size_t more_len = strlen(more);
-	size_t at;
+	char rest[EVENT_TEXT_BYTES];
 
-	if (found == NULL || strlen(buf) + more_len >= EVENT_TEXT_BYTES) {
-		return;
+	if (found != NULL && strlen(buf) + strlen(more) < EVENT_TEXT_BYTES) {
+		found += strlen(what);
+		snprintf(rest, sizeof(rest), "%s", found);
+		*found = '\0';
+		append(buf, "%s%s", more, rest);
 	}
-	at = (size_t)(found - buf) + strlen(what);
-	memmove(buf + at + more_len, buf + at, strlen(buf + at) + 1);
-	memcpy(buf + at, more, more_len);
 }
 
 /* " rear" behind "slave 1"; nothing if it has no name. */
@@ -130,48 +141,41 @@ enum event_severity event_fold_severity(const struct event_fold *fold)
 }
 
 /* "38 frames lost, 41 late": the word is not repeated. */
-static size_t put_kind(const struct event_fold *fold, size_t i, char *buf, size_t used)
+static void put_kind(const struct event_fold *fold, size_t i, char buf[EVENT_TEXT_BYTES])
 {
 	uint64_t count = fold->count[folded[i].id];
 	int is_late_beside_lost =
 		folded[i].id == EVENT_FRAME_LATE && fold->count[EVENT_FRAME_LOST] > 0;
 	const char *words = count == 1 ? folded[i].one : folded[i].many;
 
-	used += (size_t)snprintf(buf + used, EVENT_TEXT_BYTES - used, "%s%" PRIu64 " %s",
-				 used > 0 ? ", " : "", count, is_late_beside_lost ? "late" : words);
+	append(buf, "%s%" PRIu64 " %s", buf[0] != '\0' ? ", " : "", count,
+	       is_late_beside_lost ? "late" : words);
 	if (folded[i].id == EVENT_OVERRUN && fold->cycles_skipped > 0) {
-		used += (size_t)snprintf(buf + used, EVENT_TEXT_BYTES - used,
-					 " (%" PRId64 " cycles skipped)", fold->cycles_skipped);
+		append(buf, " (%" PRId64 " cycles skipped)", fold->cycles_skipped);
 	}
-	return used;
 }
 
 void event_fold_text(const struct event_fold *fold, const struct status_page *page,
 		     char buf[EVENT_TEXT_BYTES])
 {
-	size_t used = 0;
-
 	if (fold->total == 1) {
 		event_text(&fold->first, page, buf);
 		return;
 	}
+	buf[0] = '\0';
 	for (size_t i = 0; i < FOLDED_COUNT; i++) {
 		if (fold->count[folded[i].id] > 0 && folded[i].one != NULL) {
-			used = put_kind(fold, i, buf, used);
+			put_kind(fold, i, buf);
 		}
 	}
-	if (used == 0) {
-		used = (size_t)snprintf(buf, EVENT_TEXT_BYTES,
-					"%" PRIu64 " times the working counter is right again",
-					fold->total);
+	if (buf[0] == '\0') {
+		append(buf, "%" PRIu64 " times the working counter is right again", fold->total);
 	}
 	if (fold->are_of_one_slave && fold->first.slave_pos != EVENT_NO_SLAVE) {
-		used += (size_t)snprintf(buf + used, EVENT_TEXT_BYTES - used, " of slave %u",
-					 fold->first.slave_pos);
+		append(buf, " of slave %u", fold->first.slave_pos);
 		insert_name(fold->first.slave_pos, page, buf);
-		used = strlen(buf);
 	}
-	snprintf(buf + used, EVENT_TEXT_BYTES - used, " in %.1f s, cycle %" PRIu64 " to %" PRIu64,
-		 (double)(fold->last.mono_ns - fold->first.mono_ns) / 1e9, fold->first.cycle,
-		 fold->last.cycle);
+	append(buf, " in %.1f s, cycle %" PRIu64 " to %" PRIu64,
+	       (double)(fold->last.mono_ns - fold->first.mono_ns) / 1e9, fold->first.cycle,
+	       fold->last.cycle);
 }

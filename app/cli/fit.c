@@ -132,10 +132,10 @@ const char *fit_name(const char *name, int columns, char *buf, size_t buf_len)
 const char *fit_count(uint64_t count, int columns, char *buf, size_t buf_len)
 {
 	static const char prefixes[] = "kMGTPE";
-	double value = (double)count;
-	int prefix = -1;
+	double value = (double)count / 1000;
+	size_t prefix = 0;
 
-	if (snprintf(buf, buf_len, "%" PRIu64, count) <= columns) {
+	if (snprintf(buf, buf_len, "%" PRIu64, count) <= columns || count < 1000) {
 		return buf;
 	}
 	while (value >= 999.5) {

@@ -6,7 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "base/clock.h"
 #include "cli/fit.h"
 
 enum { LABEL_COLUMNS = 11, COLUMNS_MIN = 20, PANEL_ROWS_MIN = 4 };
@@ -469,7 +468,7 @@ static void write_cell(const struct view *view, int cell, int row, FILE *out)
 
 static void write_panel(const struct plot *plot, unsigned panel, int rows, FILE *out)
 {
-	struct bin columns[DOTS_LIMIT];
+	struct bin columns[DOTS_LIMIT] = { 0 };
 	struct view view = {
 		.plot = plot,
 		.panel = panel,

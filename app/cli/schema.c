@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "cli/schema.h"
 
-#include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,22 +20,34 @@ static void put_enum_text(struct json *js, const char *word)
 	json_object_end(js);
 }
 
-/* A pattern in any case, since the words of the file are. */
-static void put_words(struct json *js, const char *words)
+/* What matches @words in any case, since the words of the file are. */
+static void put_pattern(struct json *js, const char *words)
 {
 	char pattern[TEXT_LIMIT_BYTES] = "^(";
-	size_t len = strlen(pattern);
+	char *end = pattern + strlen(pattern);
 
-	for (const char *p = words; *p != '\0' && len + 8 < sizeof(pattern); p++) {
-		if (isalpha((unsigned char)*p)) {
-			len += (size_t)snprintf(pattern + len, sizeof(pattern) - len, "[%c%c]",
-						tolower((unsigned char)*p),
-						toupper((unsigned char)*p));
+	for (const char *p = words;
+	     *p != '\0' && end + sizeof("[aA])$") < pattern + sizeof(pattern); p++) {
+		char lower = (char)(*p | 0x20);
+
+		if (lower >= 'a' && lower <= 'z') {
+			*end++ = '[';
+			*end++ = lower;
+			*end++ = (char)(lower & ~0x20);
+			*end++ = ']';
 		} else {
-			pattern[len++] = *p;
+			*end++ = *p;
 		}
 	}
-	snprintf(pattern + len, sizeof(pattern) - len, ")$");
+	memcpy(end, ")$", sizeof(")$"));
+	json_object_begin(js, NULL);
+	json_text(js, "type", "string");
+	json_text(js, "pattern", pattern);
+	json_object_end(js);
+}
+
+static void put_words(struct json *js, const char *words)
+{
 	/* The words themselves as well: an editor offers them. */
 	for (const char *p = words; *p != '\0';) {
 		char word[OPTION_KEY_BYTES];
@@ -46,10 +57,7 @@ static void put_words(struct json *js, const char *words)
 		put_enum_text(js, word);
 		p += n + (p[n] == '|');
 	}
-	json_object_begin(js, NULL);
-	json_text(js, "type", "string");
-	json_text(js, "pattern", pattern);
-	json_object_end(js);
+	put_pattern(js, words);
 }
 
 static int has_word(const char *words, const char *word)

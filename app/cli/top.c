@@ -59,18 +59,20 @@ static int refresh(struct top *top, const struct status_page **page)
 /* How a shell in the same working directory calls this program. */
 static void program_path(char path[CONFIG_PATH_BYTES])
 {
-	char cwd[CONFIG_PATH_BYTES];
-	ssize_t path_len = readlink("/proc/self/exe", path, CONFIG_PATH_BYTES - 1);
-	ssize_t cwd_len = readlink("/proc/self/cwd", cwd, sizeof(cwd));
+	char exe[CONFIG_PATH_BYTES] = "";
+	char cwd[CONFIG_PATH_BYTES] = "";
+	ssize_t exe_len = readlink("/proc/self/exe", exe, sizeof(exe) - 1);
+	ssize_t cwd_len = readlink("/proc/self/cwd", cwd, sizeof(cwd) - 1);
+	size_t len = strlen(cwd);
 
-	if (path_len < 0 || strchr(program_invocation_name, '/') == NULL) {
+	if (exe_len < 0 || strchr(program_invocation_name, '/') == NULL) {
 		snprintf(path, CONFIG_PATH_BYTES, "ecdaq");
 		return;
 	}
-	path[path_len] = '\0';
-	if (cwd_len > 1 && cwd_len < path_len && memcmp(path, cwd, (size_t)cwd_len) == 0 &&
-	    path[cwd_len] == '/') {
-		memmove(path, path + cwd_len + 1, (size_t)(path_len - cwd_len));
+	if (cwd_len > 1 && strncmp(exe, cwd, len) == 0 && exe[len] == '/') {
+		snprintf(path, CONFIG_PATH_BYTES, "%s", exe + len + 1);
+	} else {
+		snprintf(path, CONFIG_PATH_BYTES, "%s", exe);
 	}
 }
 

@@ -40,6 +40,13 @@ static void sdo(void *ctx, struct admin_pending *pending)
 	admin_pending_complete(pending, reply->slave_code != 0 ? -EIO : 0);
 }
 
+/* It is of no slave. */
+static void capture(void *ctx, struct admin_pending *pending)
+{
+	(void)ctx;
+	admin_pending_complete(pending, 0);
+}
+
 static void nothing(void *ctx)
 {
 	(void)ctx;
@@ -85,7 +92,7 @@ static struct admin_target make_target(void)
 		.is_op = 1,
 		.dc_now = dc_now,
 		.mailbox = sdo,
-		.capture = sdo,
+		.capture = capture,
 		.stop = nothing,
 		.clear = nothing,
 		.emit = emit,

@@ -105,6 +105,13 @@ static void bus_request(void *ctx, struct admin_pending *pending)
 	admin_pending_complete(pending, 0);
 }
 
+/* It takes no frame, and stays open. */
+static void capture(void *ctx, struct admin_pending *pending)
+{
+	(void)ctx;
+	keep_open(pending);
+}
+
 static void nothing(void *ctx)
 {
 	(void)ctx;
@@ -123,7 +130,7 @@ static unsigned service(void)
 					     .slave_count = 2,
 					     .mailbox = mailbox,
 					     .bus_request = bus_request,
-					     .capture = bus_request,
+					     .capture = capture,
 					     .stop = nothing,
 					     .clear = nothing,
 					     .emit = emit };

@@ -80,3 +80,12 @@ TEST(fit, a_count_keeps_three_digits)
 	}
 	CHECK_STR(fit_count(1234567, 10, buf, sizeof(buf)), "1234567");
 }
+
+TEST(fit, a_small_count_is_whole_however_narrow_the_column_is)
+{
+	char buf[16];
+
+	CHECK_STR(fit_count(50, 1, buf, sizeof(buf)), "50");
+	CHECK_STR(fit_count(999, 0, buf, sizeof(buf)), "999");
+	CHECK_STR(fit_count(1000, 3, buf, sizeof(buf)), "1.00k");
+}
