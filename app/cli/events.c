@@ -215,7 +215,8 @@ static void print(struct events *events, const struct event *ev)
 		return;
 	}
 	if (events->is_json) {
-		event_text(ev, events->page, text);
+		/* Without the name, which has a field of its own. */
+		event_format(ev, text, sizeof(text));
 		print_json(events, ev, text);
 	} else {
 		print_folded(events, ev);
