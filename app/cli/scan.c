@@ -73,7 +73,7 @@ static void put_pdos(FILE *out, const struct pdo_info *info)
 	}
 }
 
-/* An object of more than 64 bits is several channels: they are told apart by name. */
+/* An object of more than 64 bits is several channels, which are selected by name. */
 static int is_only_one(const struct samples *samples, const struct channel *ch)
 {
 	unsigned count = 0;

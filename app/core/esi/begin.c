@@ -114,7 +114,7 @@ static int begin_type(struct esi_reader *rd, const char **attribute)
 	}
 	id->product = (uint32_t)product;
 	id->revision = (uint32_t)revision;
-	if (rd->visitor->wants != NULL && !rd->visitor->wants(rd->visitor->ctx, id)) {
+	if (rd->visitor->select != NULL && !rd->visitor->select(rd->visitor->ctx, id)) {
 		esi_forget(rd);
 		for (int i = rd->device_depth; i <= rd->depth; i++) {
 			rd->node[i] = ESI_NODE_OTHER;

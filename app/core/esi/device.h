@@ -150,10 +150,10 @@ struct esi_device {
 	size_t slot_count;
 };
 
-/* Who wants to know. */
+/* The caller of esi_read(). */
 struct esi_visitor {
 	/* 1: read it in full; 0: pass over it. NULL: all are wanted. */
-	int (*wants)(void *ctx, const struct esi_identity *id);
+	int (*select)(void *ctx, const struct esi_identity *id);
 	/* A whole one; @device belongs to it now: esi_device_free(). 0 or -errno, which ends the
 	 * reading. */
 	int (*device)(void *ctx, struct esi_device *device);

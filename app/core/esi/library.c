@@ -40,7 +40,7 @@ static int is_improved(const struct place *place, const struct esi_identity *id)
 		is_better(place->wanted.revision, place->device->id.revision, id->revision));
 }
 
-static int wants(void *ctx, const struct esi_identity *id)
+static int is_wanted(void *ctx, const struct esi_identity *id)
 {
 	const struct esi_library *library = ctx;
 
@@ -130,7 +130,7 @@ static void pass_on(const struct esi_library *library, const char *text)
 static int read_one(void *ctx, const char *path)
 {
 	struct esi_library *library = ctx;
-	const struct esi_visitor visitor = { .wants = wants, .device = take, .ctx = library };
+	const struct esi_visitor visitor = { .select = is_wanted, .device = take, .ctx = library };
 	char error[512];
 
 	if (esi_read_file(path, &visitor, error, sizeof(error)) < 0) {

@@ -59,7 +59,7 @@ void session_capture(void *ctx, struct admin_pending *pending)
 	s->captures++;
 	capture_set_ring(s->capture, s->frames);
 	pending->work = s;
-	pending->outlives_bus = 1; /* a rescan is what one wants to see */
+	pending->outlives_bus = 1; /* so that a rescan is captured */
 	pending->cancel = cancel;
 	admin_pending_progress(pending, 1, 1);
 }
