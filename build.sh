@@ -19,9 +19,11 @@ usage: ./build.sh VERB [OPTION...]
   fuzz     search for inputs that break a parser
   lint     formatting, static analysis, shell and Python checks
   measure  measure on this machine and write the pages of app/doc/results/
+  bench    measure ecdaq beside other EtherCAT masters
   clean    remove what was built
   deb      build Debian packages of the programs, for a PC or a board with Debian 12
   image    build the disk image of the SBC, or of the QEMU machine
+  bundle   build a signed bundle that updates such a machine in the field
   boot     boot that image in QEMU
   help     print this, or the options of a verb: ./build.sh help VERB
 
@@ -62,13 +64,14 @@ help_test()
 usage: ./build.sh test [--fail-fast | --keep-going] [--only PATTERN] [--fuzz-seconds N] [GROUP...]
 
 Without GROUP all groups run, the fast ones first, cli and docs beside the computing ones; meanwhile
-the images are built with what time the processors have left:
+the images are built with what time the processors have left. What measures time is last, and alone:
   unit     app/, module by module; also under ASan+UBSan, and what threads share under TSan
   tidy     the rules of the source tree: include table, banned calls, sizes, formatting, links, lint
   cli      the operator's tool and the programs' command lines; also under ASan+UBSan
   kit      the Python kit: recordings read and converted, without a bus
   replay   captures of real buses against the simulated segment
   sim      the whole master on virtual time; also under ASan+UBSan
+  cost     instructions of a cycle, a recorded and a published sample, counted by callgrind
   fuzz     every fuzz target: its corpus, then some seconds of search
   recipes  the image's recipes and layers, parsed by BitBake, and their rules
   deb      the Debian packages: built, and installed, upgraded and removed in a chroot; needs root
@@ -79,9 +82,12 @@ the images are built with what time the processors have left:
 Only when named:
   control  the tests of control programs in unit, sim, cli and live
   sync0    the tests of the SYNC0 check in unit, cli and live
+  deb-arm64  the Debian packages for arm64: compared with those for amd64, installed, started
   coverage the lines of each parser that its fuzz target reaches; fails below 80 %
   long     hours of bus time and of SYNC0 edges on virtual time
+  boot-long  the image in QEMU: the clock after power-off, the watchdog of a manager that hangs
   wire     SYNC0 on GPIO lines of the image in QEMU; as root, on an idle machine
+  update   updates of the image in QEMU, from slot to slot
 
   --keep-going      run all groups even if one fails (default)
   --fail-fast       stop after the first suite with a failure
@@ -140,6 +146,11 @@ help_measure()
 	"$root/app/tools/measure.py" --help
 }
 
+help_bench()
+{
+	"$root/app/tools/bench.py" --help
+}
+
 help_clean()
 {
 	cat <<'USAGE'
@@ -159,6 +170,11 @@ help_image()
 	"$root/app/tools/image/build-image.sh" --help
 }
 
+help_bundle()
+{
+	"$root/app/tools/image/build-bundle.sh" --help
+}
+
 help_boot()
 {
 	"$root/app/tools/image/boot.sh" --help
@@ -173,6 +189,8 @@ prepare_build()
 {
 	need_packages build "$@"
 	want_packages dds ecdaq-dds
+	want_packages web ecdaq-web
+	want_packages stream ecdaq-stream
 	need_sources
 }
 
@@ -214,7 +232,7 @@ do_test()
 	case " ${1:--} $* " in
 	" -"* | *" dds "*) want_packages foreign "subscribers on Fast DDS and RustDDS" ;;
 	esac
-	[ -z "${CI:-}" ] || want_packages ci "a cache of compilations"
+	[ -z "${CI:-}" ] || want_packages ci "a cache of compilations and a browser"
 	exec "$PYTHON" "$root/app/tools/run_tests.py" "$@"
 }
 
@@ -275,10 +293,24 @@ do_measure()
 	exec "$PYTHON" "$root/app/tools/measure.py" "$@"
 }
 
+do_bench()
+{
+	if python=$(find_python); then
+		"$python" "$root/app/tools/bench.py" --check "$@"
+	fi
+	prepare_tests run
+	want_packages bench "what else is measured with"
+	build_flavour release
+	exec "$PYTHON" "$root/app/tools/bench.py" "$@"
+}
+
 do_deb()
 {
 	"$root/app/tools/deb/build-deb.sh" --check "$@"
-	need_packages deb
+	case " $* " in
+	*" arm64 "* | *" all "*) need_packages deb deb-arm64 ;;
+	*) need_packages deb ;;
+	esac
 	exec "$root/app/tools/deb/build-deb.sh" "$@"
 }
 
@@ -292,6 +324,15 @@ do_image()
 	exec "$root/app/tools/image/build-image.sh" "$@"
 }
 
+do_bundle()
+{
+	"$root/app/tools/image/build-bundle.sh" --check "$@"
+	need_packages image
+	PYTHON=$(find_python) || die "no Python 3.11 or newer with venv and ensurepip"
+	export PYTHON
+	exec "$root/app/tools/image/build-bundle.sh" "$@"
+}
+
 do_boot()
 {
 	"$root/app/tools/image/boot.sh" --check "$@"
@@ -299,11 +340,11 @@ do_boot()
 	exec "$root/app/tools/image/boot.sh" "$@"
 }
 
-verbs="run test build sim fuzz lint measure clean deb image boot"
+verbs="run test build sim fuzz lint measure bench clean deb image bundle boot"
 verb=${1:-help}
 [ $# -eq 0 ] || shift
 case $verb in
-build | test | run | sim | fuzz | lint | measure | clean | deb | image | boot)
+build | test | run | sim | fuzz | lint | measure | bench | clean | deb | image | bundle | boot)
 	for argument in "$@"; do
 		if [ "$argument" = --help ] && [ "$verb" != sim ]; then
 			"help_$verb"
@@ -314,7 +355,7 @@ build | test | run | sim | fuzz | lint | measure | clean | deb | image | boot)
 	;;
 help | --help | -h)
 	case ${1:-help} in
-	build | test | run | sim | fuzz | lint | measure | clean | deb | image | boot | help) "help_${1:-help}" ;;
+	build | test | run | sim | fuzz | lint | measure | bench | clean | deb | image | bundle | boot | help) "help_${1:-help}" ;;
 	*) usage_error "no verb '$1'; there are: $verbs help" ;;
 	esac
 	;;

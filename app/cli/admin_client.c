@@ -11,12 +11,15 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "base/host_clock.h"
 #include "base/stop.h"
+#include "program/progress.h"
 
 /* ecdaqd ends each request by a time-out; the answer to that must come within this. */
 enum { REPLY_MARGIN_S = 5 };
 /* Interval at which a request to stop is checked. */
 enum { STOP_CHECK_MS = 200 };
+enum { READ_TRIES = 3 };
 
 static int timeout_s(const struct admin_request *request)
 {
@@ -33,9 +36,7 @@ static enum exit_code fail_connect(const struct cli *cli, const char *path, int 
 				"admin socket: %s: no answer: is ecdaqd running?", path);
 	case EACCES:
 	case EPERM:
-		return cli_fail(
-			cli, EXIT_CODE_PERMISSION,
-			"admin socket: %s: permission denied: run as root or join its group", path);
+		return cli_fail_permission(cli, "use the admin socket", path);
 	default:
 		return cli_fail(cli, EXIT_CODE_FAILED, "admin socket: %s: %s", path, strerror(err));
 	}
@@ -181,10 +182,24 @@ static int gather(struct admin_transfer *tr, const struct admin_reply *reply)
 	return 0;
 }
 
-/* 0 with the last reply, or -errno; -EPROTO: not a reply; -ECONNRESET: ecdaqd went away. */
-static int exchange(int fd, struct admin_transfer *tr)
+/* How far it is; @begun: it was called before. */
+static void show_progress(const struct admin_transfer *tr, int begun)
 {
-	int r = send_all(fd, tr);
+	if (tr->what == NULL) {
+		return;
+	}
+	if (!begun) {
+		progress_begin_of(tr->what[0] != '\0' ? tr->what : "transfer", tr->reply.total,
+				  tr->unit);
+	}
+	progress_at(tr->reply.done);
+}
+
+/* 0 with the last reply, or -errno; -EPROTO: not a reply; -ECONNRESET: ecdaqd went away. */
+static int take_answer(int fd, struct admin_transfer *tr, uint32_t *ret_total)
+{
+	int begun = 0;
+	int r = 0;
 
 	while (r == 0) {
 		r = receive(fd, tr);
@@ -192,9 +207,27 @@ static int exchange(int fd, struct admin_transfer *tr)
 		if (r == 0 && tr->reply.kind == ADMIN_REPLY_DONE) {
 			return 0;
 		}
-		if (r == 0 && tr->reply.kind == ADMIN_REPLY_PROGRESS && tr->progress != NULL) {
-			tr->progress(tr);
+		if (r == 0 && tr->reply.kind == ADMIN_REPLY_PROGRESS) {
+			show_progress(tr, begun);
+			begun = 1;
+			*ret_total = tr->reply.total != 0 ? tr->reply.total : tr->reply.done;
 		}
+	}
+	return r;
+}
+
+/* The request, its progress, its answer. 0 or -errno, as above. */
+static int exchange(int fd, struct admin_transfer *tr)
+{
+	int64_t start_ns = host_clock_ns(CLOCK_MONOTONIC);
+	uint32_t total = 0;
+	int r = send_all(fd, tr);
+
+	r = r == 0 ? take_answer(fd, tr, &total) : r;
+	/* What was not shown may be a part of longer work that is. */
+	if (tr->what != NULL && progress_end() && r == 0 && tr->reply.result >= 0) {
+		progress_done(start_ns, "%s: %u %s", tr->what[0] != '\0' ? tr->what : "transfer",
+			      total, tr->unit != NULL ? tr->unit : "bytes");
 	}
 	return r;
 }
@@ -235,6 +268,19 @@ enum exit_code admin_transfer(struct cli *cli, struct admin_transfer *tr)
 	r = exchange(fd, tr);
 	close(fd);
 	return judge_exchange(cli, tr, r);
+}
+
+enum exit_code admin_transfer_read(struct cli *cli, struct admin_transfer *tr)
+{
+	unsigned tries = READ_TRIES;
+	enum exit_code result;
+
+	do {
+		admin_transfer_done(tr);
+		tr->answer_len = 0;
+		result = admin_transfer(cli, tr);
+	} while (result == EXIT_CODE_OK && tr->reply.result == -ETIMEDOUT && --tries > 0);
+	return result;
 }
 
 enum exit_code admin_transfer_do(struct cli *cli, struct admin_transfer *tr)
@@ -291,15 +337,6 @@ void admin_hold_end(int fd)
 {
 	if (fd >= 0) {
 		close(fd);
-	}
-}
-
-void admin_show_progress(const struct admin_transfer *tr)
-{
-	if (isatty(STDERR_FILENO) && tr->reply.total != 0) {
-		fprintf(stderr, "\r%3u %%%s",
-			(unsigned)(UINT64_C(100) * tr->reply.done / tr->reply.total),
-			tr->reply.done >= tr->reply.total ? "\n" : "");
 	}
 }
 

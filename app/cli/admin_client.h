@@ -21,9 +21,9 @@ struct admin_transfer {
 	struct admin_request *request;
 	const uint8_t *data; /* to send, in place of request->data; NULL: none */
 	size_t data_len;
-	int can_cancel; /* when stop_requested() (base/stop.h) */
-	/** Called for each report: reply.done of reply.total. NULL: none is shown. */
-	void (*progress)(const struct admin_transfer *tr);
+	int can_cancel;           /* when stop_requested() (base/stop.h) */
+	const char *what;         /* for its progress (program/progress.h); NULL: none is shown */
+	const char *unit;         /* that it is counted in; NULL: bytes */
 	struct admin_reply reply; /* the last message */
 	uint8_t *answer;          /* all data of the answer; NULL: none */
 	size_t answer_len;
@@ -31,11 +31,14 @@ struct admin_transfer {
 
 /** admin_ask() with them. Free the answer with admin_transfer_done(), after a failure, too. */
 enum exit_code admin_transfer(struct cli *cli, struct admin_transfer *tr);
-/** The same with admin_judge(). */
+/**
+ * The same, a few times where a slave's mailbox gives no answer (-ETIMEDOUT): one of hundreds may
+ * be lost with a frame. Only for what changes nothing when it is read again.
+ */
+enum exit_code admin_transfer_read(struct cli *cli, struct admin_transfer *tr);
+/** admin_transfer() with admin_judge(). */
 enum exit_code admin_transfer_do(struct cli *cli, struct admin_transfer *tr);
 void admin_transfer_done(struct admin_transfer *tr);
-/** For progress: per cent on standard error, if that is a terminal. */
-void admin_show_progress(const struct admin_transfer *tr);
 
 /**
  * Send a request that stays open, and wait until ecdaqd reports that it has begun. EXIT_CODE_OK,

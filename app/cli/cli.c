@@ -148,6 +148,12 @@ enum exit_code cli_exit_of(int errno_value)
 	}
 }
 
+enum exit_code cli_fail_permission(const struct cli *cli, const char *what, const char *path)
+{
+	return cli_fail(cli, EXIT_CODE_PERMISSION,
+			"no permission to %s %s: be root or in its group", what, path);
+}
+
 /* None is running: the last state of the system's ecdaqd where this user has none. */
 static void prefer_the_system(char *dir)
 {

@@ -62,6 +62,8 @@ enum args_result cli_take(struct cli *cli, struct args *args, int argc, char **a
 /** EXIT_CODE_PERMISSION for EACCES and EPERM, EXIT_CODE_NO_DAEMON for what is not there, else
  * EXIT_CODE_FAILED. */
 enum exit_code cli_exit_of(int errno_value);
+/** Report that this user may not @what ("read", "use") @path: EXIT_CODE_PERMISSION. */
+enum exit_code cli_fail_permission(const struct cli *cli, const char *what, const char *path);
 
 /**
  * The path of @file (CONFIG_RUN_...) in the run directory, CONFIG_PATH_BYTES long. EXIT_CODE_OK, or
@@ -86,6 +88,7 @@ enum exit_code verb_cstruct(struct cli *cli, int argc, char **argv);
 enum exit_code verb_data(struct cli *cli, int argc, char **argv);
 enum exit_code verb_doctor(struct cli *cli, int argc, char **argv);
 enum exit_code verb_domains(struct cli *cli, int argc, char **argv);
+enum exit_code verb_eni(struct cli *cli, int argc, char **argv);
 enum exit_code verb_eoe(struct cli *cli, int argc, char **argv);
 enum exit_code verb_esi(struct cli *cli, int argc, char **argv);
 enum exit_code verb_events(struct cli *cli, int argc, char **argv);
@@ -93,6 +96,7 @@ enum exit_code verb_firmware(struct cli *cli, int argc, char **argv);
 enum exit_code verb_foe(struct cli *cli, int argc, char **argv);
 enum exit_code verb_histogram(struct cli *cli, int argc, char **argv);
 enum exit_code verb_manual(struct cli *cli, int argc, char **argv);
+enum exit_code verb_metrics(struct cli *cli, int argc, char **argv);
 enum exit_code verb_oneshot(struct cli *cli, int argc, char **argv);
 enum exit_code verb_pdo(struct cli *cli, int argc, char **argv);
 enum exit_code verb_pcap(struct cli *cli, int argc, char **argv);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* ecdaq config show, check, diff, schema */
+/* ecdaq config show, check, diff, reload, schema */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,12 +11,13 @@
 #include "cli/admin_client.h"
 #include "cli/cli.h"
 #include "cli/config_file.h"
+#include "cli/config_reload.h"
 #include "cli/schema.h"
 #include "cli/text.h"
 #include "config/effective.h"
 #include "program/json.h"
 
-enum { ERROR_BYTES = 512, LINE_BYTES = 512, COMMENT_COLUMN = 40 };
+enum { ERROR_BYTES = 512, COMMENT_COLUMN = 40 };
 
 struct config_command {
 	struct cli *cli;
@@ -120,6 +121,7 @@ static void show_json(struct config_command *cmd, const struct config_item *item
 	json_text(js, "value", item->value);
 	json_text(js, "unit", item->unit);
 	json_text(js, "origin", config_origin_to_str(item->origin));
+	json_text(js, "takes_effect", config_effect_to_str((uint32_t)item->effect));
 	if (item->origin == CONFIG_ORIGIN_FILE) {
 		json_text(js, "file", cmd->file.name);
 		json_i64(js, "line", item->line);
@@ -255,6 +257,8 @@ static const char *kind_of(const struct difference *diff)
 		return "not compared";
 	case DIFFERENCE_NO_CHANNEL:
 		return "no such channel";
+	case DIFFERENCE_PDOS:
+		return "other PDOs assigned";
 	}
 	return "?";
 }
@@ -283,13 +287,18 @@ static void show_difference(const struct difference *diff, const char *path)
 {
 	char subject[LIMIT_NAME_BYTES + 32];
 	char found[sizeof(diff->found)];
+	char group[sizeof(diff->group)];
 
 	subject_of(diff, subject, sizeof(subject));
 	text_plain(diff->found, found, sizeof(found));
 	if (path[0] != '\0' && diff->line > 0) {
 		printf("%s:%u: ", path, diff->line);
 	}
-	printf("%s: %s", subject, kind_of(diff));
+	printf("%s", subject);
+	if (diff->group[0] != '\0') {
+		printf(" (group %s)", text_plain(diff->group, group, sizeof(group)));
+	}
+	printf(": %s", kind_of(diff));
 	if (diff->kind == DIFFERENCE_PLACE) {
 		printf(": expected behind slave %d, found at position %u", diff->item - 1,
 		       diff->position);
@@ -330,15 +339,15 @@ static void diff_json(struct json *js, const struct difference *diff, const char
 		[DIFFERENCE_UNEXPECTED] = "unexpected", [DIFFERENCE_IDENTITY] = "identity",
 		[DIFFERENCE_PLACE] = "place",           [DIFFERENCE_LOST] = "lost",
 		[DIFFERENCE_CHANNEL] = "output",        [DIFFERENCE_UNCHECKED] = "unchecked",
-		[DIFFERENCE_NO_CHANNEL] = "channel",
+		[DIFFERENCE_NO_CHANNEL] = "channel",    [DIFFERENCE_PDOS] = "pdos",
 	};
 
 	json_object_begin(js, NULL);
 	json_text(js, "kind",
-		  diff->kind <= DIFFERENCE_NO_CHANNEL && diff->kind > 0 ? kinds[diff->kind]
-									: "unknown");
+		  diff->kind <= DIFFERENCE_PDOS && diff->kind > 0 ? kinds[diff->kind] : "unknown");
 	json_truth(js, "note", difference_is_note(diff));
 	put_text(js, "name", diff->name);
+	put_text(js, "group", diff->group);
 	put_place(js, "item", diff->item);
 	put_place(js, "position", diff->position);
 	put_text(js, "property", diff->property);
@@ -381,6 +390,7 @@ static void terminate(struct difference *diff)
 {
 	diff->name[sizeof(diff->name) - 1] = '\0';
 	diff->property[sizeof(diff->property) - 1] = '\0';
+	diff->group[sizeof(diff->group) - 1] = '\0';
 	diff->expected[sizeof(diff->expected) - 1] = '\0';
 	diff->found[sizeof(diff->found) - 1] = '\0';
 }
@@ -450,19 +460,24 @@ static enum exit_code run(struct config_command *cmd, const struct args *args)
 	const char *word = args->operands[0];
 	int is_show = strcmp(word, "show") == 0;
 	int is_diff = strcmp(word, "diff") == 0;
+	int is_reload = strcmp(word, "reload") == 0;
 	enum exit_code result;
 
-	if (is_diff || strcmp(word, "schema") == 0) {
+	if (is_diff || is_reload || strcmp(word, "schema") == 0) {
 		if (args->operand_count > 1 || cmd->set.count > 0) {
 			return cli_fail(
 				cmd->cli, EXIT_CODE_USAGE, "%s: takes no file and no --set%s", word,
-				is_diff ? ": it compares what ecdaqd was started with" : "");
+				is_diff || is_reload ? ": it uses what ecdaqd was started with"
+						     : "");
+		}
+		if (is_reload) {
+			return config_reload(cmd->cli, cmd->is_json ? &cmd->js : NULL);
 		}
 		return is_diff ? compare(cmd) : write_schema(cmd);
 	}
 	if (!is_show && strcmp(word, "check") != 0) {
 		return cli_fail(cmd->cli, EXIT_CODE_USAGE,
-				"%s: expected show, check, diff or schema", word);
+				"%s: expected show, check, diff, reload or schema", word);
 	}
 	result = config_file_find(cmd->cli, args->operand_count > 1 ? args->operands[1] : NULL,
 				  &cmd->set, &cmd->file);
@@ -479,7 +494,7 @@ enum exit_code verb_config(struct cli *cli, int argc, char **argv)
 		{ "set", 0, args_list, &cmd.set, "OPTION=VALUE",
 		  "show, check: set one option over the file; may be repeated" },
 		{ "json", 0, args_flag, &cmd.is_json, NULL,
-		  "show, check: a JSON object per line; diff: an array" },
+		  "show, check: a JSON object per line; diff, reload: an array" },
 	};
 	struct args args = {
 		.options = options, .option_count = 2, .operands_min = 1, .operands_max = 2

@@ -4,8 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "cli/running.h"
 #include "cli/source.h"
+#include "reader/page.h"
 
 static int append(struct args_list *set, const char *assignment)
 {
@@ -25,7 +25,7 @@ static enum exit_code find_daemon(struct cli *cli, int64_t *ret_pid)
 
 	*ret_pid = 0;
 	if (result == EXIT_CODE_OK && source_try_status(cli, &page) == 0) {
-		*ret_pid = running_is_alive(page->pid) ? page->pid : 0;
+		*ret_pid = page_is_alive(page->pid) ? page->pid : 0;
 		source_status_close(page);
 	}
 	return result;

@@ -5,10 +5,10 @@
 #include "base/clock.h"
 #include "cli/admin_client.h"
 #include "cli/cli.h"
-#include "cli/running.h"
 #include "cli/screen.h"
 #include "cli/source.h"
 #include "program/args_duration.h"
+#include "reader/page.h"
 
 enum exit_code verb_clear(struct cli *cli, int argc, char **argv)
 {
@@ -29,7 +29,7 @@ static enum exit_code wait_for_end(const struct cli *cli, int64_t pid, int64_t w
 	const int64_t step_ns = 20 * NS_PER_MS;
 	char why[32];
 
-	for (int64_t waited_ns = 0; running_is_alive(pid); waited_ns += step_ns) {
+	for (int64_t waited_ns = 0; page_is_alive(pid); waited_ns += step_ns) {
 		if (waited_ns >= wait_ns || screen_is_over()) {
 			snprintf(why, sizeof(why), "%.3g s", (double)waited_ns / 1e9);
 			return cli_fail(cli, EXIT_CODE_FAILED, "ecdaqd: still running after %s",

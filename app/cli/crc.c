@@ -65,19 +65,21 @@ static int is_quiet(const struct admin_port *port)
 /* --- text --- */
 
 /* The errors of a port, not counting forwarded ones, arise between it and the port before it. */
-static void show_cable(const struct crc *crc, uint16_t pos, unsigned port)
+static void show_cable(const struct crc *crc, uint16_t pos, unsigned number,
+		       const struct admin_port *port)
 {
+	const char *what = port->is_ebus ? "the E-bus" : "the cable";
 	char text[CABLE_TEXT_BYTES];
 	char *second;
 
-	cable_describe(crc->page, pos, port, text);
+	cable_describe(crc->page, pos, number, text);
 	second = strstr(text, " and ");
-	if (strlen(text) + strlen("    port 0: check the cable ") > LINE_COLUMNS &&
+	if (strlen("    port 0: check ") + strlen(what) + 1 + strlen(text) > LINE_COLUMNS &&
 	    second != NULL) {
 		*second++ = '\0';
-		printf("    port %u: check the cable %s\n            %s\n", port, text, second);
+		printf("    port %u: check %s %s\n            %s\n", number, what, text, second);
 	} else {
-		printf("    port %u: check the cable %s\n", port, text);
+		printf("    port %u: check %s %s\n", number, what, text);
 	}
 }
 
@@ -113,7 +115,7 @@ static void show_text(const struct crc *crc, uint16_t pos, const struct admin_di
 	}
 	for (unsigned i = 0; i < ADMIN_PORTS; i++) {
 		if (!is_quiet(&found->port[i])) {
-			show_cable(crc, pos, i);
+			show_cable(crc, pos, i, &found->port[i]);
 		}
 	}
 }
@@ -133,7 +135,7 @@ static void show_added(const struct crc *crc, uint16_t pos, const struct admin_d
 		       pos, source_slave(crc->page, pos).name, i, port.invalid_frames,
 		       port.rx_errors, port.forwarded_errors, port.lost_links);
 		if (!is_quiet(&port)) {
-			show_cable(crc, pos, i);
+			show_cable(crc, pos, i, &port);
 		}
 	}
 }
@@ -174,6 +176,7 @@ static void show_json(struct crc *crc, uint16_t pos, const struct admin_diagnosi
 		json_object_begin(js, NULL);
 		json_truth(js, "link", port->is_link);
 		json_truth(js, "open", port->is_communicating);
+		json_truth(js, "ebus", port->is_ebus);
 		write_counts(js, port);
 		json_text(js, "cable", cable_describe(crc->page, pos, i, cable));
 		if (before != NULL) {
@@ -240,17 +243,9 @@ static enum exit_code run_one(void *ctx, uint16_t pos)
 /* One reading. */
 static enum exit_code read_all(struct crc *crc, const struct args *args)
 {
-	enum exit_code result;
+	enum exit_code result = each_slave_listed(crc->cli, crc->page, args,
+						  crc->is_json ? &crc->js : NULL, run_one, crc);
 
-	json_init(&crc->js, stdout);
-	if (crc->is_json) {
-		json_array_begin(&crc->js, NULL);
-	}
-	result = each_slave(crc->cli, crc->page, args->operands, args->operand_count, run_one, crc);
-	if (crc->is_json) {
-		json_array_end(&crc->js);
-		json_end_line(&crc->js);
-	}
 	fflush(stdout);
 	return result;
 }

@@ -9,11 +9,14 @@
 
 #include "base/args.h"
 #include "cli/cli.h"
+#include "cli/fit.h"
+#include "cli/screen.h"
 #include "cli/source.h"
 #include "cli/text.h"
 #include "image/image.h"
 
 enum {
+	INDENT = 8, /* of what continues a line */
 	PREFIX_MAX = 40,
 	MEMBER_BYTES = sizeof(((struct channel *)0)->name) + 24, /* with a number */
 };
@@ -26,6 +29,7 @@ struct member {
 
 struct writer {
 	FILE *out;
+	const char *tab; /* before a member */
 	const char *prefix;
 	struct member *member; /* by place in the image */
 	size_t count;
@@ -141,7 +145,7 @@ static void write_comment(const struct writer *w, const struct channel *ch)
 		*p = *p == '*' ? '?' : *p;
 	}
 	fprintf(w->out, " /* %u.%u %s", ch->bit_offset / 8, ch->bit_offset % 8, type);
-	if (ch->scale != 1.0 || ch->offset != 0.0) {
+	if (image_is_scaled(ch)) {
 		fprintf(w->out, " * %.9g + %.9g", ch->scale, ch->offset);
 	}
 	fprintf(w->out, "%s%s */\n", unit[0] == '\0' ? "" : " ", unit);
@@ -153,9 +157,9 @@ static void write_member(const struct writer *w, const struct member *member)
 	const char *type = type_of(ch);
 
 	if (type != NULL) {
-		fprintf(w->out, "\t%s %s;", type, member->name);
+		fprintf(w->out, "%s%s %s;", w->tab, type, member->name);
 	} else {
-		fprintf(w->out, "\t%sint%u_t %s : %u;", ch->type == CHANNEL_INT ? "" : "u",
+		fprintf(w->out, "%s%sint%u_t %s : %u;", w->tab, ch->type == CHANNEL_INT ? "" : "u",
 			ch->bit_len > 32 ? 64u : 32u, member->name, ch->bit_len);
 	}
 	write_comment(w, ch);
@@ -170,13 +174,13 @@ static void write_gap(struct writer *w, uint32_t from, uint32_t to)
 		whole = to;
 	}
 	if (whole > from) {
-		fprintf(w->out, "\tuint32_t pad%u : %u;\n", w->pads++, whole - from);
+		fprintf(w->out, "%suint32_t pad%u : %u;\n", w->tab, w->pads++, whole - from);
 	}
 	if (to / 8 > whole / 8) {
-		fprintf(w->out, "\tuint8_t pad%u[%u];\n", w->pads++, (to - whole) / 8);
+		fprintf(w->out, "%suint8_t pad%u[%u];\n", w->tab, w->pads++, (to - whole) / 8);
 	}
 	if (to % 8 != 0 && to / 8 * 8 >= whole) {
-		fprintf(w->out, "\tuint32_t pad%u : %u;\n", w->pads++, to % 8);
+		fprintf(w->out, "%suint32_t pad%u : %u;\n", w->tab, w->pads++, to % 8);
 	}
 }
 
@@ -198,7 +202,7 @@ static void write_struct(struct writer *w, const char *name, uint32_t from, uint
 			continue;
 		}
 		if (ch->bit_offset < at || ch->bit_offset + ch->bit_len > to) {
-			fprintf(w->out, "\t/* %s lies over it:", w->member[i].name);
+			fprintf(w->out, "%s/* %s lies over it:", w->tab, w->member[i].name);
 			fprintf(w->out, " %u bits at %u.%u */\n", ch->bit_len, ch->bit_offset / 8,
 				ch->bit_offset % 8);
 			continue;
@@ -215,9 +219,10 @@ static void write_struct(struct writer *w, const char *name, uint32_t from, uint
 }
 
 int cstruct_write(FILE *out, const struct sample_meta *meta, const struct channel *channels,
-		  const char *prefix)
+		  const char *prefix, int columns)
 {
 	struct writer w = { .out = out, .prefix = prefix };
+	struct fit fit;
 
 	w.member = calloc((size_t)meta->channel_count + 1, sizeof(*w.member));
 	if (w.member == NULL) {
@@ -230,6 +235,9 @@ int cstruct_write(FILE *out, const struct sample_meta *meta, const struct channe
 		}
 	}
 	make_names_unique(&w);
+	/* A tab has no width of its own. */
+	w.tab = columns > 0 ? "        " : "\t";
+	out = w.out = fit_begin(&fit, columns, out);
 	fprintf(out,
 		"/* Process image: %u slaves, %u bytes of outputs, %u of inputs; by ecdaq "
 		"cstruct. Each\n * member: byte.bit in the image, type, scale and unit. For gcc "
@@ -241,6 +249,7 @@ int cstruct_write(FILE *out, const struct sample_meta *meta, const struct channe
 	write_struct(&w, "outputs", 0, meta->output_bytes * 8);
 	write_struct(&w, "inputs", meta->output_bytes * 8, meta->image_bytes * 8);
 	fprintf(out, "\n#endif\n");
+	fit_end(&fit, INDENT);
 	free(w.member);
 	return 0;
 }
@@ -258,7 +267,8 @@ static enum exit_code write_to(struct cli *cli, const struct samples *samples, c
 				"%s: %s", path, strerror(errno));
 	}
 	errno = 0;
-	r = cstruct_write(out, samples->meta, samples->channels, prefix);
+	r = cstruct_write(out, samples->meta, samples->channels, prefix,
+			  path == NULL ? screen_columns() : 0);
 	if (r == 0 && path != NULL && ferror(out)) {
 		r = errno != 0 ? -errno : -EIO;
 	}

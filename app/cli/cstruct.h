@@ -14,11 +14,11 @@
 
 /**
  * Write the header of @channels, which need not be in order, to @out; @prefix begins the names of
- * the structures and is a C name. A channel that lies over one before it is a comment. 0 or
- * -ENOMEM.
+ * the structures and is a C name. A channel that lies over one before it is a comment. With
+ * @columns the lines fit a terminal (cli/fit.h). 0 or -ENOMEM.
  */
 int cstruct_write(FILE *out, const struct sample_meta *meta, const struct channel *channels,
-		  const char *prefix);
+		  const char *prefix, int columns);
 
 /** 1 if @text can be a name in C and C++: letters, digits, underscores, 40 at most. */
 int cstruct_is_name(const char *text);

@@ -5,114 +5,27 @@
  */
 #include <inttypes.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "base/args.h"
-#include "cli/admin_client.h"
 #include "cli/cli.h"
 #include "cli/each_slave.h"
+#include "cli/mapping.h"
 #include "cli/source.h"
 #include "program/json.h"
 #include "wire/datagram.h"
 #include "wire/fmmu.h"
 
-/* The mapping of one slave. */
-struct mapping {
-	unsigned sm_count;
-	unsigned fmmu_count;
-	struct sync_manager sm[SYNC_MANAGER_COUNT_MAX];
-	struct fmmu fmmu[FMMU_COUNT_MAX];
-};
-
 struct domains {
 	struct cli *cli;
 	const struct status_page *page;
-	struct admin_datagram *datagram;
-	size_t datagram_count;
-	char why[ADMIN_TEXT_BYTES]; /* there are none */
+	struct datagrams list;
 	int is_json;
 	struct json js;
 };
 
-/* --- reading --- */
-
-/* A refusal is no failure: the slaves are shown without them. */
-static enum exit_code read_datagrams(struct domains *d)
-{
-	struct admin_request rq = { .verb = ADMIN_DATAGRAMS };
-	struct admin_transfer tr = { .request = &rq };
-	enum exit_code result = admin_transfer(d->cli, &tr);
-
-	if (result == EXIT_CODE_OK && tr.reply.result < 0) {
-		snprintf(d->why, sizeof(d->why), "%s", tr.reply.text);
-	} else if (result == EXIT_CODE_OK && tr.answer_len > 0) {
-		d->datagram_count = tr.answer_len / sizeof(*d->datagram);
-		d->datagram = malloc(tr.answer_len);
-		if (d->datagram == NULL) {
-			result = cli_fail(d->cli, EXIT_CODE_FAILED, "out of memory");
-		} else {
-			memcpy(d->datagram, tr.answer, d->datagram_count * sizeof(*d->datagram));
-		}
-	}
-	admin_transfer_done(&tr);
-	return result;
-}
-
-static enum exit_code read_registers(struct domains *d, uint16_t pos, uint32_t reg, size_t len,
-				     uint8_t *ret_bytes)
-{
-	struct admin_request rq = { .verb = ADMIN_REGISTER_READ,
-				    .slave_pos = pos,
-				    .address = reg,
-				    .length = (uint32_t)len };
-	struct admin_reply reply;
-	enum exit_code result = len == 0 ? EXIT_CODE_OK : admin_do(d->cli, &rq, &reply);
-
-	if (result == EXIT_CODE_OK && len > 0) {
-		memcpy(ret_bytes, reply.data, len);
-	}
-	return result;
-}
-
-static enum exit_code read_mapping(struct domains *d, uint16_t pos, struct mapping *ret)
-{
-	uint8_t counts[2] = { 0 };
-	uint8_t fmmu[FMMU_COUNT_MAX * ESC_FMMU_BYTES] = { 0 };
-	uint8_t sm[SYNC_MANAGER_COUNT_MAX * ESC_SM_BYTES] = { 0 };
-	enum exit_code result = read_registers(d, pos, ESC_REG_FMMU_COUNT, 2, counts);
-
-	static_assert(sizeof(fmmu) <= ADMIN_REGISTER_BYTES, "one access");
-	*ret = (struct mapping){
-		.fmmu_count = counts[0] < FMMU_COUNT_MAX ? counts[0] : FMMU_COUNT_MAX,
-		.sm_count = counts[1] < SYNC_MANAGER_COUNT_MAX ? counts[1] : SYNC_MANAGER_COUNT_MAX,
-	};
-	if (result == EXIT_CODE_OK) {
-		result = read_registers(d, pos, ESC_REG_FMMU,
-					(size_t)ret->fmmu_count * ESC_FMMU_BYTES, fmmu);
-	}
-	if (result == EXIT_CODE_OK) {
-		result = read_registers(d, pos, ESC_REG_SM, (size_t)ret->sm_count * ESC_SM_BYTES,
-					sm);
-	}
-	for (unsigned i = 0; i < ret->fmmu_count; i++) {
-		ret->fmmu[i] = fmmu_parse(fmmu + (size_t)i * ESC_FMMU_BYTES);
-	}
-	for (unsigned i = 0; i < ret->sm_count; i++) {
-		ret->sm[i] = sync_manager_parse(sm + (size_t)i * ESC_SM_BYTES);
-	}
-	return result;
-}
-
 static unsigned adds_to(const struct mapping *mapping, const struct admin_datagram *dg)
 {
 	return fmmu_wkc(dg->command, dg->address, dg->bytes, mapping->fmmu, mapping->fmmu_count);
-}
-
-static int is_logical(const struct admin_datagram *dg)
-{
-	return dg->command == ECAT_CMD_LRD || dg->command == ECAT_CMD_LWR ||
-	       dg->command == ECAT_CMD_LRW;
 }
 
 /* --- text --- */
@@ -128,18 +41,18 @@ static const char *wkc_to_str(uint16_t wkc, char buf[8])
 
 static void show_datagrams(const struct domains *d)
 {
-	if (d->datagram_count == 0) {
-		printf("no cyclic frames: %s\n", d->why);
+	if (d->list.count == 0) {
+		printf("no cyclic frames: %s\n", d->list.why);
 		return;
 	}
 	printf("datagram frame  command  address        bytes  expected  measured\n");
-	for (size_t i = 0; i < d->datagram_count; i++) {
-		const struct admin_datagram *dg = &d->datagram[i];
+	for (size_t i = 0; i < d->list.count; i++) {
+		const struct admin_datagram *dg = &d->list.datagram[i];
 		char address[16];
 		char expected[8];
 		char measured[8];
 
-		if (is_logical(dg)) {
+		if (datagram_is_logical(dg)) {
 			snprintf(address, sizeof(address), "0x%08" PRIx32, dg->address);
 		} else {
 			snprintf(address, sizeof(address), "0x%04x:0x%04x",
@@ -183,8 +96,8 @@ static void show_text(const struct domains *d, uint16_t pos, const struct mappin
 			show_fmmu(i, &mapping->fmmu[i]);
 		}
 	}
-	for (size_t i = 0; i < d->datagram_count; i++) {
-		unsigned adds = adds_to(mapping, &d->datagram[i]);
+	for (size_t i = 0; i < d->list.count; i++) {
+		unsigned adds = adds_to(mapping, &d->list.datagram[i]);
 
 		if (adds > 0) {
 			printf("    adds %u to datagram %zu\n", adds, i);
@@ -208,13 +121,13 @@ static void put_datagrams(struct domains *d)
 	struct json *js = &d->js;
 
 	json_array_begin(js, "datagram");
-	for (size_t i = 0; i < d->datagram_count; i++) {
-		const struct admin_datagram *dg = &d->datagram[i];
+	for (size_t i = 0; i < d->list.count; i++) {
+		const struct admin_datagram *dg = &d->list.datagram[i];
 
 		json_object_begin(js, NULL);
 		json_u64(js, "frame", dg->frame);
 		json_text(js, "command", ecat_cmd_to_str(dg->command));
-		if (is_logical(dg)) {
+		if (datagram_is_logical(dg)) {
 			json_u64(js, "logical", dg->address);
 		} else {
 			json_u64(js, "station", dg->address & 0xffff);
@@ -226,8 +139,8 @@ static void put_datagrams(struct domains *d)
 		json_object_end(js);
 	}
 	json_array_end(js);
-	if (d->datagram_count == 0) {
-		json_text(js, "why", d->why);
+	if (d->list.count == 0) {
+		json_text(js, "why", d->list.why);
 	}
 }
 
@@ -287,11 +200,11 @@ static void put_slave(struct domains *d, uint16_t pos, const struct mapping *map
 	put_sync_managers(js, mapping);
 	put_fmmus(js, mapping);
 	json_array_begin(js, "wkc");
-	for (size_t i = 0; i < d->datagram_count; i++) {
-		if (adds_to(mapping, &d->datagram[i]) > 0) {
+	for (size_t i = 0; i < d->list.count; i++) {
+		if (adds_to(mapping, &d->list.datagram[i]) > 0) {
 			json_object_begin(js, NULL);
 			json_u64(js, "datagram", i);
-			json_u64(js, "adds", adds_to(mapping, &d->datagram[i]));
+			json_u64(js, "adds", adds_to(mapping, &d->list.datagram[i]));
 			json_object_end(js);
 		}
 	}
@@ -305,7 +218,7 @@ static enum exit_code run_one(void *ctx, uint16_t pos)
 {
 	struct domains *d = ctx;
 	struct mapping mapping;
-	enum exit_code result = read_mapping(d, pos, &mapping);
+	enum exit_code result = mapping_read(d->cli, pos, &mapping);
 
 	if (result == EXIT_CODE_OK && d->is_json) {
 		put_slave(d, pos, &mapping);
@@ -317,7 +230,7 @@ static enum exit_code run_one(void *ctx, uint16_t pos)
 
 static enum exit_code run(struct domains *d, const struct args *args)
 {
-	enum exit_code result = read_datagrams(d);
+	enum exit_code result = datagrams_read(d->cli, &d->list);
 
 	if (result != EXIT_CODE_OK) {
 		return result;
@@ -354,7 +267,7 @@ enum exit_code verb_domains(struct cli *cli, int argc, char **argv)
 	}
 	json_init(&d.js, stdout);
 	result = run(&d, &args);
-	free(d.datagram);
+	datagrams_done(&d.list);
 	source_status_close(d.page);
 	return result;
 }

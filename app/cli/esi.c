@@ -67,6 +67,15 @@ static void show_details(const struct esi_device *d)
 		       text_plain(d->dc[i].name, name, sizeof(name)),
 		       text_plain(d->dc[i].text, text, sizeof(text)));
 	}
+	for (size_t i = 0; i < d->object_count; i++) {
+		const struct esi_object *o = &d->object[i];
+
+		if (o->unit[0] != '\0') {
+			printf("    unit 0x%04x:%02x  %s  %s\n", o->index, o->subindex,
+			       text_plain(o->unit, text, sizeof(text)),
+			       text_plain(o->name, name, sizeof(name)));
+		}
+	}
 	for (size_t i = 0; i < d->command_count; i++) {
 		const struct esi_command *c = &d->command[i];
 
@@ -96,8 +105,6 @@ static void show_text(const struct esi_run *run, const struct esi_device *d)
 
 static void pdo_json(struct json *js, const struct esi_device *d, const struct esi_pdo *pdo)
 {
-	char type[TEXT_BYTES];
-
 	json_object_begin(js, NULL);
 	json_u64(js, "index", pdo->index);
 	json_text(js, "name", pdo->name);
@@ -119,20 +126,32 @@ static void pdo_json(struct json *js, const struct esi_device *d, const struct e
 	for (size_t i = 0; i < pdo->count; i++) {
 		const struct esi_entry *e = &d->entry[pdo->first + i];
 
-		json_object_begin(js, NULL);
-		json_u64(js, "index", e->index);
-		json_u64(js, "subindex", e->subindex);
-		json_u64(js, "bits", e->bits);
-		if (e->type == 0) {
-			json_null(js, "type");
-		} else {
-			json_text(js, "type", coe_type_to_str(e->type, type));
-		}
-		json_text(js, "name", e->name);
-		json_object_end(js);
+		coe_entry_json(js, &(struct coe_entry){ .index = e->index,
+							.subindex = e->subindex,
+							.bits = e->bits,
+							.type = e->type,
+							.name = e->name });
 	}
 	json_array_end(js);
 	json_object_end(js);
+}
+
+static void units_json(struct json *js, const struct esi_device *d)
+{
+	json_array_begin(js, "unit");
+	for (size_t i = 0; i < d->object_count; i++) {
+		const struct esi_object *o = &d->object[i];
+
+		if (o->unit[0] != '\0') {
+			json_object_begin(js, NULL);
+			json_u64(js, "index", o->index);
+			json_u64(js, "subindex", o->subindex);
+			json_text(js, "name", o->name);
+			json_text(js, "unit", o->unit);
+			json_object_end(js);
+		}
+	}
+	json_array_end(js);
 }
 
 static void commands_json(struct json *js, const struct esi_device *d)
@@ -186,6 +205,7 @@ static void show_json(struct esi_run *run, const struct esi_device *d)
 		json_object_end(js);
 	}
 	json_array_end(js);
+	units_json(js, d);
 	commands_json(js, d);
 	json_object_end(js);
 }
@@ -239,7 +259,7 @@ enum exit_code verb_esi(struct cli *cli, int argc, char **argv)
 	struct esi_run run = { .cli = cli, .result = EXIT_CODE_OK };
 	const struct args_option options[] = {
 		{ "verbose", 'v', args_flag, &run.is_verbose, NULL,
-		  "with PDOs, DC modes and start-up commands" },
+		  "with PDOs, DC modes, units and start-up commands" },
 		{ "json", 0, args_flag, &run.is_json, NULL, "a JSON array" },
 	};
 	struct args args = {

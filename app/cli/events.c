@@ -12,11 +12,11 @@
 #include "base/clock.h"
 #include "base/event.h"
 #include "cli/cli.h"
-#include "cli/event_text.h"
 #include "cli/fit.h"
 #include "cli/screen.h"
 #include "cli/source.h"
 #include "cli/text.h"
+#include "program/event_text.h"
 #include "program/json.h"
 #include "reader/feed.h"
 #include "reader/reader.h"
@@ -332,14 +332,8 @@ static enum exit_code open_feeds(struct events *events)
 
 static enum exit_code parse_level(struct events *events)
 {
-	if (events->level == NULL) {
+	if (events->level == NULL || event_severity_parse(events->level, &events->severity) == 0) {
 		return EXIT_CODE_OK;
-	}
-	for (int level = EVENT_INFO; level <= EVENT_ERROR; level++) {
-		if (strcmp(event_severity_to_str((enum event_severity)level), events->level) == 0) {
-			events->severity = (enum event_severity)level;
-			return EXIT_CODE_OK;
-		}
 	}
 	return cli_fail(events->cli, EXIT_CODE_USAGE,
 			"--level: %s: expected info, notice, warning or error", events->level);

@@ -165,7 +165,7 @@ static enum exit_code write_image(struct firmware *fw)
 				     .data = fw->image,
 				     .data_len = fw->image_len,
 				     .can_cancel = 1,
-				     .progress = admin_show_progress };
+				     .what = fw->write.name };
 	enum exit_code result = admin_transfer(fw->cli, &tr);
 
 	if (result == EXIT_CODE_OK && tr.reply.result < 0) {

@@ -2,7 +2,10 @@
 #include "cli/fit.h"
 
 #include <inttypes.h>
+#include <stdlib.h>
 #include <string.h>
+
+enum { INDENT_MAX = 60 };
 
 /* Bytes of the colour at the start of @text; 0: there is none. */
 static size_t colour_len(const char *text, size_t len)
@@ -78,9 +81,10 @@ static size_t find_break(const char *line, size_t len, size_t fits, size_t *ret_
 	return end;
 }
 
-static void write_line(const char *line, size_t len, int columns, int indent, FILE *out)
+void fit_write_line(const char *line, size_t len, int columns, const char *prefix, FILE *out)
 {
-	size_t fits = fit_cut(line, len, columns);
+	int lead = (int)strlen(prefix);
+	size_t fits = columns <= 0 ? len : fit_cut(line, len, columns);
 
 	while (fits < len) {
 		size_t next;
@@ -93,8 +97,8 @@ static void write_line(const char *line, size_t len, int columns, int indent, FI
 		if (len == 0) {
 			return;
 		}
-		fprintf(out, "%*s", indent, "");
-		fits = fit_cut(line, len, columns - indent);
+		fputs(prefix, out);
+		fits = fit_cut(line, len, columns > lead ? columns - lead : 1);
 	}
 	fwrite(line, 1, len, out);
 	fputc('\n', out);
@@ -102,17 +106,37 @@ static void write_line(const char *line, size_t len, int columns, int indent, FI
 
 void fit_write(const char *text, int columns, int indent, FILE *out)
 {
+	char blanks[INDENT_MAX + 1];
+
 	if (columns <= 0) {
 		fputs(text, out);
 		return;
 	}
 	indent = indent > columns / 2 ? columns / 2 : indent;
+	indent = indent > INDENT_MAX ? INDENT_MAX : indent;
+	memset(blanks, ' ', (size_t)indent);
+	blanks[indent] = '\0';
 	while (*text != '\0') {
 		size_t len = strcspn(text, "\n");
 
-		write_line(text, len, columns, indent, out);
+		fit_write_line(text, len, columns, blanks, out);
 		text += len + (text[len] == '\n');
 	}
+}
+
+FILE *fit_begin(struct fit *fit, int columns, FILE *to)
+{
+	*fit = (struct fit){ .columns = columns, .to = to };
+	fit->text_out = columns <= 0 ? NULL : open_memstream(&fit->text, &fit->len);
+	return fit->text_out != NULL ? fit->text_out : to;
+}
+
+void fit_end(struct fit *fit, int indent)
+{
+	if (fit->text_out != NULL && fclose(fit->text_out) == 0) {
+		fit_write(fit->text, fit->columns, indent, fit->to);
+	}
+	free(fit->text);
 }
 
 const char *fit_name(const char *name, int columns, char *buf, size_t buf_len)

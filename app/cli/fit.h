@@ -22,6 +22,26 @@ size_t fit_cut(const char *line, size_t len, int columns);
  */
 void fit_write(const char *text, int columns, int indent, FILE *out);
 
+/** One line of @len bytes, without its newline: the same, but what continues it begins with
+ * @prefix. */
+void fit_write_line(const char *line, size_t len, int columns, const char *prefix, FILE *out);
+
+/* Text on its way to a terminal. */
+struct fit {
+	FILE *to;
+	FILE *text_out;
+	char *text;
+	size_t len;
+	int columns;
+};
+
+/**
+ * Where to write text that fit_end() writes to @to as fit_write() does. 0 @columns, or no memory:
+ * that is @to itself.
+ */
+FILE *fit_begin(struct fit *fit, int columns, FILE *to);
+void fit_end(struct fit *fit, int indent);
+
 /** @name in up to @columns (1 or more) characters: what is left out of the middle is a '~'. */
 const char *fit_name(const char *name, int columns, char *buf, size_t buf_len);
 

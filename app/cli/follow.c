@@ -5,8 +5,8 @@
 #include <stddef.h>
 
 #include "base/clock.h"
-#include "cli/running.h"
 #include "cli/screen.h"
+#include "reader/page.h"
 
 enum exit_code follow_open(struct cli *cli, struct follow *ret_follow)
 {
@@ -40,7 +40,7 @@ static int may_continue(struct follow *follow)
 	source_status_close(follow->page);
 	follow->page = page;
 	state = atomic_load_explicit(&page->bus_state, memory_order_relaxed);
-	return running_is_alive(page->pid) && state != BUS_STOPPED && state != BUS_FAILED;
+	return page_is_alive(page->pid) && state != BUS_STOPPED && state != BUS_FAILED;
 }
 
 enum follow_result follow_next(struct follow *follow, uint64_t *ret_lost)

@@ -18,7 +18,8 @@ void mail_init(struct mail *mail, struct cli *cli)
 {
 	*mail = (struct mail){ .cli = cli };
 	mail->transfer.request = &mail->request;
-	mail->transfer.progress = admin_show_progress;
+	/* The name of a file, or of nothing. */
+	mail->transfer.what = mail->request.name;
 }
 
 void mail_done(struct mail *mail)
@@ -58,6 +59,12 @@ enum exit_code mail_run(struct mail *mail, const struct mail_action *actions, si
 
 /* --- the request --- */
 
+/* Reading a dictionary again changes nothing. */
+static int is_of_dictionary(enum admin_verb verb)
+{
+	return verb == ADMIN_SDO_LIST || verb == ADMIN_SDO_OBJECT || verb == ADMIN_SDO_ENTRY;
+}
+
 enum exit_code mail_try(struct mail *mail, enum admin_verb verb, int *ret_refused)
 {
 	enum exit_code result;
@@ -65,7 +72,8 @@ enum exit_code mail_try(struct mail *mail, enum admin_verb verb, int *ret_refuse
 	admin_transfer_done(&mail->transfer);
 	mail->transfer.answer_len = 0;
 	mail->request.verb = verb;
-	result = admin_transfer(mail->cli, &mail->transfer);
+	result = is_of_dictionary(verb) ? admin_transfer_read(mail->cli, &mail->transfer)
+					: admin_transfer(mail->cli, &mail->transfer);
 	*ret_refused = result == EXIT_CODE_OK && mail->transfer.reply.result == -EREMOTEIO;
 	return result == EXIT_CODE_OK && !*ret_refused
 		       ? admin_judge(mail->cli, &mail->transfer.reply)
@@ -86,10 +94,11 @@ enum exit_code mail_parse_object(struct mail *mail, const char *text)
 	unsigned long subindex = 0;
 	char *end = NULL;
 
-	if (isdigit((unsigned char)text[0])) {
-		index = strtoul(text, &end, 0);
-		if (*end == ':' && isdigit((unsigned char)end[1])) {
-			subindex = strtoul(end + 1, &end, 0);
+	/* Both are hexadecimal with or without 0x, as every list shows them. */
+	if (isxdigit((unsigned char)text[0])) {
+		index = strtoul(text, &end, 16);
+		if (*end == ':' && isxdigit((unsigned char)end[1])) {
+			subindex = strtoul(end + 1, &end, 16);
 		}
 	}
 	if (end == NULL || *end != '\0' || index == 0 || index > 0xffff || subindex > 0xff) {

@@ -47,7 +47,7 @@ enum exit_code mail_ask(struct mail *mail, enum admin_verb verb);
 /** The same without a message for what the slave refuses (-EREMOTEIO): @ret_refused is 1 then. */
 enum exit_code mail_try(struct mail *mail, enum admin_verb verb, int *ret_refused);
 
-/** "0x1018:1": hexadecimal with 0x, else decimal; the subindex may be left out. */
+/** "0x1018:0a": both hexadecimal, with or without 0x; the subindex may be left out. */
 enum exit_code mail_parse_object(struct mail *mail, const char *text);
 /** --type: an enum sdo_type, MAIL_STRING or MAIL_NO_TYPE. */
 enum exit_code mail_parse_type(const struct mail *mail, int *ret_type);

@@ -11,7 +11,10 @@
 #include "cli/cli.h"
 #include "cli/screen.h"
 #include "cli/selection.h"
+#include "program/beside.h"
 #include "program/exit_code.h"
+
+enum { PROGRAM_NAME_BYTES = 64 };
 
 static enum exit_code verb_version(struct cli *cli, int argc, char **argv)
 {
@@ -25,32 +28,19 @@ static enum exit_code verb_version(struct cli *cli, int argc, char **argv)
 	return result;
 }
 
-/* "ecdaq-VERB" beside the file that is running. */
-static int program_path(const char *verb, char ret_path[PATH_MAX])
-{
-	ssize_t len = readlink("/proc/self/exe", ret_path, PATH_MAX - 1);
-
-	if (len < 0) {
-		return -errno;
-	}
-	while (ret_path[len - 1] != '/') {
-		len--;
-	}
-	return snprintf(ret_path + len, (size_t)(PATH_MAX - len), "ecdaq-%s", verb) < PATH_MAX - len
-		       ? 0
-		       : -ENAMETOOLONG;
-}
-
 /* A verb that is a program of its own, ecdaq-VERB, so that this one needs no libraries for it. */
 static enum exit_code verb_program(struct cli *cli, int argc, char **argv)
 {
+	char name[PROGRAM_NAME_BYTES];
 	char path[PATH_MAX];
 	char run_dir[sizeof("--run-dir=") + CONFIG_PATH_BYTES];
 	char config[sizeof("--config=") + PATH_MAX];
 	char **words = calloc((size_t)argc + 4, sizeof(*words));
 	int count = 0;
-	int r = words == NULL ? -ENOMEM : program_path(cli->verb->name, path);
+	int r;
 
+	snprintf(name, sizeof(name), "ecdaq-%s", cli->verb->name);
+	r = words == NULL ? -ENOMEM : program_beside(name, path);
 	if (r == 0) {
 		words[count++] = path;
 		if (cli->run_dir != NULL) {
@@ -69,6 +59,8 @@ static enum exit_code verb_program(struct cli *cli, int argc, char **argv)
 	return r == -ENOENT ? cli_fail(cli, EXIT_CODE_FAILED, "%s: not installed", path)
 			    : cli_fail(cli, EXIT_CODE_FAILED, "%s", strerror(-r));
 }
+
+static enum exit_code verb_help(struct cli *cli, int argc, char **argv);
 
 static const struct verb verbs[] = {
 	{ "status", "", "Bus, cycle, slaves and recorder on one screen.",
@@ -110,14 +102,15 @@ static const struct verb verbs[] = {
 	  verb_state },
 	{ "rescan", "", "Take the bus down and bring it up again, with what is there now.",
 	  "Ends when the target is reached, or with the reason why not.\n", verb_rescan },
-	{ "sdo", "read|write|list SLAVE [INDEX:SUB] [VALUE]",
+	{ "sdo", "read|write|list|startup SLAVE [INDEX:SUB] [VALUE]",
 	  "Read, write or list the objects of a slave (CoE).",
 	  "ecdaq sdo read piccolo0 0x1018:1 --type UDINT\n"
 	  "ecdaq sdo write 0 0x8000:2 20 --type UINT\n"
 	  "ecdaq sdo read 0 0x1c12 --complete          all subindices, as bytes\n"
 	  "ecdaq sdo write 0 0x1c12 '01 00 00 16' --complete\n"
-	  "ecdaq sdo list 0                            the object dictionary\n\n"
-	  "INDEX is hexadecimal with 0x; :SUB may be left out for 0. Types: BOOL SINT INT DINT "
+	  "ecdaq sdo list 0                            the object dictionary\n"
+	  "ecdaq sdo startup 0                         what ecdaqd writes on the way to OP\n\n"
+	  "INDEX and SUB are hexadecimal; :SUB may be left out for 0. Types: BOOL SINT INT DINT "
 	  "LINT\n"
 	  "USINT UINT UDINT ULINT REAL LREAL, and for reading STRING.\n",
 	  verb_sdo },
@@ -144,17 +137,22 @@ static const struct verb verbs[] = {
 	  verb_aoe },
 	{ "voe", "SLAVE BYTES", "One exchange of a vendor's own protocol (VoE), in hex.",
 	  "ecdaq voe 0 '01 02 ff' --type 3\n", verb_voe },
-	{ "reg", "read|write SLAVE REGISTER [LENGTH|VALUE...]",
-	  "Read or write registers of a slave's ESC.",
+	{ "reg", "read|write|watch|list SLAVE REGISTER [LENGTH|VALUE...]",
+	  "Read, write or watch registers of a slave's ESC.",
+	  "ecdaq reg read piccolo0 al_status      by name, with its fields\n"
 	  "ecdaq reg read piccolo0 0x0130         2 bytes: AL status\n"
 	  "ecdaq reg read 0 0x0300 20             20 bytes\n"
+	  "ecdaq reg watch 0 dl_status            a line for each change\n"
+	  "ecdaq reg list                         registers that have names\n"
 	  "ecdaq reg write 0 0x0f80 1 2 0xff      3 bytes\n"
 	  "ecdaq reg write 0 0x0420 1000 -t UINT  a word\n\n"
 	  "While the bus is in operation, what the master needs unchanged is written with --force "
 	  "only.\n",
 	  verb_reg },
-	{ "sii", "read|write|alias SLAVE [FILE|ALIAS]", "Read or write a slave's EEPROM (SII).",
+	{ "sii", "read|show|write|alias SLAVE [FILE|ALIAS]",
+	  "Read or write a slave's EEPROM (SII).",
 	  "ecdaq sii read piccolo0 --output piccolo.bin\n"
+	  "ecdaq sii show piccolo0\n"
 	  "ecdaq sii write piccolo0 piccolo.bin\n"
 	  "ecdaq sii alias piccolo0 1001\n\n"
 	  "An image is checked first and verified word by word; it is in effect after the slave's "
@@ -185,13 +183,26 @@ static const struct verb verbs[] = {
 	  "ecdaq esi /etc/ecdaq/esi\n\n"
 	  "Needs no ecdaqd. A folder: its files *.xml. ecdaqd uses that of bus.esi_dir.\n",
 	  verb_esi },
-	{ "config", "show|check|diff|schema [FILE]",
-	  "The configuration: show it, check a file, compare it with the bus.",
+	{ "eni", "write|check|import [FILE]",
+	  "The bus as an ENI file; compare one with the bus; a configuration from one.",
+	  "ecdaq eni write --output bus.xml           the plan of the running bus (ETG.2100)\n"
+	  "ecdaq eni check twincat.xml                every difference between a file and the bus\n"
+	  "ecdaq eni import twincat.xml -o ecdaq.yaml  a configuration; needs no ecdaqd\n\n"
+	  "check: exit code 9 with a slave missing or another one, 3 with another difference; "
+	  "another\n"
+	  "layout of the same process data, names and addresses are allowed.\n",
+	  verb_eni },
+	{ "config", "show|check|diff|reload|schema [FILE]",
+	  "The configuration: show, check, compare with the bus, read again.",
 	  "ecdaq config show                  every option in effect, and where it is from\n"
 	  "ecdaq config check ecdaq.yaml      every problem of a file\n"
 	  "ecdaq config diff                  every difference between what ecdaqd was started "
 	  "with\n"
 	  "                                   and what is on the bus, in any state\n"
+	  "ecdaq config reload                read the file again: what changed, and what of it "
+	  "needs\n"
+	  "                                   a rescan or a restart; a file with an error changes "
+	  "nothing\n"
 	  "ecdaq config schema                JSON Schema of the file, for editors\n\n"
 	  "Without FILE that of --config, else of the ecdaqd that is running.\n",
 	  verb_config },
@@ -218,6 +229,11 @@ static const struct verb verbs[] = {
 	  "error, from lock on. work: wake to end of work. control: one call of the control "
 	  "program.\n",
 	  verb_histogram },
+	{ "metrics", "", "Figures for Prometheus.",
+	  "ecdaq metrics --output /var/lib/prometheus/node-exporter/ecdaq.prom\n\n"
+	  "The text format: counters, gauges and histograms of ecdaqd, its slaves and services.\n"
+	  "Without ecdaqd it is \"ecdaq_up 0\".\n",
+	  verb_metrics },
 	{ "log", "...", "Recordings: list, info, check, recover, export (see ecdaq log --help).",
 	  NULL, verb_program },
 	{ "security", "...", "The keys of DDS Security (see ecdaq security --help).", NULL,
@@ -229,9 +245,14 @@ static const struct verb verbs[] = {
 	{ "clear", "", "Set counters and histograms of ecdaqd to zero.", NULL, verb_clear },
 	{ "stop", "", "Stop the bus and ecdaqd in order.", NULL, verb_stop },
 	{ "completion", "", "Completion of this command line, for bash.",
-	  "source <(ecdaq completion)\n", verb_completion },
+	  "source <(ecdaq completion)\n\n"
+	  "It is installed, for the package bash-completion.\n",
+	  verb_completion },
 	{ "manual", "[VERB]", "The manual page of ecdaq, or of a verb, for man.",
-	  "ecdaq manual sdo | man -l -\n", verb_manual },
+	  "ecdaq manual sdo | man -l -\n\n"
+	  "They are installed: man ecdaq, man ecdaq-sdo.\n",
+	  verb_manual },
+	{ "help", "[VERB]", "How ecdaq, or a verb, is called.", NULL, verb_help },
 	{ "version", "", "The version of this program.", NULL, verb_version },
 };
 
@@ -295,6 +316,27 @@ static enum exit_code run(struct cli *cli, int argc, char **argv)
 	selection_done(cli->selection);
 	free(words);
 	return result;
+}
+
+static enum exit_code verb_help(struct cli *cli, int argc, char **argv)
+{
+	char option[] = "--help";
+	char *words[] = { option, NULL };
+	struct args args = { .operands_max = 1 };
+	enum exit_code result;
+
+	if (!cli_parse(cli, &args, argc, argv, &result)) {
+		return result;
+	}
+	if (args.operand_count == 0) {
+		help();
+		return EXIT_CODE_OK;
+	}
+	cli->verb = find_verb(args.operands[0]);
+	return cli->verb != NULL
+		       ? run(cli, 1, words)
+		       : cli_fail(cli, EXIT_CODE_USAGE, "%s: unknown command (see ecdaq --help)",
+				  args.operands[0]);
 }
 
 int main(int argc, char **argv)

@@ -4,6 +4,8 @@
  * options that each verb gives to cli_parse().
  */
 #include <ctype.h>
+#include <errno.h>
+#include <limits.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -213,21 +215,75 @@ static void show_front(const struct cli *cli)
 	puts(".fi");
 }
 
+static void show_page_of(const struct cli *cli, const struct verb *verb)
+{
+	if (verb == NULL) {
+		show_front(cli);
+	} else {
+		show_verb(cli, verb, show_page);
+	}
+}
+
+/* --- pages as files --- */
+
+/* The page of @verb (NULL: of ecdaq) as a file in @dir, in place of standard output. */
+static enum exit_code write_page(const struct cli *cli, const char *dir, const struct verb *verb)
+{
+	char path[PATH_MAX];
+
+	if (snprintf(path, sizeof(path), "%s/ecdaq%s%s.1", dir, verb == NULL ? "" : "-",
+		     verb == NULL ? "" : verb->name) >= (int)sizeof(path)) {
+		return cli_fail(cli, EXIT_CODE_USAGE, "--write: the path is too long");
+	}
+	errno = 0;
+	if (freopen(path, "we", stdout) != NULL) {
+		show_page_of(cli, verb);
+		if (fflush(stdout) == 0 && !ferror(stdout)) {
+			return EXIT_CODE_OK;
+		}
+	}
+	return cli_fail(cli, errno == EACCES ? EXIT_CODE_PERMISSION : EXIT_CODE_FAILED, "%s: %s",
+			path, strerror(errno != 0 ? errno : EIO));
+}
+
+/* Programs of their own have pages of their own. */
+static enum exit_code write_pages(const struct cli *cli, const char *dir)
+{
+	enum exit_code result = write_page(cli, dir, NULL);
+
+	for (size_t i = 0; i < cli->verb_count && result == EXIT_CODE_OK; i++) {
+		if (has_options(&cli->verbs[i])) {
+			result = write_page(cli, dir, &cli->verbs[i]);
+		}
+	}
+	return result;
+}
+
 enum exit_code verb_manual(struct cli *cli, int argc, char **argv)
 {
-	struct args args = { .options = NULL, .operands_max = 1 };
+	const char *dir = NULL;
+	const struct args_option options[] = {
+		{ "write", 'w', args_text, &dir, "DIR",
+		  "all pages as files in the folder DIR: ecdaq.1, ecdaq-VERB.1" },
+	};
+	struct args args = { .options = options, .option_count = 1, .operands_max = 1 };
 	enum exit_code result;
 
 	if (!cli_parse(cli, &args, argc, argv, &result)) {
 		return result;
 	}
+	if (dir != NULL) {
+		return args.operand_count > 0 ? cli_fail(cli, EXIT_CODE_USAGE,
+							 "--write and VERB exclude each other")
+					      : write_pages(cli, dir);
+	}
 	if (args.operand_count == 0) {
-		show_front(cli);
+		show_page_of(cli, NULL);
 		return EXIT_CODE_OK;
 	}
 	for (size_t i = 0; i < cli->verb_count; i++) {
 		if (strcmp(cli->verbs[i].name, args.operands[0]) == 0) {
-			show_verb(cli, &cli->verbs[i], show_page);
+			show_page_of(cli, &cli->verbs[i]);
 			return EXIT_CODE_OK;
 		}
 	}

@@ -7,12 +7,12 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "base/args.h"
 #include "base/clock.h"
 #include "base/frame_record.h"
+#include "base/host_clock.h"
 #include "cli/admin_client.h"
 #include "cli/cli.h"
 #include "cli/pcapng.h"
@@ -43,14 +43,6 @@ struct pcap {
 	uint64_t missed_before; /* the next frame */
 };
 
-static int64_t clock_ns(clockid_t clock)
-{
-	struct timespec ts;
-
-	clock_gettime(clock, &ts);
-	return (int64_t)ts.tv_sec * NS_PER_S + ts.tv_nsec;
-}
-
 /* The one before ends afterwards, so that no frame is between. */
 static enum exit_code hold(struct pcap *pcap)
 {
@@ -61,7 +53,7 @@ static enum exit_code hold(struct pcap *pcap)
 	if (result == EXIT_CODE_OK) {
 		admin_hold_end(pcap->fd);
 		pcap->fd = fd;
-		pcap->renew_mono_ns = clock_ns(CLOCK_MONOTONIC) + RENEW_NS;
+		pcap->renew_mono_ns = host_clock_ns(CLOCK_MONOTONIC) + RENEW_NS;
 	}
 	return result;
 }
@@ -105,14 +97,15 @@ static int is_over(const struct pcap *pcap)
 {
 	return (pcap->count > 0 && pcap->frames >= pcap->count) || screen_is_over() ||
 	       ferror(pcap->out) ||
-	       (pcap->duration_ns > 0 && clock_ns(CLOCK_MONOTONIC) >= pcap->end_mono_ns);
+	       (pcap->duration_ns > 0 && host_clock_ns(CLOCK_MONOTONIC) >= pcap->end_mono_ns);
 }
 
 /* Nothing to read: 1 if it goes on. A request that ends, or soon would, is made again. */
 static int wait_for_more(struct pcap *pcap, enum exit_code *ret_result)
 {
 	fflush(pcap->out);
-	if (admin_hold_has_ended(pcap->fd) || clock_ns(CLOCK_MONOTONIC) >= pcap->renew_mono_ns) {
+	if (admin_hold_has_ended(pcap->fd) ||
+	    host_clock_ns(CLOCK_MONOTONIC) >= pcap->renew_mono_ns) {
 		*ret_result = hold(pcap);
 		return *ret_result == EXIT_CODE_OK;
 	}
@@ -181,8 +174,8 @@ static enum exit_code run(struct pcap *pcap)
 	if (result != EXIT_CODE_OK) {
 		return result;
 	}
-	pcap->utc_minus_mono_ns = clock_ns(CLOCK_REALTIME) - clock_ns(CLOCK_MONOTONIC);
-	pcap->end_mono_ns = clock_ns(CLOCK_MONOTONIC) + pcap->duration_ns;
+	pcap->utc_minus_mono_ns = host_clock_ns(CLOCK_REALTIME) - host_clock_ns(CLOCK_MONOTONIC);
+	pcap->end_mono_ns = host_clock_ns(CLOCK_MONOTONIC) + pcap->duration_ns;
 	screen_catch_signals();
 	pcapng_put_head(pcap->out, interface);
 	return copy(pcap);

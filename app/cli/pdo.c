@@ -6,9 +6,14 @@
 #include "cli/cli.h"
 #include "cli/coe_type.h"
 #include "cli/each_slave.h"
+#include "cli/fit.h"
 #include "cli/pdo_info.h"
+#include "cli/screen.h"
 #include "cli/source.h"
 #include "program/json.h"
+
+/* Columns before what continues a line. */
+enum { INDENT = 12 };
 
 struct pdo_command {
 	struct cli *cli;
@@ -48,83 +53,94 @@ static unsigned bytes_of_sm(const struct pdo_info *info, unsigned sm)
 
 /* --- text --- */
 
-static void show_pdo(const struct pdo_info *info, const struct pdo_info_pdo *pdo)
+static void put_pdo(FILE *out, const struct pdo_info *info, const struct pdo_info_pdo *pdo)
 {
 	char type[TEXT_BYTES];
 	char name[SII_NAME_BYTES];
 
-	printf("      %s 0x%04x  %u bit%s", pdo->is_tx ? "TxPDO" : "RxPDO", pdo->index, pdo->bits,
-	       pdo->bits == 1 ? "" : "s");
+	fprintf(out, "      %s 0x%04x  %u bit%s", pdo->is_tx ? "TxPDO" : "RxPDO", pdo->index,
+		pdo->bits, pdo->bits == 1 ? "" : "s");
 	if (!pdo->is_assigned && pdo->sm != PDO_INFO_NO_SM) {
-		printf(", SM%d by default", pdo->sm);
+		fprintf(out, ", SM%d by default", pdo->sm);
 	}
-	printf("%s%s\n", pdo->name[0] == '\0' ? "" : "  ",
-	       text_plain(pdo->name, name, sizeof(name)));
+	if (pdo->times > 1) {
+		fprintf(out, ", ASSIGNED %u TIMES", pdo->times);
+	}
+	fprintf(out, "%s%s\n", pdo->name[0] == '\0' ? "" : "  ",
+		text_plain(pdo->name, name, sizeof(name)));
 	for (size_t i = 0; i < pdo->count; i++) {
 		const struct pdo_info_entry *e = &info->entry[pdo->first + i];
 
 		if (e->index == 0) {
-			printf("        -          %3u  padding\n", e->bits);
+			fprintf(out, "        -          %3u  padding\n", e->bits);
 			continue;
 		}
-		printf("        0x%04x:%02x  %3u  %-6s %s\n", e->index, e->subindex, e->bits,
-		       e->type == 0 ? "?" : coe_type_to_str(e->type, type),
-		       text_plain(e->name, name, sizeof(name)));
+		fprintf(out, "        0x%04x:%02x  %3u  %-6s %s\n", e->index, e->subindex, e->bits,
+			e->type == 0 ? "?" : coe_type_to_str(e->type, type),
+			text_plain(e->name, name, sizeof(name)));
 	}
 }
 
-static void show_text(const struct pdo_command *cmd, uint16_t pos, const struct pdo_info *info)
+static void put_slave(FILE *out, const struct pdo_command *cmd, uint16_t pos,
+		      const struct pdo_info *info)
 {
 	struct slave_info slave = source_slave(cmd->page, pos);
 	char text[256];
 	int is_open = 0;
 
-	printf("%3u %s  %s  assigned by %s\n", pos, slave.name,
-	       text_plain(slave.device, text, sizeof(text)), info->is_by_coe ? "CoE" : "SII");
+	fprintf(out, "%3u %s  %s  assigned by %s\n", pos, slave.name,
+		text_plain(slave.device, text, sizeof(text)), info->is_by_coe ? "CoE" : "SII");
 	if (info->why[0] != '\0') {
-		printf("    not by CoE: %s\n", text_plain(info->why, text, sizeof(text)));
+		fprintf(out, "    not by CoE: %s\n", text_plain(info->why, text, sizeof(text)));
 	}
 	if (info->damage[0] != '\0') {
-		printf("    SII: %s\n", text_plain(info->damage, text, sizeof(text)));
+		fprintf(out, "    SII: %s\n", text_plain(info->damage, text, sizeof(text)));
 	}
 	for (unsigned sm = 0; sm < pdo_info_sm_count(info); sm++) {
 		if (sm >= info->sii.sm_count && bits_of_sm(info, sm) == 0) {
 			continue;
 		}
-		printf("    SM%u %s", sm, sm_type_to_str(pdo_info_sm_type(info, sm)));
+		fprintf(out, "    SM%u %s", sm, sm_type_to_str(pdo_info_sm_type(info, sm)));
 		if (sm < info->sii.sm_count) {
-			printf(", start 0x%04x", info->sii.sm[sm].start);
+			fprintf(out, ", start 0x%04x", info->sii.sm[sm].start);
 		}
-		printf(", %u byte%s\n", bytes_of_sm(info, sm),
-		       bytes_of_sm(info, sm) == 1 ? "" : "s");
+		fprintf(out, ", %u byte%s\n", bytes_of_sm(info, sm),
+			bytes_of_sm(info, sm) == 1 ? "" : "s");
 		for (size_t i = 0; i < info->pdo_count; i++) {
 			if (info->pdo[i].is_assigned && info->pdo[i].sm == (int)sm) {
-				show_pdo(info, &info->pdo[i]);
+				put_pdo(out, info, &info->pdo[i]);
 			}
 		}
 	}
 	for (size_t i = 0; i < info->pdo_count; i++) {
 		if (!info->pdo[i].is_assigned) {
 			if (!is_open) {
-				puts("    not assigned");
+				fputs("    not assigned\n", out);
 			}
 			is_open = 1;
-			show_pdo(info, &info->pdo[i]);
+			put_pdo(out, info, &info->pdo[i]);
 		}
 	}
+}
+
+static void show_text(const struct pdo_command *cmd, uint16_t pos, const struct pdo_info *info)
+{
+	struct fit fit;
+
+	put_slave(fit_begin(&fit, screen_columns(), stdout), cmd, pos, info);
+	fit_end(&fit, INDENT);
 }
 
 /* --- JSON --- */
 
 static void pdo_json(struct json *js, const struct pdo_info *info, const struct pdo_info_pdo *pdo)
 {
-	char type[TEXT_BYTES];
-
 	json_object_begin(js, NULL);
 	json_u64(js, "index", pdo->index);
 	json_text(js, "name", pdo->name);
 	json_text(js, "direction", pdo->is_tx ? "input" : "output");
 	json_truth(js, "assigned", pdo->is_assigned);
+	json_u64(js, "times", pdo->is_assigned && pdo->times == 0 ? 1 : pdo->times);
 	if (pdo->sm == PDO_INFO_NO_SM) {
 		json_null(js, "sm");
 	} else {
@@ -135,17 +151,11 @@ static void pdo_json(struct json *js, const struct pdo_info *info, const struct 
 	for (size_t i = 0; i < pdo->count; i++) {
 		const struct pdo_info_entry *e = &info->entry[pdo->first + i];
 
-		json_object_begin(js, NULL);
-		json_u64(js, "index", e->index);
-		json_u64(js, "subindex", e->subindex);
-		json_u64(js, "bits", e->bits);
-		if (e->type == 0) {
-			json_null(js, "type");
-		} else {
-			json_text(js, "type", coe_type_to_str(e->type, type));
-		}
-		json_text(js, "name", e->name);
-		json_object_end(js);
+		coe_entry_json(js, &(struct coe_entry){ .index = e->index,
+							.subindex = e->subindex,
+							.bits = e->bits,
+							.type = e->type,
+							.name = e->name });
 	}
 	json_array_end(js);
 	json_object_end(js);
@@ -234,15 +244,8 @@ enum exit_code verb_pdo(struct cli *cli, int argc, char **argv)
 	if (result != EXIT_CODE_OK) {
 		return result;
 	}
-	json_init(&cmd.js, stdout);
-	if (cmd.is_json) {
-		json_array_begin(&cmd.js, NULL);
-	}
-	result = each_slave(cli, cmd.page, args.operands, args.operand_count, run_one, &cmd);
-	if (cmd.is_json) {
-		json_array_end(&cmd.js);
-		json_end_line(&cmd.js);
-	}
+	result = each_slave_listed(cli, cmd.page, &args, cmd.is_json ? &cmd.js : NULL, run_one,
+				   &cmd);
 	source_status_close(cmd.page);
 	return result;
 }

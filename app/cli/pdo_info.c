@@ -10,6 +10,7 @@
 #include "base/utf8.h"
 #include "cli/admin_client.h"
 #include "cli/esi_source.h"
+#include "cli/text.h"
 
 enum {
 	OBJECT_SM_ASSIGN = 0x1c10,
@@ -46,6 +47,32 @@ unsigned pdo_info_sm_type(const struct pdo_info *info, unsigned sm)
 unsigned pdo_info_sm_count(const struct pdo_info *info)
 {
 	return info->sii.sm_count > SM_MIN ? (unsigned)info->sii.sm_count : SM_MIN;
+}
+
+void pdo_info_ports(const struct pdo_info *info, char ret_text[PDO_INFO_PORTS_BYTES])
+{
+	enum { PORTS_AT = 16 }; /* in the general category of an SII */
+	static const char letters[] = " Y KH";
+	unsigned last = PDO_INFO_PORTS_BYTES - 1;
+	size_t at;
+	size_t len;
+	unsigned ports;
+
+	memset(ret_text, 0, PDO_INFO_PORTS_BYTES);
+	if (sii_find_category(info->image, info->image_bytes, SII_CATEGORY_GENERAL, &at, &len) <
+		    0 ||
+	    len < PORTS_AT + 2) {
+		return;
+	}
+	ports = get_le16(info->image + at + PORTS_AT);
+	for (unsigned i = 0; i < last; i++) {
+		unsigned kind = ports >> (4 * i) & 0xf;
+
+		ret_text[i] = kind < sizeof(letters) - 1 ? letters[kind] : ' ';
+	}
+	for (; last > 0 && ret_text[last - 1] == ' '; last--) {
+		ret_text[last - 1] = '\0';
+	}
 }
 
 /* --- SII --- */
@@ -111,12 +138,14 @@ static enum exit_code read_sii(struct pdo_reader *rd)
 /* 1 and the answer; 0: the slave has no such object; -1: no answer, no further request. */
 static int ask(struct pdo_reader *rd, enum admin_verb verb, uint16_t index, uint8_t subindex)
 {
-	admin_transfer_done(&rd->transfer);
-	rd->transfer.answer_len = 0;
 	rd->request.verb = verb;
 	rd->request.index = index;
 	rd->request.subindex = subindex;
-	if (rd->is_over || admin_transfer(rd->cli, &rd->transfer) != EXIT_CODE_OK) {
+	if (rd->is_over) {
+		return -1;
+	}
+	if (admin_transfer_read(rd->cli, &rd->transfer) != EXIT_CODE_OK) {
+		snprintf(rd->info->why, sizeof(rd->info->why), "no answer of ecdaqd");
 		rd->is_over = 1;
 		return -1;
 	}
@@ -251,7 +280,8 @@ static struct pdo_info_pdo *put_pdo(struct pdo_reader *rd, uint16_t index, size_
 	}
 	moved = *pdo;
 	if (pdo < &info->pdo[place]) {
-		return NULL; /* assigned twice: shown once */
+		pdo->times++;
+		return NULL; /* shown once */
 	}
 	memmove(&info->pdo[place + 1], &info->pdo[place],
 		(size_t)(pdo - &info->pdo[place]) * sizeof(*pdo));
@@ -279,6 +309,7 @@ static int read_sm(struct pdo_reader *rd, unsigned sm, size_t known, size_t *pla
 			pdo->sm = (int16_t)sm;
 			pdo->is_tx = pdo_info_sm_type(rd->info, sm) == SM_INPUTS;
 			pdo->is_assigned = 1;
+			pdo->times = 1;
 			(*place)++;
 			r = read_mapping(rd, pdo, known) < 0 ? -1 : 1;
 		}
@@ -341,6 +372,10 @@ static enum exit_code add_coe(struct pdo_reader *rd)
 	}
 	*by_sii = *info;
 	info->is_by_coe = read_coe(rd) > 0;
+	if (!info->is_by_coe && info->why[0] == '\0') {
+		snprintf(info->why, sizeof(info->why),
+			 "its object dictionary has no assignment of PDOs (0x1c12, 0x1c13)");
+	}
 	if (!info->is_by_coe) {
 		memcpy(by_sii->why, info->why, sizeof(by_sii->why));
 		*info = *by_sii;
@@ -349,7 +384,31 @@ static enum exit_code add_coe(struct pdo_reader *rd)
 	return EXIT_CODE_OK;
 }
 
+void pdo_info_warn(const struct cli *cli, uint16_t pos, const struct pdo_info *info)
+{
+	char why[sizeof(info->why)];
+
+	if (info->why[0] != '\0') {
+		(void)cli_fail(cli, EXIT_CODE_OK, "slave %u: PDOs by SII, not by CoE: %s", pos,
+			       text_plain(info->why, why, sizeof(why)));
+	}
+}
+
 /* --- ESI: names and types that both lack --- */
+
+static void complete(struct pdo_info_entry *e, const struct esi_device *device, uint16_t pdo)
+{
+	struct esi_known known;
+
+	if (e->index == 0) {
+		return;
+	}
+	known = esi_find_known(device, (struct esi_shift){ 0, 0 }, pdo, e->index, e->subindex);
+	if (e->name[0] == '\0') {
+		utf8_copy(known.name, e->name, sizeof(e->name));
+	}
+	e->type = e->type != 0 ? e->type : known.type;
+}
 
 static void add_esi(struct cli *cli, struct pdo_info *info)
 {
@@ -364,18 +423,7 @@ static void add_esi(struct cli *cli, struct pdo_info *info)
 			utf8_copy(known->name, pdo->name, sizeof(pdo->name));
 		}
 		for (size_t k = 0; k < pdo->count; k++) {
-			struct pdo_info_entry *e = &info->entry[pdo->first + k];
-			const struct esi_entry *found =
-				e->index == 0
-					? NULL
-					: esi_find_entry(device, pdo->index, e->index, e->subindex);
-
-			if (found != NULL && e->name[0] == '\0') {
-				utf8_copy(found->name, e->name, sizeof(e->name));
-			}
-			if (found != NULL && e->type == 0) {
-				e->type = found->type;
-			}
+			complete(&info->entry[pdo->first + k], device, pdo->index);
 		}
 	}
 }

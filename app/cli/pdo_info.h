@@ -29,6 +29,7 @@ struct pdo_info_pdo {
 	int16_t sm;          /* assigned to, or by default; PDO_INFO_NO_SM */
 	uint8_t is_tx;       /* TxPDO: inputs of the master */
 	uint8_t is_assigned; /* now */
+	uint8_t times;       /* assigned, as CoE has it; more than once is a mistake */
 	char name[SII_NAME_BYTES];
 	size_t first; /* of its entries */
 	size_t count;
@@ -52,10 +53,16 @@ struct pdo_info {
  * code of a failure, which has been reported. */
 enum exit_code pdo_info_read(struct cli *cli, uint16_t pos, struct pdo_info **ret_info);
 void pdo_info_free(struct pdo_info *info);
+/** One line on standard error if they are not by CoE although the slave has it. */
+void pdo_info_warn(const struct cli *cli, uint16_t pos, const struct pdo_info *info);
 
 /** The type of SyncManager @sm as sii.h has it: what the SII says, else by its number. */
 unsigned pdo_info_sm_type(const struct pdo_info *info, unsigned sm);
 /** SyncManagers to look at: those of the SII, at least four. */
 unsigned pdo_info_sm_count(const struct pdo_info *info);
+
+enum { PDO_INFO_PORTS_BYTES = 5 };
+/** A letter a port, as ESI and ENI files have it; blank: not there. "": the SII does not say. */
+void pdo_info_ports(const struct pdo_info *info, char ret_text[PDO_INFO_PORTS_BYTES]);
 
 #endif

@@ -295,8 +295,9 @@ static int call_clock(const char *object, char text[PROBE_TEXT_BYTES])
 	if (adjtimex(&tx) < 0) {
 		return -errno;
 	}
-	snprintf(text, PROBE_TEXT_BYTES, "synchronised %d\nerror_us %ld\ntai_offset_s %d\n",
-		 (tx.status & STA_UNSYNC) == 0, tx.maxerror, tx.tai);
+	snprintf(text, PROBE_TEXT_BYTES,
+		 "synchronised %d\nerror_us %ld\ntai_offset_s %d\nutc_s %" PRId64 "\n",
+		 (tx.status & STA_UNSYNC) == 0, tx.maxerror, tx.tai, (int64_t)tx.time.tv_sec);
 	return 0;
 }
 

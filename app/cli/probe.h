@@ -47,10 +47,10 @@ int probe_each(const struct probe *p, const char *dir, void (*each)(void *ctx, c
  *   eee         enabled active                        energy-efficient Ethernet of port @object
  *   coalesce    rx_us rx_frames adaptive              of port @object; adaptive: the driver moves
  * rx_us addresses   (IP addresses of port @object, separated by blanks) clock       synchronised
- * error_us tai_offset_s    error_us: the kernel's bound of its error disk        bytes_total
- * bytes_free inodes_total inodes_free read_only memory of the file system that @object is on; free:
- * for who is not root; memory: tmpfs throttled   flags                                 of a
- * Raspberry Pi's firmware (tag 0x00030046)
+ * error_us tai_offset_s utc_s    error_us: the kernel's bound of its error; utc_s: since 1970 disk
+ * bytes_total bytes_free inodes_total inodes_free read_only memory of the file system that @object
+ * is on; free: for who is not root; memory: tmpfs throttled   flags of a Raspberry Pi's firmware
+ * (tag 0x00030046)
  *
  * The length of the text.
  */

@@ -10,12 +10,11 @@
 #include "base/event.h"
 #include "base/sync0.h"
 #include "cli/fit.h"
-#include "cli/running.h"
 #include "cli/screen.h"
 #include "cli/source.h"
 #include "cli/sync0_source.h"
 #include "cli/text.h"
-#include "wire/al.h"
+#include "reader/page.h"
 
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
 
@@ -27,12 +26,14 @@ void report_gather(struct cli *cli, const struct status_page *page,
 	struct report report = { .page = page, .record = record };
 	struct samples samples;
 
-	report.is_running = running_is_alive(page->pid);
-	report.is_recorder_running = record != NULL && running_is_alive(record->pid);
+	report.is_running = page_is_alive(page->pid);
+	report.is_recorder_running = record != NULL && page_is_alive(record->pid);
 	report.dds = source_dds(cli);
-	report.is_dds_running = report.dds != NULL && running_is_alive(report.dds->pid);
+	report.is_dds_running = report.dds != NULL && page_is_alive(report.dds->pid);
+	report.stream = source_stream(cli);
+	report.is_stream_running = report.stream != NULL && page_is_alive(report.stream->pid);
 	report.sync0 = sync0_source_try(cli);
-	report.is_sync0_running = report.sync0 != NULL && running_is_alive(report.sync0->pid);
+	report.is_sync0_running = report.sync0 != NULL && page_is_alive(report.sync0->pid);
 	if (samples_try(cli, &samples) == 0) {
 		if (samples.meta->session == page->session && reader_read_newest(samples.reader)) {
 			struct sample_header header = samples_header(&samples);
@@ -50,17 +51,8 @@ void report_gather(struct cli *cli, const struct status_page *page,
 void report_release(const struct report *report)
 {
 	source_dds_close(report->dds);
+	source_stream_close(report->stream);
 	sync0_source_close(report->sync0);
-}
-
-void report_al_format(uint32_t al_state, char *buf, size_t buf_len)
-{
-	if ((al_state & AL_STATE_MASK) == 0) {
-		snprintf(buf, buf_len, "unknown"); /* no frame comes back from it */
-		return;
-	}
-	snprintf(buf, buf_len, "%s%s", al_state_to_str((uint16_t)(al_state & AL_STATE_MASK)),
-		 (al_state & AL_ERROR) != 0 ? "+ERROR" : "");
 }
 
 /* Behind the name of a program; at the end of a run all have ended, and should have. */
@@ -297,6 +289,33 @@ static void write_dds(const struct report *report, FILE *out)
 		GET(dds->commands_refused), dds->is_secure ? "   secured" : "");
 }
 
+/* The same. */
+static void write_stream(const struct report *report, FILE *out)
+{
+	const struct stream_status *st = report->stream;
+	char plain[sizeof(st->message)];
+	char sent[TEXT_BYTES];
+
+	if (st == NULL) {
+		return;
+	}
+	fprintf(out, "stream     %s%s, as %s", stream_state_to_str(GET(st->state)),
+		mark_absent(report, report->is_stream_running),
+		text_plain(st->appliance, plain, sizeof(plain)));
+	fprintf(out, " in %s", text_plain(st->stream, plain, sizeof(plain)));
+	if (st->server[0] != '\0') {
+		fprintf(out, " at %s", text_plain(st->server, plain, sizeof(plain)));
+	}
+	fprintf(out,
+		"   to cycle %" PRIu64 ", %" PRIu64 " gaps (%" PRIu64 " missing)   %" PRIu64
+		" events   lag %" PRIu64 " cycles   %s sent\n",
+		GET(st->next_cycle), GET(st->gaps), GET(st->cycles_missing), GET(st->events),
+		GET(st->lag_cycles), text_bytes(GET(st->bytes_sent), sent));
+	if (st->message[0] != '\0') {
+		fprintf(out, "           %s\n", text_plain(st->message, plain, sizeof(plain)));
+	}
+}
+
 uint32_t report_sync0_verdict(const struct sync0_status *page)
 {
 	uint32_t v = SYNC0_NONE;
@@ -386,6 +405,7 @@ static void write_head_lines(const struct report *report, enum report_detail det
 	write_times(report->page, out);
 	write_recorder(report, out);
 	write_dds(report, out);
+	write_stream(report, out);
 	write_sync0(report, out);
 }
 
@@ -430,6 +450,7 @@ void report_write_summary(const struct report *report, FILE *out)
 	write_times(report->page, out);
 	write_recorder(report, out);
 	write_dds(report, out);
+	write_stream(report, out);
 	write_sync0(report, out);
 	write_message(report->page, out);
 }

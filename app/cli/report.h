@@ -13,10 +13,12 @@ struct report {
 	const struct status_page *page;
 	const struct record_status *record; /* NULL: no recorder was started */
 	const struct dds_status *dds;       /* NULL: no ecdaq-dds was started */
+	const struct stream_status *stream; /* NULL: no ecdaq-stream was started */
 	const struct sync0_status *sync0;   /* NULL: no ecdaq-sync0 was started */
 	int is_running;                     /* ecdaqd's process is there */
 	int is_recorder_running;
 	int is_dds_running;
+	int is_stream_running;
 	int is_sync0_running;
 	int has_wkc; /* the newest sample could be read */
 	uint16_t wkc;
@@ -65,9 +67,6 @@ void report_write_screen(const struct report *report, int columns, FILE *out);
 void report_write_summary(const struct report *report, FILE *out);
 /** One JSON object, without the end of the line; doc/reference/cli.md lists its keys. */
 void report_write_json(const struct report *report, struct json *js);
-
-/** "OP", "SAFE-OP+ERROR". */
-void report_al_format(uint32_t al_state, char *buf, size_t buf_len);
 
 /** The worst verdict of all lines; a lost line is a failed one. */
 uint32_t report_sync0_verdict(const struct sync0_status *page);

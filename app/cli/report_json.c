@@ -146,6 +146,36 @@ static void write_dds(struct json *js, const struct report *report)
 	json_object_end(js);
 }
 
+static void write_stream(struct json *js, const struct report *report)
+{
+	const struct stream_status *st = report->stream;
+
+	if (st == NULL) {
+		json_null(js, "stream");
+		return;
+	}
+	json_object_begin(js, "stream");
+	json_text(js, "state", stream_state_to_str(GET(st->state)));
+	json_truth(js, "running", report->is_stream_running);
+	json_i64(js, "pid", st->pid);
+	json_text(js, "server", st->server);
+	json_text(js, "stream", st->stream);
+	json_text(js, "appliance", st->appliance);
+	json_u64(js, "session", GET(st->session));
+	json_u64(js, "next_cycle", GET(st->next_cycle));
+	json_u64(js, "blocks", GET(st->blocks));
+	json_u64(js, "slave_cycles", GET(st->cycles));
+	json_u64(js, "bytes_sent", GET(st->bytes_sent));
+	json_u64(js, "events", GET(st->events));
+	json_u64(js, "events_lost", GET(st->events_lost));
+	json_u64(js, "gaps", GET(st->gaps));
+	json_u64(js, "cycles_missing", GET(st->cycles_missing));
+	json_u64(js, "connects", GET(st->connects));
+	json_u64(js, "lag_cycles", GET(st->lag_cycles));
+	json_text(js, "message", st->message);
+	json_object_end(js);
+}
+
 static void write_control(struct json *js, const struct status_page *page)
 {
 	const struct control_status *st = &page->control;
@@ -185,12 +215,14 @@ void report_slave_json(const struct status_page *page, uint32_t index, struct js
 	const struct slave_status *slave = &page->slave[index];
 	struct slave_info info = source_slave(page, index);
 	uint32_t code = GET(slave->al_status_code);
+	char group[SOURCE_GROUP_BYTES];
 	char state[24];
 
-	report_al_format(GET(slave->al_state), state, sizeof(state));
+	al_status_format(GET(slave->al_state), state, sizeof(state));
 	json_object_begin(js, NULL);
 	json_u64(js, "position", index);
 	json_text(js, "name", info.name);
+	json_text(js, "group", source_group(page, index, group));
 	json_text(js, "device", info.device);
 	json_u64(js, "vendor", info.vendor);
 	json_u64(js, "product", info.product);
@@ -301,6 +333,7 @@ void report_write_json(const struct report *report, struct json *js)
 	write_control(js, page);
 	write_record(js, report);
 	write_dds(js, report);
+	write_stream(js, report);
 	write_sync0(report, js);
 	write_degraded(js, page);
 	json_array_begin(js, "slave");

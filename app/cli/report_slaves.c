@@ -180,7 +180,7 @@ static void write_state(const struct slave_status *slave, const struct layout *l
 	char state[24];
 	char *error;
 
-	report_al_format(al_state, state, sizeof(state));
+	al_status_format(al_state, state, sizeof(state));
 	error = strstr(state, "+ERROR");
 	if (error != NULL && l->state < wide.state) {
 		error[2] = '\0'; /* "SAFE-OP+E" */

@@ -2,8 +2,6 @@
 #include "cli/running.h"
 
 #include <dirent.h>
-#include <errno.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,11 +10,6 @@
 
 #include "reader/page.h"
 
-int running_is_alive(int64_t pid)
-{
-	return pid > 0 && (kill((pid_t)pid, 0) == 0 || errno == EPERM);
-}
-
 static int is_running(const char *dir, struct running *ret_running)
 {
 	struct status_page *page = malloc(sizeof(*page));
@@ -24,7 +17,7 @@ static int is_running(const char *dir, struct running *ret_running)
 	int found = 0;
 
 	snprintf(path, sizeof(path), "%s%s", dir, CONFIG_RUN_STATUS);
-	if (page != NULL && page_read_status(path, page) == 0 && running_is_alive(page->pid)) {
+	if (page != NULL && page_read_status(path, page) == 0 && page_is_alive(page->pid)) {
 		snprintf(ret_running->dir, sizeof(ret_running->dir), "%s", dir);
 		snprintf(ret_running->interface, sizeof(ret_running->interface), "%s",
 			 page->interface);

@@ -16,9 +16,6 @@ struct running {
 	int is_simulated;
 };
 
-/** 1 if the process with @pid, the writer of a status page, is still there. */
-int running_is_alive(int64_t pid);
-
 /**
  * Look at @system_dir ("/run/ecdaq") and at the directories of this user that are named "ecdaq-*"
  * in

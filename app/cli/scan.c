@@ -10,10 +10,13 @@
 #include "cli/coe_type.h"
 #include "cli/each_slave.h"
 #include "cli/file.h"
+#include "cli/fit.h"
 #include "cli/pdo_info.h"
+#include "cli/screen.h"
 #include "cli/source.h"
 #include "image/image.h"
 #include "program/json.h"
+#include "program/progress.h"
 
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
 
@@ -107,7 +110,7 @@ static void put_channel(FILE *out, const struct samples *samples, const struct c
 		fputs(", unit: ", out);
 		json_put_text(out, unit);
 	}
-	if (ch->scale != 1.0 || ch->offset != 0.0) {
+	if (image_is_scaled(ch)) {
 		fputs(", scale: ", out);
 		json_put_real(out, ch->scale);
 		fputs(", offset: ", out);
@@ -155,8 +158,10 @@ static enum exit_code put_slave(void *ctx, uint16_t pos)
 	struct slave_info slave = source_slave(cmd->page, pos);
 	char device[sizeof(slave.device)];
 	struct pdo_info *info;
-	enum exit_code result = pdo_info_read(cmd->cli, pos, &info);
+	enum exit_code result;
 
+	progress_at(pos);
+	result = pdo_info_read(cmd->cli, pos, &info);
 	if (result != EXIT_CODE_OK) {
 		return result;
 	}
@@ -173,6 +178,9 @@ static enum exit_code put_slave(void *ctx, uint16_t pos)
 	}
 	put_channels(cmd, pos);
 	put_pdos(cmd->out, info);
+	if (cmd->path != NULL) {
+		pdo_info_warn(cmd->cli, pos, info);
+	}
 	pdo_info_free(info);
 	return EXIT_CODE_OK;
 }
@@ -189,21 +197,40 @@ static enum exit_code check(const struct scan_command *cmd, const char *text, si
 	return r == 0 ? EXIT_CODE_OK : cli_fail(cmd->cli, EXIT_CODE_FAILED, "%s", error);
 }
 
+/* On a terminal, what continues a comment is one as well: it stays the same configuration. */
+static void show_text(const char *text, int columns)
+{
+	while (*text != '\0') {
+		size_t len = strcspn(text, "\n");
+		size_t lead = strspn(text, " ");
+		char prefix[32] = "";
+
+		if (text[lead] == '#') {
+			snprintf(prefix, sizeof(prefix), "%.*s#      ",
+				 (int)(lead < 16 ? lead : 16), text);
+		}
+		fit_write_line(text, len, prefix[0] == '\0' ? 0 : columns, prefix, stdout);
+		text += len + (text[len] == '\n');
+	}
+}
+
 static enum exit_code write_out(const struct scan_command *cmd, const char *text, size_t len)
 {
 	enum exit_code result = check(cmd, text, len);
+	char size[TEXT_BYTES];
 
 	if (result != EXIT_CODE_OK) {
 		return result;
 	}
 	if (cmd->path == NULL) {
-		fwrite(text, 1, len, stdout);
+		show_text(text, screen_columns());
 		return EXIT_CODE_OK;
 	}
 	result = cmd->is_forced ? file_write(cmd->cli, cmd->path, (const uint8_t *)text, len)
 				: file_write_new(cmd->cli, cmd->path, (const uint8_t *)text, len);
 	if (result == EXIT_CODE_OK) {
-		printf("%s: %u slaves\n", cmd->path, source_slave_count(cmd->page));
+		printf("%s: %u slaves, %s\n", cmd->path, source_slave_count(cmd->page),
+		       text_bytes(len, size));
 	}
 	return result;
 }
@@ -219,7 +246,9 @@ static enum exit_code write_yaml(struct scan_command *cmd)
 		return cli_fail(cmd->cli, EXIT_CODE_FAILED, "out of memory");
 	}
 	put_head(cmd);
+	progress_begin_of("scan", source_slave_count(cmd->page), "slaves");
 	result = each_slave(cmd->cli, cmd->page, NULL, 0, put_slave, cmd);
+	progress_end();
 	if (fclose(cmd->out) != 0 && result == EXIT_CODE_OK) {
 		result = cli_fail(cmd->cli, EXIT_CODE_FAILED, "out of memory");
 	}
@@ -285,13 +314,16 @@ static enum exit_code run(struct scan_command *cmd)
 enum exit_code verb_scan(struct cli *cli, int argc, char **argv)
 {
 	struct scan_command cmd = { .cli = cli };
+	int is_progress = 0;
 	const struct args_option options[] = {
 		{ "write", 'w', args_text, &cmd.path, "FILE", "write it to FILE" },
 		{ "force", 0, args_flag, &cmd.is_forced, NULL, "replace FILE if it is there" },
 		{ "json", 0, args_flag, &cmd.is_json, NULL,
 		  "the slaves as a JSON array, not as a configuration" },
+		{ "progress", 0, args_flag, &is_progress, NULL,
+		  "show how far it is where standard error is no terminal, too" },
 	};
-	struct args args = { .options = options, .option_count = 3 };
+	struct args args = { .options = options, .option_count = 4 };
 	enum exit_code result;
 
 	if (!cli_parse(cli, &args, argc, argv, &result)) {
@@ -301,6 +333,9 @@ enum exit_code verb_scan(struct cli *cli, int argc, char **argv)
 		return cli_fail(cli, EXIT_CODE_USAGE,
 				cmd.is_json ? "--write and --json exclude each other"
 					    : "--force requires --write");
+	}
+	if (is_progress) {
+		progress_always();
 	}
 	result = source_status(cli, &cmd.page);
 	if (result != EXIT_CODE_OK) {

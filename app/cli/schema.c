@@ -223,6 +223,7 @@ static void put_option(struct json *js, const struct option *option, const char 
 	}
 	json_object_begin(js, name);
 	json_text(js, "description", text);
+	json_text(js, "x-takes-effect", config_effect_to_str((uint32_t)option->effect));
 	if (option->default_value != NULL) {
 		json_text(js, "default", option->default_value);
 	}
@@ -244,10 +245,26 @@ static const char *name_under(const struct option *option, const char *prefix)
 
 static void put_lists(struct json *js, const char *prefix);
 
+/* An object; the items of some lists may be a line of text instead. */
+static void put_type(struct json *js, const struct option_list *list)
+{
+	if (list == NULL || list->line_pattern == NULL) {
+		json_text(js, "type", "object");
+		return;
+	}
+	json_array_begin(js, "type");
+	json_text(js, NULL, "object");
+	json_text(js, NULL, "string");
+	if (list->is_number_line) {
+		json_text(js, NULL, "number");
+	}
+	json_array_end(js);
+	json_text(js, "pattern", list->line_pattern);
+}
+
 /* The inside of an object: the options, and the lists, below @prefix. */
 static void put_members(struct json *js, const char *prefix)
 {
-	json_text(js, "type", "object");
 	json_truth(js, "additionalProperties", 0);
 	json_object_begin(js, "properties");
 	for (size_t i = 0; i < option_count(); i++) {
@@ -288,7 +305,8 @@ static void put_lists(struct json *js, const char *prefix)
 		json_text(js, "type", "array");
 		json_u64(js, "maxItems", list->limit);
 		json_object_begin(js, "items");
-		snprintf(inside, sizeof(inside), "%s[].", list->name);
+		option_list_prefix(list, inside);
+		put_type(js, list);
 		put_members(js, inside);
 		json_object_end(js);
 		json_object_end(js);
@@ -310,6 +328,7 @@ void schema_write(struct json *js)
 		snprintf(prefix, sizeof(prefix), "%s.", option_sections[i].name);
 		json_object_begin(js, option_sections[i].name);
 		json_text(js, "description", option_sections[i].prose);
+		put_type(js, NULL);
 		put_members(js, prefix);
 		json_object_end(js);
 	}

@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "base/host_clock.h"
 #include "base/stop.h"
 #include "cli/fit.h"
 
@@ -353,14 +354,6 @@ int screen_scroll_key(struct screen_scroll *scroll, int key)
 	return 1;
 }
 
-static int64_t now_ns(void)
-{
-	struct timespec ts;
-
-	clock_gettime(CLOCK_MONOTONIC, &ts);
-	return (int64_t)ts.tv_sec * NS_PER_S + ts.tv_nsec;
-}
-
 /* Read what was typed. A standard input that has ended gives no more keys. */
 static void read_typed(void)
 {
@@ -445,7 +438,7 @@ static int wait_for_key(int64_t until_ns, const sigset_t *mask)
 	struct pollfd fd = { .fd = STDIN_FILENO, .events = POLLIN };
 
 	for (;;) {
-		int64_t left_ns = until_ns - now_ns();
+		int64_t left_ns = until_ns - host_clock_ns(CLOCK_MONOTONIC);
 		/* A single Escape is a key once nothing follows. */
 		int64_t wait_ns = typed_len > 0 && left_ns > ESCAPE_WAIT_MS * NS_PER_MS
 					  ? ESCAPE_WAIT_MS * NS_PER_MS
@@ -472,7 +465,7 @@ static int wait_for_key(int64_t until_ns, const sigset_t *mask)
 int screen_wait(int64_t ns)
 {
 	static const int numbers[] = { SIGINT, SIGTERM, SIGHUP, SIGTSTP, SIGCONT, SIGWINCH };
-	int64_t until_ns = now_ns() + ns;
+	int64_t until_ns = host_clock_ns(CLOCK_MONOTONIC) + ns;
 	sigset_t caught;
 	sigset_t mask;
 	int key;

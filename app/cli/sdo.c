@@ -4,6 +4,7 @@
 #include "cli/mail.h"
 #include "cli/sdo_list.h"
 #include "cli/source.h"
+#include "cli/startup_list.h"
 
 static void write_keys(struct json *js, const struct mail *mail)
 {
@@ -50,17 +51,33 @@ static enum exit_code write_object(struct mail *mail, char **operands, int count
 	return result == EXIT_CODE_OK ? mail_write(mail, ADMIN_SDO_WRITE, operands[1]) : result;
 }
 
-static enum exit_code list_objects(struct mail *mail, char **operands, int count)
+/* What shows a list has no options of a transfer. */
+static enum exit_code take_slave(struct mail *mail, char **operands)
 {
-	enum exit_code result;
-
-	(void)count;
 	if (mail->type != NULL || mail->request.argument[0] != 0) {
-		return cli_fail(mail->cli, EXIT_CODE_USAGE, "list: has no option %s",
+		return cli_fail(mail->cli, EXIT_CODE_USAGE, "%s: has no option %s", operands[0],
 				mail->type != NULL ? "--type" : "--complete");
 	}
-	result = source_slave_pos(mail->cli, operands[1], &mail->request.slave_pos);
+	return source_slave_pos(mail->cli, operands[1], &mail->request.slave_pos);
+}
+
+static enum exit_code list_objects(struct mail *mail, char **operands, int count)
+{
+	enum exit_code result = take_slave(mail, operands);
+
+	(void)count;
 	return result == EXIT_CODE_OK ? sdo_list(mail) : result;
+}
+
+static enum exit_code list_startup(struct mail *mail, char **operands, int count)
+{
+	enum exit_code result = take_slave(mail, operands);
+	struct json js;
+
+	(void)count;
+	return result == EXIT_CODE_OK ? startup_list_show(mail->cli, mail->request.slave_pos,
+							  mail->is_json ? &js : NULL)
+				      : result;
 }
 
 enum exit_code verb_sdo(struct cli *cli, int argc, char **argv)
@@ -69,6 +86,7 @@ enum exit_code verb_sdo(struct cli *cli, int argc, char **argv)
 		{ "read", 3, 3, "read: expected SLAVE INDEX:SUB", read_object },
 		{ "write", 4, 4, "write: expected SLAVE INDEX:SUB VALUE", write_object },
 		{ "list", 2, 2, "list: expected SLAVE", list_objects },
+		{ "startup", 2, 2, "startup: expected SLAVE", list_startup },
 	};
 	struct mail mail;
 	int is_complete = 0;

@@ -33,11 +33,6 @@ static int parse_physical(const struct channel *ch, const char *text, uint64_t *
 	return image_physical_to_raw(ch, value, ret_raw);
 }
 
-static int is_scaled(const struct channel *ch)
-{
-	return ch->scale != 1.0 || ch->offset != 0.0;
-}
-
 /* "piccolo0.led=1" into @item. */
 static enum exit_code take_word(struct setting *setting, const char *word, struct admin_item *item)
 {
@@ -63,8 +58,8 @@ static enum exit_code take_word(struct setting *setting, const char *word, struc
 	if (ch->direction != CHANNEL_OUTPUT) {
 		return cli_fail(cli, EXIT_CODE_FAILED, "%s: is an input", name);
 	}
-	r = is_scaled(ch) && !setting->is_raw ? parse_physical(ch, equals + 1, &item->raw)
-					      : image_raw_parse(ch, equals + 1, &item->raw);
+	r = image_is_scaled(ch) && !setting->is_raw ? parse_physical(ch, equals + 1, &item->raw)
+						    : image_raw_parse(ch, equals + 1, &item->raw);
 	if (r < 0) {
 		image_type_format(ch, type, sizeof(type));
 		return cli_fail(cli, EXIT_CODE_FAILED, "%s: %s %s %s", name, equals + 1,

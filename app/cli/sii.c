@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* ecdaq sii read, ecdaq sii write, ecdaq sii alias */
+/* ecdaq sii read, ecdaq sii show, ecdaq sii write, ecdaq sii alias */
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,6 +11,7 @@
 #include "cli/cli.h"
 #include "cli/file.h"
 #include "cli/hex.h"
+#include "cli/sii_show.h"
 #include "cli/source.h"
 #include "program/json.h"
 #include "wire/sii.h"
@@ -20,6 +21,7 @@ struct sii_command {
 	const char *output; /* file; NULL: standard output */
 	int is_forced;
 	int is_json;
+	int is_shown; /* in words */
 	struct admin_request request;
 	struct admin_transfer transfer;
 };
@@ -68,6 +70,12 @@ static enum exit_code read_sii(struct sii_command *cmd)
 	}
 	if (result != EXIT_CODE_OK) {
 		return result;
+	}
+	if (cmd->is_shown && cmd->is_json) {
+		return sii_show_json(cmd->cli, cmd->request.slave_pos, tr->answer, tr->answer_len);
+	}
+	if (cmd->is_shown) {
+		return sii_show(cmd->cli, tr->answer, tr->answer_len);
 	}
 	if (cmd->is_json) {
 		show_json(cmd);
@@ -124,33 +132,47 @@ static enum exit_code write_file(struct sii_command *cmd, const char *path)
 
 /* --- all --- */
 
+enum { READ, SHOW, WRITE, ALIAS, VERBS };
+
+static const struct sii_verb {
+	const char *word;
+	enum admin_verb verb;
+	int operands;
+	const char *usage;
+} verbs[VERBS] = { [READ] = { "read", ADMIN_SII_READ, 2, "read: expected SLAVE" },
+		   [SHOW] = { "show", ADMIN_SII_READ, 2, "show: expected SLAVE" },
+		   [WRITE] = { "write", ADMIN_SII_WRITE, 3, "write: expected SLAVE FILE" },
+		   [ALIAS] = { "alias", ADMIN_SII_ALIAS, 3, "alias: expected SLAVE ALIAS" } };
+
+/* An option that @n does not have; NULL: none was given. */
+static const char *foreign_option(const struct sii_command *cmd, size_t n)
+{
+	if (cmd->output != NULL && n != READ) {
+		return "--output";
+	}
+	return cmd->is_forced && (n == READ || n == SHOW) ? "--force" : NULL;
+}
+
 static enum exit_code run(struct sii_command *cmd, const struct args *args)
 {
-	static const struct {
-		const char *word;
-		enum admin_verb verb;
-		int operands;
-		const char *usage;
-	} verbs[] = { { "read", ADMIN_SII_READ, 2, "read: expected SLAVE" },
-		      { "write", ADMIN_SII_WRITE, 3, "write: expected SLAVE FILE" },
-		      { "alias", ADMIN_SII_ALIAS, 3, "alias: expected SLAVE ALIAS" } };
 	enum exit_code result;
 	size_t n = 0;
 
-	while (n < 3 && strcmp(args->operands[0], verbs[n].word) != 0) {
+	while (n < VERBS && strcmp(args->operands[0], verbs[n].word) != 0) {
 		n++;
 	}
-	if (n == 3) {
-		return cli_fail(cmd->cli, EXIT_CODE_USAGE, "%s: expected read, write or alias",
-				args->operands[0]);
+	if (n == VERBS) {
+		return cli_fail(cmd->cli, EXIT_CODE_USAGE,
+				"%s: expected read, show, write or alias", args->operands[0]);
 	}
 	if (args->operand_count != verbs[n].operands) {
 		return cli_fail(cmd->cli, EXIT_CODE_USAGE, "%s", verbs[n].usage);
 	}
 	cmd->request.verb = verbs[n].verb;
-	if (n == 0 ? cmd->is_forced : cmd->output != NULL) {
+	cmd->is_shown = n == SHOW;
+	if (foreign_option(cmd, n) != NULL) {
 		return cli_fail(cmd->cli, EXIT_CODE_USAGE, "%s: has no option %s", verbs[n].word,
-				n == 0 ? "--force" : "--output");
+				foreign_option(cmd, n));
 	}
 	if (verbs[n].verb == ADMIN_SII_ALIAS &&
 	    hex_number(args->operands[2], UINT16_MAX, &cmd->request.argument[0]) < 0) {
@@ -182,8 +204,9 @@ enum exit_code verb_sii(struct cli *cli, int argc, char **argv)
 	};
 	enum exit_code result;
 
-	cmd.transfer =
-		(struct admin_transfer){ .request = &cmd.request, .progress = admin_show_progress };
+	cmd.transfer = (struct admin_transfer){ .request = &cmd.request,
+						.what = "EEPROM",
+						.unit = "words" };
 	if (!cli_parse(cli, &args, argc, argv, &result)) {
 		return result;
 	}

@@ -36,7 +36,7 @@ static void show(const struct status_page *page, uint32_t index)
 	char device[sizeof(info.device)];
 	char state[24];
 
-	report_al_format(GET(page->slave[index].al_state), state, sizeof(state));
+	al_status_format(GET(page->slave[index].al_state), state, sizeof(state));
 	printf("%2u  %u:%u  %-13s %c  %-16s %s\n", index, info.alias, index,
 	       GET(page->slave[index].is_lost) ? "LOST" : state, mark_of(page, index), info.name,
 	       text_plain(info.device, device, sizeof(device)));
@@ -56,8 +56,12 @@ static void show_more(const struct status_page *page, uint32_t index)
 	const struct slave_status *slave = &page->slave[index];
 	struct slave_info info = source_slave(page, index);
 	uint32_t code = GET(slave->al_status_code);
+	char group[SOURCE_GROUP_BYTES];
 	char buf[TEXT_BYTES];
 
+	if (source_group(page, index, group)[0] != '\0') {
+		printf("    %-16s %s\n", "group", group);
+	}
 	printf("    %-16s 0x%08x\n", "vendor", info.vendor);
 	printf("    %-16s 0x%08x\n", "product", info.product);
 	printf("    %-16s 0x%08x\n", "revision", info.revision);
@@ -128,15 +132,8 @@ enum exit_code verb_slaves(struct cli *cli, int argc, char **argv)
 	if (result != EXIT_CODE_OK) {
 		return result;
 	}
-	json_init(&cmd.js, stdout);
-	if (cmd.is_json) {
-		json_array_begin(&cmd.js, NULL);
-	}
-	result = each_slave(cli, cmd.page, args.operands, args.operand_count, run_one, &cmd);
-	if (cmd.is_json) {
-		json_array_end(&cmd.js);
-		json_end_line(&cmd.js);
-	}
+	result = each_slave_listed(cli, cmd.page, &args, cmd.is_json ? &cmd.js : NULL, run_one,
+				   &cmd);
 	source_status_close(cmd.page);
 	return result;
 }

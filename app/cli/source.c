@@ -23,8 +23,7 @@ enum exit_code source_fail_open(const struct cli *cli, const char *path, int err
 				path);
 	case EACCES:
 	case EPERM:
-		return cli_fail(cli, EXIT_CODE_PERMISSION,
-				"no permission to read %s: be root or in its group", path);
+		return cli_fail_permission(cli, "read", path);
 	case EPROTO:
 		return cli_fail(cli, EXIT_CODE_FAILED,
 				"%s is of another version of ecdaq, or damaged", path);
@@ -67,6 +66,22 @@ int source_try_status(struct cli *cli, const struct status_page **ret_page)
 	return 0;
 }
 
+int source_refresh_status(struct cli *cli, const struct status_page **page)
+{
+	const struct status_page *newer;
+
+	if (source_try_status(cli, &newer) < 0) {
+		return 0;
+	}
+	if (newer->session != (*page)->session) {
+		source_status_close(newer);
+		return 0;
+	}
+	source_status_close(*page);
+	*page = newer;
+	return 1;
+}
+
 const struct record_status *source_record(struct cli *cli)
 {
 	struct record_status *record = malloc(sizeof(*record));
@@ -106,6 +121,24 @@ const struct dds_status *source_dds(struct cli *cli)
 		return NULL;
 	}
 	return dds;
+}
+
+void source_stream_close(const struct stream_status *stream)
+{
+	free((void *)(uintptr_t)stream);
+}
+
+const struct stream_status *source_stream(struct cli *cli)
+{
+	struct stream_status *stream = malloc(sizeof(*stream));
+	char path[CONFIG_PATH_BYTES];
+
+	if (stream == NULL || cli_path(cli, CONFIG_RUN_STREAM_STATUS, path) != EXIT_CODE_OK ||
+	    page_read_stream(path, stream) < 0) {
+		free(stream);
+		return NULL;
+	}
+	return stream;
 }
 
 void samples_take_table(struct samples *samples)
@@ -153,6 +186,26 @@ int samples_try(struct cli *cli, struct samples *ret_samples)
 	return open_samples(cli, ret_samples, problem);
 }
 
+/* There is no ring: ecdaqd makes it with the mapping, on the way to SAFE-OP. */
+static enum exit_code fail_no_samples(struct cli *cli, const char *path, int err)
+{
+	const struct status_page *page;
+	uint32_t state = BUS_DOWN;
+	int is_there = source_try_status(cli, &page) == 0;
+
+	if (is_there) {
+		state = atomic_load_explicit(&page->bus_state, memory_order_relaxed);
+		is_there = page_is_alive(page->pid);
+		source_status_close(page);
+	}
+	if (!is_there) {
+		return source_fail_open(cli, path, err);
+	}
+	return cli_fail(cli, EXIT_CODE_NO_DAEMON,
+			"the bus is %s: process data are there from SAFE-OP on (ecdaq state)",
+			bus_state_to_str(state));
+}
+
 enum exit_code samples_open(struct cli *cli, struct samples *ret_samples)
 {
 	char path[CONFIG_PATH_BYTES];
@@ -166,6 +219,9 @@ enum exit_code samples_open(struct cli *cli, struct samples *ret_samples)
 	r = open_samples(cli, ret_samples, problem);
 	if (problem[0] != '\0') {
 		return cli_fail(cli, EXIT_CODE_FAILED, "%s: %s", path, problem);
+	}
+	if (r == -ENOENT || r == -ENOTDIR) {
+		return fail_no_samples(cli, path, -r);
 	}
 	return r < 0 ? source_fail_open(cli, path, -r) : EXIT_CODE_OK;
 }
@@ -267,6 +323,10 @@ enum exit_code source_find_slave(const struct cli *cli, const struct status_page
 	if (strncmp(text, SOURCE_POSITION_PREFIX, strlen(SOURCE_POSITION_PREFIX)) == 0) {
 		text += strlen(SOURCE_POSITION_PREFIX);
 	}
+	if (text[0] == SOURCE_GROUP_MARK) {
+		return cli_fail(cli, EXIT_CODE_FAILED,
+				"%s: is a group, and one slave is expected here", text);
+	}
 	errno = 0;
 	pos = strtoul(text, &end, 10);
 	if (text[0] < '0' || text[0] > '9' || *end != '\0' || errno != 0) {
@@ -279,6 +339,37 @@ enum exit_code source_find_slave(const struct cli *cli, const struct status_page
 	}
 	*ret_pos = (uint16_t)pos;
 	return EXIT_CODE_OK;
+}
+
+const char *source_group(const struct status_page *page, uint32_t index,
+			 char ret_group[SOURCE_GROUP_BYTES])
+{
+	snprintf(ret_group, SOURCE_GROUP_BYTES, "%.*s", (int)sizeof(page->slave[index].group) - 1,
+		 page->slave[index].group);
+	return ret_group;
+}
+
+/* NOLINTNEXTLINE(readability-function-size): the interface of source.h */
+enum exit_code source_find_slaves(const struct cli *cli, const struct status_page *page,
+				  const char *text, uint16_t *ret_pos, unsigned *ret_count)
+{
+	uint32_t count = source_slave_count(page);
+	char group[SOURCE_GROUP_BYTES];
+	unsigned found = 0;
+
+	if (text[0] != SOURCE_GROUP_MARK) {
+		*ret_count = 1;
+		return source_find_slave(cli, page, text, ret_pos);
+	}
+	for (uint32_t i = 0; i < count; i++) {
+		if (text[1] != '\0' && strcmp(source_group(page, i, group), text + 1) == 0) {
+			ret_pos[found++] = (uint16_t)i;
+		}
+	}
+	*ret_count = found;
+	return found > 0 ? EXIT_CODE_OK
+			 : cli_fail(cli, EXIT_CODE_FAILED,
+				    "%s: no slave is of this group (slaves[].group)", text);
 }
 
 enum exit_code source_slave_pos(struct cli *cli, const char *text, uint16_t *ret_pos)

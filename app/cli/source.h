@@ -22,13 +22,19 @@ enum exit_code source_fail_open(const struct cli *cli, const char *path, int err
 enum exit_code source_status(struct cli *cli, const struct status_page **ret_page);
 /** The same without a message; 0 or -errno. */
 int source_try_status(struct cli *cli, const struct status_page **ret_page);
+/** A newer copy in place of *@page. 0: *@page stays: there is none, or it is that of another
+ * ecdaqd. */
+int source_refresh_status(struct cli *cli, const struct status_page **page);
 /** The recorder's page, or NULL: it may not have been started. Reports nothing. */
 const struct record_status *source_record(struct cli *cli);
 /** The same of ecdaq-dds. */
 const struct dds_status *source_dds(struct cli *cli);
+/** The same of ecdaq-stream. */
+const struct stream_status *source_stream(struct cli *cli);
 void source_status_close(const struct status_page *page);
 void source_record_close(const struct record_status *record);
 void source_dds_close(const struct dds_status *dds);
+void source_stream_close(const struct stream_status *stream);
 
 /* The sample ring with its own description. */
 struct samples {
@@ -68,6 +74,14 @@ uint32_t source_slave_count(const struct status_page *page);
  * failure, reported. */
 enum exit_code source_find_slave(const struct cli *cli, const struct status_page *page,
 				 const char *text, uint16_t *ret_pos);
+enum { SOURCE_GROUP_BYTES = 33, SOURCE_GROUP_MARK = '@' };
+
+/** The group of a slave, into @ret_group; "": none. */
+const char *source_group(const struct status_page *page, uint32_t index,
+			 char ret_group[SOURCE_GROUP_BYTES]);
+/** The slaves that @text means: all of "@GROUP", else one. @ret_pos has room for LIMIT_SLAVES. */
+enum exit_code source_find_slaves(const struct cli *cli, const struct status_page *page,
+				  const char *text, uint16_t *ret_pos, unsigned *ret_count);
 /** source_find_slave() of the status page as it is now. */
 enum exit_code source_slave_pos(struct cli *cli, const char *text, uint16_t *ret_pos);
 

@@ -8,12 +8,13 @@
 #include "base/clock.h"
 #include "cli/admin_client.h"
 #include "cli/cli.h"
+#include "cli/hints.h"
 #include "cli/report.h"
-#include "cli/running.h"
 #include "cli/screen.h"
 #include "cli/source.h"
 #include "program/args_duration.h"
 #include "program/json.h"
+#include "reader/page.h"
 #include "wire/al.h"
 
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
@@ -48,7 +49,7 @@ static void slave_state(const struct status_page *page, uint32_t index, char *bu
 	if (GET(page->slave[index].is_lost)) {
 		snprintf(buf, buf_len, "LOST");
 	} else {
-		report_al_format(GET(page->slave[index].al_state), buf, buf_len);
+		al_status_format(GET(page->slave[index].al_state), buf, buf_len);
 	}
 }
 
@@ -71,6 +72,7 @@ static void show_text(const struct status_page *page)
 			       al_status_code_to_str((uint16_t)code));
 		}
 	}
+	hints_write(page, screen_columns(), stdout);
 }
 
 static void show_json(const struct status_page *page)
@@ -111,7 +113,7 @@ static int is_at_target(struct cli *cli)
 	if (source_try_status(cli, &page) < 0) {
 		return 0;
 	}
-	is_there = running_is_alive(page->pid) && GET(page->bus_target) != BUS_DOWN &&
+	is_there = page_is_alive(page->pid) && GET(page->bus_target) != BUS_DOWN &&
 		   GET(page->bus_state) == GET(page->bus_target);
 	source_status_close(page);
 	return is_there;
@@ -161,24 +163,30 @@ static enum exit_code request(const struct wish *wish, uint16_t slave_pos)
 	return admin_do(wish->cli, &rq, &reply);
 }
 
-/* In the order given; the first refusal ends it. */
+static enum exit_code request_one(const struct wish *wish, const char *name)
+{
+	uint16_t pos[LIMIT_SLAVES] = { ADMIN_ALL_SLAVES };
+	enum exit_code result = EXIT_CODE_OK;
+	unsigned count = 1;
+
+	if (strcmp(name, "all") != 0) {
+		result = source_find_slaves(wish->cli, wish->page, name, pos, &count);
+	}
+	for (unsigned i = 0; i < count && result == EXIT_CODE_OK; i++) {
+		result = request(wish, pos[i]);
+	}
+	return result;
+}
+
+/* In the order given, a group in that of the bus; the first refusal ends it. */
 static enum exit_code request_each(const struct wish *wish, char **names, int count)
 {
-	for (int i = 0; i < count; i++) {
-		uint16_t pos = ADMIN_ALL_SLAVES;
-		enum exit_code result = EXIT_CODE_OK;
+	enum exit_code result = EXIT_CODE_OK;
 
-		if (strcmp(names[i], "all") != 0) {
-			result = source_find_slave(wish->cli, wish->page, names[i], &pos);
-		}
-		if (result == EXIT_CODE_OK) {
-			result = request(wish, pos);
-		}
-		if (result != EXIT_CODE_OK) {
-			return result;
-		}
+	for (int i = 0; i < count && result == EXIT_CODE_OK; i++) {
+		result = request_one(wish, names[i]);
 	}
-	return EXIT_CODE_OK;
+	return result;
 }
 
 static enum exit_code run(struct wish *wish, const struct args *args)

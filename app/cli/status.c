@@ -2,6 +2,7 @@
 /* ecdaq status */
 #include "base/args.h"
 #include "cli/cli.h"
+#include "cli/hints.h"
 #include "cli/report.h"
 #include "cli/screen.h"
 #include "cli/source.h"
@@ -39,6 +40,7 @@ enum exit_code verb_status(struct cli *cli, int argc, char **argv)
 		report_write_summary(&report, stdout);
 	} else {
 		report_write_screen(&report, screen_columns(), stdout);
+		hints_write(report.page, screen_columns(), stdout);
 	}
 	report_release(&report);
 	source_record_close(record);

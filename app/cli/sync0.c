@@ -4,6 +4,7 @@
 
 #include <errno.h>
 #include <inttypes.h>
+#include <limits.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -11,18 +12,19 @@
 #include "base/args.h"
 #include "cli/bars.h"
 #include "cli/cli.h"
-#include "cli/running.h"
 #include "cli/sync0_source.h"
 #include "cli/text.h"
+#include "program/beside.h"
 #include "program/json.h"
 #include "reader/feed.h"
+#include "reader/page.h"
 
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
 
 /* Results that are looked through for the newest of each line. */
 #define NEWEST (UINT64_C(4) * LIMIT_SYNC0_LINES)
 
-enum { PROGRAM_PATH_BYTES = 4096, PROGRAM_ARGUMENTS = 8 };
+enum { PROGRAM_ARGUMENTS = 8 };
 
 struct view {
 	const struct sync0_status *page;
@@ -281,18 +283,14 @@ static void write_bars(const struct view *view)
 /* ecdaq-sync0 beside this program: it alone may see the lines. Returns only when that failed. */
 static enum exit_code run_calibration(const struct cli *cli)
 {
-	char program[PROGRAM_PATH_BYTES];
+	char program[PATH_MAX];
 	char *words[PROGRAM_ARGUMENTS];
-	ssize_t len = readlink("/proc/self/exe", program, sizeof(program) - 32);
 	int n = 0;
-	char *slash;
+	int r = program_beside("ecdaq-sync0", program);
 
-	if (len <= 0) {
-		return cli_fail(cli, EXIT_CODE_FAILED, "/proc/self/exe: %s", strerror(errno));
+	if (r < 0) {
+		return cli_fail(cli, EXIT_CODE_FAILED, "/proc/self/exe: %s", strerror(-r));
 	}
-	program[len] = '\0';
-	slash = strrchr(program, '/');
-	snprintf(slash == NULL ? program : slash + 1, 32, "ecdaq-sync0");
 	words[n++] = program;
 	words[n++] = (char *)(uintptr_t)"--calibrate";
 	if (cli->config != NULL) {
@@ -312,7 +310,7 @@ static enum exit_code show(struct cli *cli, int is_json, int is_histogram)
 	if (result != EXIT_CODE_OK) {
 		return result;
 	}
-	view.is_running = running_is_alive(view.page->pid);
+	view.is_running = page_is_alive(view.page->pid);
 	view.lines = sync0_source_lines(view.page);
 	read_results(cli, &view);
 	if (is_json) {

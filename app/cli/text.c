@@ -83,7 +83,7 @@ const char *text_plain(const char *text, char *buf, size_t buf_len)
 /* Does the value need no scaling, so that its raw text is exact? */
 static int is_exact(const struct channel *ch)
 {
-	return ch->type != CHANNEL_FLOAT && ch->scale == 1.0 && ch->offset == 0.0;
+	return ch->type != CHANNEL_FLOAT && !image_is_scaled(ch);
 }
 
 const char *text_value(const struct channel *ch, uint64_t raw, char buf[TEXT_BYTES])

@@ -9,13 +9,14 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "base/host_clock.h"
 #include "cli/cli.h"
 #include "cli/report.h"
-#include "cli/running.h"
 #include "cli/screen.h"
 #include "cli/source.h"
 #include "cli/text.h"
 #include "program/args_duration.h"
+#include "reader/page.h"
 
 #define GET(field) atomic_load_explicit(&(field), memory_order_relaxed)
 
@@ -38,23 +39,6 @@ struct top {
 	uint64_t cycles_before;
 	uint64_t lost_before;
 };
-
-/* Read the page again. 0: it is no longer there, or is that of another ecdaqd. */
-static int refresh(struct top *top, const struct status_page **page)
-{
-	const struct status_page *newer;
-
-	if (source_try_status(top->cli, &newer) < 0) {
-		return 0;
-	}
-	if (newer->session != (*page)->session) {
-		source_status_close(newer);
-		return 0;
-	}
-	source_status_close(*page);
-	*page = newer;
-	return 1;
-}
 
 /* How a shell in the same working directory calls this program. */
 static void program_path(char path[CONFIG_PATH_BYTES])
@@ -198,14 +182,6 @@ static void show_screen(struct top *top, const struct report *report)
 	free(body);
 }
 
-static int64_t now_ns(void)
-{
-	struct timespec ts;
-
-	clock_gettime(CLOCK_MONOTONIC, &ts);
-	return (int64_t)ts.tv_sec * NS_PER_S + ts.tv_nsec;
-}
-
 static void show_line(struct top *top, const struct report *report)
 {
 	const struct cycle_stats *st = &report->page->cycle;
@@ -268,16 +244,17 @@ static void take_key(struct top *top, int key)
 /* The interval; keys and a new size take effect in it. */
 static void wait_interval(struct top *top, const struct report *report)
 {
-	int64_t until_ns = now_ns() + top->interval_ns;
+	int64_t until_ns = host_clock_ns(CLOCK_MONOTONIC) + top->interval_ns;
 
 	while (!screen_is_over()) {
-		int64_t left_ns = until_ns - now_ns();
+		int64_t left_ns = until_ns - host_clock_ns(CLOCK_MONOTONIC);
 
 		if (left_ns <= 0) {
 			return;
 		}
 		take_key(top, screen_wait(left_ns));
-		if (top->is_live && !screen_is_over() && now_ns() < until_ns) {
+		if (top->is_live && !screen_is_over() &&
+		    host_clock_ns(CLOCK_MONOTONIC) < until_ns) {
 			show_screen(top, report);
 		}
 	}
@@ -301,7 +278,7 @@ static enum exit_code follow(struct top *top, const struct status_page **page)
 		}
 		report_release(&report);
 		source_record_close(record);
-	} while (!is_last && !screen_is_over() && refresh(top, page));
+	} while (!is_last && !screen_is_over() && source_refresh_status(top->cli, page));
 	screen_end();
 	/* Leave the last state in the terminal: the other screen buffer is gone. */
 	if (top->is_live && !screen_is_over()) {
@@ -324,7 +301,7 @@ static int is_worth_waiting(struct top *top)
 	if (r < 0) {
 		return r == -ENOENT;
 	}
-	is_alive = running_is_alive(page->pid);
+	is_alive = page_is_alive(page->pid);
 	source_status_close(page);
 	return !is_alive;
 }

@@ -35,7 +35,7 @@ static void state_of(const struct status_page *page, uint32_t pos, char *buf, si
 	if (GET(page->slave[pos].is_lost)) {
 		snprintf(buf, buf_len, "LOST");
 	} else {
-		report_al_format(GET(page->slave[pos].al_state), buf, buf_len);
+		al_status_format(GET(page->slave[pos].al_state), buf, buf_len);
 	}
 }
 
@@ -348,13 +348,17 @@ static enum exit_code choose_all(struct cli *cli, struct tree *tree, const struc
 		tree->shown = slave_set_all(source_slave_count(tree->page));
 	}
 	for (int i = 0; i < args->operand_count; i++) {
-		uint16_t pos;
-		enum exit_code result = source_find_slave(cli, tree->page, args->operands[i], &pos);
+		uint16_t pos[LIMIT_SLAVES];
+		unsigned count = 0;
+		enum exit_code result =
+			source_find_slaves(cli, tree->page, args->operands[i], pos, &count);
 
 		if (result != EXIT_CODE_OK) {
 			return result;
 		}
-		choose(tree, pos);
+		for (unsigned k = 0; k < count; k++) {
+			choose(tree, pos[k]);
+		}
 	}
 	return EXIT_CODE_OK;
 }

@@ -9,6 +9,7 @@
 #include <time.h>
 
 #include "base/clock.h"
+#include "base/host_clock.h"
 #include "cli/choose.h"
 #include "cli/cli.h"
 #include "cli/fit.h"
@@ -53,14 +54,6 @@ struct watch {
 	uint64_t next_cycle; /* which should come next; 0: none came yet */
 	int64_t drawn_ns;
 };
-
-static int64_t now_ns(void)
-{
-	struct timespec ts;
-
-	clock_gettime(CLOCK_MONOTONIC, &ts);
-	return (int64_t)ts.tv_sec * NS_PER_S + ts.tv_nsec;
-}
 
 static const struct channel *chosen(const struct watch *watch, unsigned i)
 {
@@ -182,7 +175,7 @@ static void draw(struct watch *watch)
 		});
 	}
 	free(text);
-	watch->drawn_ns = now_ns();
+	watch->drawn_ns = host_clock_ns(CLOCK_MONOTONIC);
 }
 
 /* --- values in place --- */
@@ -218,7 +211,7 @@ static void draw_table(struct watch *watch)
 	if (head != NULL && body != NULL) {
 		write_table_head(watch, columns, head);
 		value_table_write(&watch->table, (enum value_table_sort)watch->sort, columns,
-				  now_ns(), body);
+				  host_clock_ns(CLOCK_MONOTONIC), body);
 	}
 	if (head != NULL && fclose(head) == 0 && body != NULL && fclose(body) == 0) {
 		snprintf(footer, sizeof(footer), "q: leave   ?: keys   %s   %u channels",
@@ -233,7 +226,7 @@ static void draw_table(struct watch *watch)
 	}
 	free(text[0]);
 	free(text[1]);
-	watch->drawn_ns = now_ns();
+	watch->drawn_ns = host_clock_ns(CLOCK_MONOTONIC);
 }
 
 /* A live plot starts with the samples of its window that are in the ring, also after a pause. */
@@ -295,7 +288,7 @@ static void take_key(struct watch *watch, int key)
 static void draw_if_due(struct watch *watch)
 {
 	if (!watch->is_live || watch->next_cycle == 0 ||
-	    now_ns() - watch->drawn_ns < DRAW_PERIOD_NS) {
+	    host_clock_ns(CLOCK_MONOTONIC) - watch->drawn_ns < DRAW_PERIOD_NS) {
 		return;
 	}
 	if (watch->is_table) {

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "base/args.h"
-#include "base/bytes.h"
 #include "base/utf8.h"
 #include "cli/cli.h"
 #include "cli/each_slave.h"
@@ -15,8 +14,6 @@
 #include "esi/esi.h"
 #include "wire/coe_type.h"
 #include "wire/sii.h"
-
-enum { PORTS_AT = 16, PORT_COUNT = 4 }; /* general category of an SII */
 
 struct xml_command {
 	struct cli *cli;
@@ -32,30 +29,6 @@ static void take_text(const struct pdo_info *info, unsigned number, char ret_tex
 
 	sii_text(info->image, info->image_bytes, number, text);
 	utf8_copy(text, ret_text, ESI_NAME_BYTES);
-}
-
-/* A letter a port, as in ESI; blank: not there. */
-static void take_ports(const struct pdo_info *info, struct esi_device *d)
-{
-	static const char letters[] = " Y KH";
-	size_t at;
-	size_t len;
-	unsigned ports;
-
-	if (sii_find_category(info->image, info->image_bytes, SII_CATEGORY_GENERAL, &at, &len) <
-		    0 ||
-	    len < PORTS_AT + 2) {
-		return;
-	}
-	ports = get_le16(info->image + at + PORTS_AT);
-	for (unsigned i = 0; i < PORT_COUNT; i++) {
-		unsigned kind = ports >> (4 * i) & 0xf;
-
-		d->physics[i] = kind < sizeof(letters) - 1 ? letters[kind] : ' ';
-	}
-	for (unsigned i = PORT_COUNT; i > 0 && d->physics[i - 1] == ' '; i--) {
-		d->physics[i - 1] = '\0';
-	}
 }
 
 static void take_mailbox(const struct sii *sii, struct esi_device *d)
@@ -164,7 +137,7 @@ static struct esi_device *describe(const struct pdo_info *info)
 	take_text(info, info->sii.group_name, d->group);
 	memcpy(d->group_name, d->group, sizeof(d->group_name));
 	d->eeprom_bytes = info->sii.size_bytes;
-	take_ports(info, d);
+	pdo_info_ports(info, d->physics);
 	take_sms(&info->sii, d);
 	for (size_t i = 0; i < info->pdo_count; i++) {
 		take_pdo(info, &info->pdo[i], d);
@@ -183,6 +156,7 @@ static enum exit_code add_slave(void *ctx, uint16_t pos)
 	if (result != EXIT_CODE_OK) {
 		return result;
 	}
+	pdo_info_warn(cmd->cli, pos, info);
 	if (info->damage[0] != '\0') {
 		result = cli_fail(cmd->cli, EXIT_CODE_FAILED, "slave %u: its SII is damaged: %s",
 				  pos, info->damage);

@@ -1,8 +1,25 @@
 # SPDX-License-Identifier: MIT
-# What others use, beside the programs: libecdaq with <ecdaq/reader.h> (pkg-config name ecdaq, CMake
+# What is installed beside the programs: completion and manual pages of ecdaq, and what others use: libecdaq with <ecdaq/reader.h> (pkg-config name ecdaq, CMake
 # package ecdaq), <ecdaq/control.h>, the licence texts, and what SOEM's licence asks to hand on.
 
 include(CMakePackageConfigHelpers)
+
+# The tool itself writes its completion and pages. Where the building machine does not run the target's
+# programs, CMAKE_CROSSCOMPILING_EMULATOR does.
+if(CMAKE_CROSSCOMPILING AND NOT CMAKE_CROSSCOMPILING_EMULATOR)
+	message(FATAL_ERROR "ecdaq's manual pages are made by running it: set CMAKE_CROSSCOMPILING_EMULATOR "
+		"(/usr/bin/env where binfmt_misc runs programs of ${CMAKE_SYSTEM_PROCESSOR})")
+endif()
+set(pages ${CMAKE_CURRENT_BINARY_DIR}/pages)
+add_custom_command(OUTPUT ${pages}/ecdaq ${pages}/man1/ecdaq.1
+	COMMAND ${CMAKE_COMMAND} -E rm -rf ${pages}
+	COMMAND ${CMAKE_COMMAND} -E make_directory ${pages}/man1
+	COMMAND ecdaq completion > ${pages}/ecdaq
+	COMMAND ecdaq manual --write ${pages}/man1
+	DEPENDS ecdaq VERBATIM)
+add_custom_target(ecdaq_pages ALL DEPENDS ${pages}/ecdaq ${pages}/man1/ecdaq.1)
+install(FILES ${pages}/ecdaq DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
+install(DIRECTORY ${pages}/man1 DESTINATION ${CMAKE_INSTALL_MANDIR})
 
 # Only ecdaq_* is visible to a program that links the library: everything else in it may change.
 set(client_objects $<TARGET_OBJECTS:ecdaq_base> $<TARGET_OBJECTS:ecdaq_image> $<TARGET_OBJECTS:ecdaq_reader>)

@@ -42,7 +42,17 @@ PARSERS: dict[str, tuple[str, ...]] = {
         *(f"master/mailbox/{name}.c" for name in ("raw_client", "raw_match")),
     ),
     "sii": ("core/wire/sii.c",),
-    "esi": tuple(f"core/esi/{name}.c" for name in ("begin", "end", "esi", "field", "nodes")),
+    "esi": tuple(
+        f"core/esi/{name}.c" for name in ("begin", "dictionary", "end", "esi", "field", "nodes")
+    ),
+    "eni": (
+        *(
+            f"core/eni/{name}.c"
+            for name in ("compare", "compare_frames", "compare_slave", "fields")
+        ),
+        *(f"core/eni/{name}.c" for name in ("mapping", "read", "rows", "write")),
+        *("core/xml/value.c", "core/xml/xml.c"),
+    ),
     "catalogue": ("sim/devices/slave_model_parse.c", "sim/devices/model_text.c"),
     "mcap": tuple(
         f"services/record/{name}.c"

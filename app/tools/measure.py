@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from measure.page import NotMeasuredError, write_index, write_page
-from measure.subjects import SUBJECTS
+from measure.subjects import PAGES, SUBJECTS
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -56,7 +56,7 @@ def main(arguments: Sequence[str]) -> int:
         except NotMeasuredError as why:
             print(f"build.sh: measure: {subject.name}: {why}", file=sys.stderr)
             failed = True
-    write_index(ROOT, SUBJECTS.values())
+    write_index(ROOT, PAGES)
     return 1 if failed else 0
 
 

@@ -12,7 +12,8 @@ usage()
 usage: ./build.sh run [OPTION...]
 
 Brings a simulated segment to OP over a veth pair in its own network namespace, records every cycle,
-publishes it over DDS, checks the SYNC0 pulses and shows it live. Ctrl-C stops ecdaqd, recorder and
+publishes it over DDS, serves it to browsers and Foxglove viewers, checks the SYNC0 pulses and shows it
+live. Ctrl-C stops ecdaqd, recorder and
 segment in this order, prints a summary and where the recording is.
 It needs no privilege where the kernel grants users network namespaces; ecdaqd then runs without
 real-time priority and reports that once.
@@ -28,6 +29,9 @@ real-time priority and reports that once.
                   FILE configures
   --no-sync0      do not start ecdaq-sync0. Without this option it checks the simulated pulses, marked
                   as simulated in `ecdaq sync0`, or what section sync0 of FILE names (enable, edges)
+  --no-web        do not start ecdaq-web. Without this option it listens on 127.0.0.1, on the first free
+                  port from 8765 on (the address is printed at start), or as section web of FILE
+                  configures
   --json          no live view; the last line of standard output is `ecdaq status --json --summary`;
                   there is none if the start failed
 
@@ -70,6 +74,7 @@ config=
 record=$root/build/run/record
 json=no
 dds=yes
+web=yes
 sync0=yes
 mode=outside
 bin=${ECDAQ_BIN_DIR:-$root/build/stage/bin}
@@ -87,6 +92,7 @@ parse_options()
 			;;
 		--json) json=yes ;;
 		--no-dds) dds=no ;;
+		--no-web) web=no ;;
 		--no-sync0) sync0=no ;;
 		--check) mode=check ;;
 		--inside) mode=inside ;;
@@ -146,6 +152,48 @@ start_dds()
 		note "DDS: ecdaq-remote --interface lo --domain $private_domain --tag run-$$ watch"
 }
 
+# The first port from 8765 on that nobody listens on.
+free_web_port()
+{
+	local port
+
+	for port in 8765 8766 8767 8768 8769 8770 8771 8772 8773 8774; do
+		if ! (: < "/dev/tcp/127.0.0.1/$port") 2> /dev/null; then
+			printf '%s\n' "$port"
+			return 0
+		fi
+	done
+	return 1
+}
+
+# ecdaq-web listens outside the namespace, too.
+start_web()
+{
+	local options=(--config "$config") port='' why
+
+	[ "$web" = yes ] || return 0
+	if [ ! -x "$bin/ecdaq-web" ]; then
+		note "no page: ecdaq-web is not built (app/doc/reference/web.md names the packages it needs)"
+		return 0
+	fi
+	if [ -z "$config" ] || ! grep -q '^web:' "$config"; then
+		if ! port=$(free_web_port); then
+			note "no page: ports 8765 to 8774 of 127.0.0.1 are in use"
+			return 0
+		fi
+		options=(--set web.enable=on --set web.listen=loopback --set "web.port=$port")
+		[ -z "$config" ] || options=(--config "$config" "${options[@]}")
+	fi
+	options+=(--set "record.dir=$record") # --record may say another one
+	if ! why=$("$bin/ecdaq-web" --check "${options[@]}" 2>&1); then
+		note "no page: ${why##*$'\n'}"
+		return 0
+	fi
+	setpriv --pdeathsig TERM setsid "$bin/ecdaq-web" "${options[@]}" < /dev/null 2<> "$run_work/pipe" &
+	export run_web_pid=$!
+	[ -z "$port" ] || note "page: http://127.0.0.1:$port/ (Foxglove: ws://127.0.0.1:$port/)"
+}
+
 # Directories of earlier runs that were killed: no process holds their lock any more.
 remove_abandoned_run_dirs()
 {
@@ -178,6 +226,7 @@ enter_namespace()
 	export run_work
 	mkfifo "$run_work/pipe"
 	start_dds
+	start_web
 	exec "${how[@]}" "$0" --inside "$@"
 }
 
@@ -197,7 +246,8 @@ make_wire()
 }
 
 declare -A pid=() program=(
-	[daemon]=ecdaqd [recorder]=ecdaq-record [segment]=ecdaq-sim [sync0]=ecdaq-sync0 [dds]=ecdaq-dds [view]=ecdaq
+	[daemon]=ecdaqd [recorder]=ecdaq-record [segment]=ecdaq-sim [sync0]=ecdaq-sync0 [dds]=ecdaq-dds
+	[web]=ecdaq-web [view]=ecdaq
 )
 view=no
 cause=
@@ -257,7 +307,7 @@ stop()
 	case $status in
 	0 | 143) ;;
 	*)
-		# A check that fails does not fail what it checks.
+		# A check or a view that fails does not fail what it shows.
 		if [ "$name" = sync0 ]; then
 			note "ecdaq-sync0 ended with $status"
 		else
@@ -316,20 +366,22 @@ start_sync0()
 	fi
 }
 
-# ecdaq-dds is not a child of this shell: a tail that ends with it takes its place.
-adopt_dds()
+# adopt NAME PID: what was started outside is not a child of this shell: a tail that ends with it takes
+# its place.
+adopt()
 {
-	[ -n "${run_dds_pid:-}" ] || return 0
-	setsid tail --pid="$run_dds_pid" -s 0.1 -f /dev/null 4>&- 5>&- &
-	pid[dds]=$!
+	[ -n "$2" ] || return 0
+	setsid tail --pid="$2" -s 0.1 -f /dev/null 4>&- 5>&- &
+	pid[$1]=$!
 }
 
-stop_dds()
+# stop_adopted NAME PID
+stop_adopted()
 {
-	[ -n "${pid[dds]:-}" ] || return 0
-	kill -TERM "$run_dds_pid" 2> /dev/null || true
-	wait "${pid[dds]}" || true
-	unset 'pid[dds]'
+	[ -n "${pid[$1]:-}" ] || return 0
+	kill -TERM "$2" 2> /dev/null || true
+	wait "${pid[$1]}" || true
+	unset "pid[$1]"
 }
 
 failed=0
@@ -342,7 +394,8 @@ end_in_order()
 	stop sync0
 	stop daemon
 	stop recorder
-	stop_dds
+	stop_adopted dds "${run_dds_pid:-}"
+	stop_adopted web "${run_web_pid:-}"
 	stop segment
 }
 
@@ -361,7 +414,8 @@ has_ended()
 	wait "${pid[$1]}" || status=$?
 }
 
-# Returns when the first of the children has ended, except ecdaq-sync0: the run continues without it. It
+# Returns when the first of the children has ended, except ecdaq-sync0 and ecdaq-web: the run continues
+# without them. It
 # polls instead of waiting: a signal during "wait -n" can make bash lose the end of a child.
 wait_for_end()
 {
@@ -377,6 +431,11 @@ wait_for_end()
 			sync0*)
 				unset 'pid[sync0]'
 				[ "$status" = 0 ] || note "ecdaq-sync0 ended with $status"
+				continue
+				;;
+			web*)
+				unset 'pid[web]'
+				note "ecdaq-web has ended: there is no page any more"
 				continue
 				;;
 			view* | daemon0) ;;
@@ -456,7 +515,8 @@ run_inside()
 		start daemon "$bin/ecdaqd" --exit-on-failure "${set_options[@]}" "${daemon_options[@]}"
 	fi
 	daemon_pid=${pid[daemon]}
-	adopt_dds
+	adopt dds "${run_dds_pid:-}"
+	adopt web "${run_web_pid:-}"
 	start_sync0 "$has_source"
 	wait_for_end
 	end_in_order

@@ -39,7 +39,7 @@ FUZZ_SEED = 20261122
 # Of the slowest target, on a loaded machine.
 FUZZ_RUNS_PER_SECOND = 2
 SLOWEST = 10
-IMAGES = ("qemuarm64", "raspberrypi4-64")
+IMAGES = ("ecdaq-qemuarm64", "ecdaq-raspberrypi4-64")
 # What threads share: the tests of these modules run under ThreadSanitizer.
 SHARED_STATE = (
     "ring",
@@ -208,7 +208,7 @@ def run_fuzz_target(suite: Suite, target: Path, seconds: int) -> Outcome:
         return outcome
     for step, command, must_fail in steps:
         log = LOGS / f"fuzz-{name}-{step.replace(' ', '-')}.log"
-        status = run_logged(command, log, environment(suite))
+        status = run_logged(command, log, environment(suite), suite.seconds + seconds)
         if (status != 0) == must_fail:
             outcome.passed += 1
             runs = re.search(
@@ -262,15 +262,16 @@ def run_fuzz(suite: Suite, options: argparse.Namespace) -> Outcome:
 
 
 def needs_idle_host(path: Path) -> bool:
-    """Whether something on the host has to keep pace with the machine of a file of boot tests."""
-    return re.search(r"^(OUTSIDE|WIRE) = True$", path.read_text(), re.M) is not None
+    """Whether a file says that its tests measure time, or that something on the host has to keep
+    pace with their machine."""
+    return re.search(r"^(IDLE|OUTSIDE|WIRE) = True$", path.read_text(), re.M) is not None
 
 
-def run_booted(suite: Suite, options: argparse.Namespace) -> Outcome:
-    """The files of boot tests that match suite.arguments[0], a pytest for each. A machine that is
-    alone with its clock uses one processor of the host: as many at once as there are processors.
+def run_files(suite: Suite, options: argparse.Namespace) -> Outcome:
+    """The files that match suite.arguments[0], a pytest for each. A bus, or a machine that is
+    alone with its clock, uses one processor at most: as many at once as there are processors.
     Then those that need an idle host, one after the other."""
-    paths = sorted((ROOT / "tests" / "boot").glob(suite.arguments[0]))
+    paths = sorted((ROOT / "tests").glob(suite.arguments[0]))
     files = {
         path: replace(
             suite,
@@ -329,7 +330,8 @@ def pytest(group: str, flavour: str, *options: str) -> Suite:
 
 def booted(name: str, files: str) -> Suite:
     """Tests of the images, most of them in QEMU."""
-    return Suite(f"{name} python", "release", run_booted, (files, "-s"), BOOT_SECONDS, IMAGES)
+    files = f"boot/{files}"
+    return Suite(f"{name} python", "release", run_files, (files, "-s"), BOOT_SECONDS, IMAGES)
 
 
 # Fast groups first. Tests labelled "long" run in the release flavour only.
@@ -353,10 +355,14 @@ GROUPS: dict[str, list[Suite]] = {
         pytest("sim", "release"),
         ctest("sim", "asan", "-LE", "^long$", *ONE_BY_ONE),
     ],
+    "cost": [pytest("cost", "release")],
     "fuzz": [Suite("fuzz", "fuzz", run_fuzz)],
     "recipes": [pytest("recipes", "release")],
-    "deb": [pytest("deb", "release")],
-    "live": [ctest("live", "release"), pytest("live", "release")],
+    "deb": [pytest("deb", "release", "--ignore=tests/deb/test_arm64.py")],
+    "live": [
+        ctest("live", "release"),
+        Suite("live python", "release", run_files, ("live/test_*.py",)),
+    ],
     "dds": [pytest("dds", "release", "-s")],
     "docs": [pytest("docs", "release")],
     # All tests of control programs in unit, sim, cli and live.
@@ -381,18 +387,22 @@ GROUPS: dict[str, list[Suite]] = {
             ("tests/live", "-k", "test_sync0 or test_oneshot"),
         ),
     ],
+    "deb-arm64": [Suite("deb-arm64 python", "release", run_pytest, ("tests/deb/test_arm64.py",))],
     # Lines that the fuzz targets reach.
     "coverage": [Suite("coverage", "coverage", run_coverage)],
-    # Hours of bus time.
     "long": [ctest("long", "release")],
-    "boot": [booted("boot", "test_[0-6]*.py")],
+    "boot": [booted("boot", "test_[0-6][0-5]*.py")],
+    "boot-long": [booted("boot-long", "test_[0-6][6-9]*.py")],
     "wire": [booted("wire", "test_[78]*.py")],
+    "update": [booted("update", "test_9*.py")],
 }
 # Part of other groups, long, or too exact for a loaded machine: only when named.
-ON_REQUEST = ("control", "sync0", "coverage", "long", "wire")
+ON_REQUEST = ("control", "sync0", "deb-arm64", "coverage", "long", "boot-long", "wire", "update")
+# Runs a command behind all other work of the machine, also where the kernel groups that by session.
+BEHIND = ("sh", "-c", '{ echo 19 > /proc/self/autogroup; } 2>/dev/null; exec "$@"', "behind")
 # These mostly wait, and run beside the computing ones. The rest measure time: each alone.
 WAITING = ("cli", "docs")
-COMPUTING = ("unit", "tidy", "kit", "replay", "sim", "fuzz", "recipes", "deb")
+COMPUTING = ("unit", "tidy", "kit", "replay", "sim", "cost", "fuzz", "recipes", "deb")
 
 
 class Builder:
@@ -401,6 +411,7 @@ class Builder:
     def __init__(self) -> None:
         self.failed: dict[str, str | None] = {}
         self.images_beside: Beside[dict[str, str | None]] | None = None
+        self.prefix: Sequence[str] = ()
 
     def build(self, flavour: str) -> str | None:
         """None, or the last lines of the failed build."""
@@ -414,15 +425,20 @@ class Builder:
 
         def build() -> dict[str, str | None]:
             os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+            self.prefix = BEHIND
             return {machine: self.image(machine) for machine in machines}
 
         self.images_beside = Beside(build)
 
-    def image(self, machine: str) -> str | None:
-        """The same as build() for a machine's image."""
+    def wait_for_images(self) -> None:
+        """Until those that are built beside are done: what measures time is alone then."""
         if self.images_beside is not None:
             beside, self.images_beside = self.images_beside, None
             self.failed |= beside.result() or {}
+
+    def image(self, machine: str) -> str | None:
+        """The same as build() for a machine's image."""
+        self.wait_for_images()
         if machine not in self.failed:
             command = [ROOT / "build.sh", "image", "--machine", machine]
             self.failed[machine] = self.make(machine, command, IMAGE_SECONDS)
@@ -431,7 +447,7 @@ class Builder:
     def make(self, name: str, command: Sequence[str | Path], seconds: int) -> str | None:
         started = time.monotonic()
         log = LOGS / f"build-{name}.log"
-        status = run_logged(command, log, dict(os.environ), seconds)
+        status = run_logged([*self.prefix, *command], log, dict(os.environ), seconds)
         print(f"{'build ' + name:24} {time.monotonic() - started:7.1f} s", flush=True)
         return None if status == 0 else tail(log.read_text(errors="replace"), 40)
 
@@ -511,6 +527,7 @@ def run_in_order(wanted: Sequence[str], builder: Builder, options: argparse.Name
     total = run_all(computing, builder, options)
     for name, one in beside.items():
         total.add(result_of(name, one))
+    builder.wait_for_images()
     total.add(run_all(alone, builder, options))
     return total
 

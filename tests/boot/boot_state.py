@@ -7,6 +7,7 @@ from __future__ import annotations
 import re
 import struct
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -50,6 +51,24 @@ def unpack(raw: bytes) -> Copy | None:
 def slots(order: str, left_a: int, left_b: int) -> dict[str, str]:
     """The values that the boot script knows."""
     return {"BOOT_A_LEFT": str(left_a), "BOOT_B_LEFT": str(left_b), "BOOT_ORDER": order}
+
+
+def latest(copies: Sequence[Copy | None]) -> Copy | None:
+    """The copy that counts, as recipes/recipes-bsp/u-boot-ecdaq/files/boot.cmd chooses it."""
+    first, second = copies
+    if first is None or second is None:
+        return first or second
+    if {first.counter, second.counter} == {0, 255}:
+        return first if first.counter == 0 else second
+    return second if second.counter > first.counter else first
+
+
+def next_slot(copies: Sequence[Copy | None]) -> str | None:
+    """The slot that U-Boot starts next; None: no slot is left, each gets its tries again."""
+    current = latest(copies)
+    values = slots("A B", 3, 3) | (current.values if current else {})
+    named = values["BOOT_ORDER"].split()
+    return next((s for s in named if int(values.get(f"BOOT_{s}_LEFT", "0"), 16) > 0), None)
 
 
 def read(disk: Path) -> list[Copy | None]:

@@ -22,7 +22,7 @@ KEEP = Path(__file__).resolve().parents[2] / "build" / "test-logs"
 def image() -> Path:
     """The image under test. No image is a failure, not a skip."""
     disk = IMAGE / f"{NAME}.img"
-    assert disk.exists(), "no image in build/image/qemuarm64: run ./build.sh image first"
+    assert disk.exists(), "no image in build/image/ecdaq-qemuarm64: run ./build.sh image first"
     assert os.geteuid() == 0, "boot tests need root (QEMU runs in the image chroot)"
     return disk
 

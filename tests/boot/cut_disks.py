@@ -11,7 +11,7 @@ import shutil
 import subprocess
 import tempfile
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from multiprocessing import get_context
@@ -220,14 +220,22 @@ def scratch() -> str | None:
     return str(memory) if has_room else None
 
 
+def share_out(
+    look: Callable[[Any, Sequence[Cut], int], list[Any]], source: Any, cuts: list[Cut], seed: int
+) -> list[Any]:
+    """Let each processor look at its part of the cuts, which stay in order of the log."""
+    workers = os.cpu_count() or 1
+    shares = [
+        cuts[len(cuts) * w // workers : len(cuts) * (w + 1) // workers] for w in range(workers)
+    ]
+    with ProcessPoolExecutor(workers, get_context("fork")) as pool:
+        parts = pool.map(look, [source] * workers, shares, [seed] * workers)
+        return [result for part in parts for result in part]
+
+
 def examine_all(source: Source, disks: int, seed: int) -> list[Result]:
     """Share the disks out to all processors."""
-    workers = os.cpu_count() or 1
-    cuts = make_cuts(source, disks, seed, WriteLog(source.log))
-    shares = [cuts[disks * w // workers : disks * (w + 1) // workers] for w in range(workers)]
-    with ProcessPoolExecutor(workers, get_context("fork")) as pool:
-        parts = pool.map(examine, [source] * workers, shares, [seed] * workers)
-        return [result for part in parts for result in part]
+    return share_out(examine, source, make_cuts(source, disks, seed, WriteLog(source.log)), seed)
 
 
 def is_bad(result: Result) -> bool:

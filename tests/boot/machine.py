@@ -10,14 +10,15 @@ import shutil
 import signal
 import socket
 import subprocess
+import tempfile
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 TOP = Path(__file__).resolve().parents[2]
-IMAGE = Path(os.environ.get("ECDAQ_IMAGE_DIR", TOP / "build" / "image" / "qemuarm64"))
-NAME = "ecdaq-image-ecdaq-qemuarm64"
+IMAGE = Path(os.environ.get("ECDAQ_IMAGE_DIR", TOP / "build" / "image" / "ecdaq-qemuarm64"))
+NAME = "ecdaq-image-ecdaq-ecdaq-qemuarm64"
 TOOLS = TOP / "app" / "tools" / "image"
 # An emulator on a busy machine: limits that only a hang exceeds.
 BOOT_S = float(os.environ.get("ECDAQ_BOOT_SECONDS", "1800"))
@@ -114,6 +115,10 @@ class Machine:
         self.port = free_port()
         self.process: subprocess.Popen[bytes] | None = None
         self.boots = 0
+        # One connection for all commands: a log-in costs the emulated machine seconds. It ends with
+        # the machine. The path of a socket has to be short.
+        self.short = tempfile.TemporaryDirectory(prefix="ecdaq-ssh-")
+        self.connection = Path(self.short.name) / "to"
 
     def tool(self, *command: str | Path) -> subprocess.CompletedProcess[str]:
         """A program of the SDK chroot, in the folder of this machine."""
@@ -168,6 +173,7 @@ class Machine:
         log_writes: keep the disk as it is now, and log what is written to it from now on.
         """
         assert self.process is None
+        self.disconnect()
         if log_writes:
             subprocess.run(["cp", "--sparse=always", self.disk, self.disk_before], check=True)
             self.write_log.write_bytes(b"")
@@ -229,8 +235,17 @@ class Machine:
             *(space.enter if space is not None else []),
             *("ssh", "-q", "-p", where[1], "-i", str(self.key), "-o", "BatchMode=yes"),
             *("-o", "StrictHostKeyChecking=no", "-o", "UserKnownHostsFile=/dev/null"),
-            *("-o", "ConnectTimeout=30", *options, f"operator@{where[0]}"),
+            *("-o", "ControlMaster=auto", "-o", f"ControlPath={self.connection}"),
+            *("-o", "ControlPersist=yes", "-o", "ConnectTimeout=30"),
+            *(*options, f"operator@{where[0]}"),
         ]
+
+    def disconnect(self) -> None:
+        """The connection ends, if there is one."""
+        if self.connection.exists():
+            command = ["ssh", "-q", "-o", f"ControlPath={self.connection}", "-O", "exit", "machine"]
+            subprocess.run(command, capture_output=True, timeout=60, check=False)
+            self.connection.unlink(missing_ok=True)
 
     def try_run(self, command: str, seconds: float = COMMAND_S) -> subprocess.CompletedProcess[str]:
         """A shell command in the guest; the caller checks its exit code."""
@@ -276,9 +291,11 @@ class Machine:
         os.killpg(self.process.pid, signal.SIGKILL)
         self.process.wait(30)
         self.process = None
+        self.disconnect()
 
     def stop(self) -> None:
         """Whatever its state, it is off afterwards."""
         if self.process is not None and self.process.poll() is None:
             self.cut_power()
         self.process = None
+        self.disconnect()

@@ -16,12 +16,13 @@ import ecdaq
 LED = "piccolo0.led"
 TIMEOUT_S = 120.0
 
+# What an emulator that stops for a second makes of a command: the bus has left OP, or the cycle
+# thread did not run before the command's time was over. The user gives the command again.
+AGAIN = ("the bus is not in OP", "not taken by the master in time: reverted")
+
 
 def command(link: ecdaq.Link, value: int) -> tuple[int, int]:
-    """Set the LED; the cycle that carried it, and after how many commands.
-
-    An emulator can stop for a second, and the bus leaves OP then: the user gives the command again.
-    """
+    """Set the LED; the cycle that carried it, and after how many commands."""
     end = time.monotonic() + TIMEOUT_S
     tries = 0
     while True:
@@ -29,7 +30,7 @@ def command(link: ecdaq.Link, value: int) -> tuple[int, int]:
         try:
             return link.command({LED: value}, seconds=TIMEOUT_S), tries
         except ecdaq.RefusedError as error:
-            if str(error) != "the bus is not in OP" or time.monotonic() > end:
+            if str(error) not in AGAIN or time.monotonic() > end:
                 raise
             link.events(1.0)
 

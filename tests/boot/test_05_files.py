@@ -24,7 +24,7 @@ import boot_state
 import firmware
 
 IMAGES = TOP / "build" / "image"
-MACHINES = ("qemuarm64", "raspberrypi4-64")
+MACHINES = ("ecdaq-qemuarm64", "ecdaq-raspberrypi4-64")
 MIB = 1 << 20
 SIZES_MIB = {"boot": 128, "rootA": 512, "rootB": 512}
 SLOT = "/usr/lib/ecdaq/slot"
@@ -95,7 +95,7 @@ def test_partitions_are_those_of_the_layout(built: Built) -> None:
     found = built.partitions()
     assert [p["size"] * 512 // MIB for p in found] == [*SIZES_MIB.values(), 256]
     assert [p["start"] * 512 % (4 * MIB) for p in found] == [0, 0, 0, 0]
-    if built.machine == "qemuarm64":
+    if built.machine == "ecdaq-qemuarm64":
         assert [p["name"] for p in found] == [*SIZES_MIB, "data"]
     else:
         # The boot ROM takes the first one, if it is FAT.
@@ -121,7 +121,7 @@ def test_the_slot_holds_kernel_command_line_and_device_trees(built: Built) -> No
     assert kernel[56:60] == b"ARMd", "no arm64 kernel"
     words = built.path(".cmdline").read_text()
     assert built.root_file(f"{SLOT}/slot.env").decode() == f"cmdline={words}"
-    if built.machine == "raspberrypi4-64":
+    if built.machine == "ecdaq-raspberrypi4-64":
         for tree in (*firmware.TREES, "bcm2711-rpi-cm4.dtb"):
             link = built.link(f"{SLOT}/dtb/broadcom/{tree}")
             assert built.root_file(link)[:4] == b"\xd0\x0d\xfe\xed", tree
@@ -138,17 +138,18 @@ def test_the_boot_state_is_in_front_of_the_first_partition(built: Built) -> None
 
 
 def test_the_firmware_of_the_emulator_is_u_boot_of_the_image(built: Built) -> None:
-    board = {"qemuarm64": "qemu_arm64", "raspberrypi4-64": "rpi_arm64"}[built.machine]
+    board = {"ecdaq-qemuarm64": "qemu_arm64", "ecdaq-raspberrypi4-64": "rpi_arm64"}[built.machine]
     loader = built.root_file(f"/usr/lib/u-boot-ecdaq/{board}/u-boot.bin")
     assert loader == built.path("-u-boot.bin").read_bytes()
     assert b"-ecdaq (" in loader
-    if built.machine == "raspberrypi4-64":
+    if built.machine == "ecdaq-raspberrypi4-64":
         assert built.boot_file("u-boot.bin") == loader
 
 
 def test_the_command_line_isolates_the_last_core(built: Built) -> None:
     words = built.path(".cmdline").read_text().split()
-    core, others = {"qemuarm64": ("1", "0"), "raspberrypi4-64": ("3", "0-2")}[built.machine]
+    cores = {"ecdaq-qemuarm64": ("1", "0"), "ecdaq-raspberrypi4-64": ("3", "0-2")}
+    core, others = cores[built.machine]
     for word in (
         *(f"isolcpus=managed_irq,domain,{core}", f"nohz_full={core}", f"rcu_nocbs={core}"),
         *(f"irqaffinity={others}", "ro", "init=/usr/lib/ecdaq/preinit"),
@@ -161,7 +162,7 @@ def test_the_command_line_isolates_the_last_core(built: Built) -> None:
 def test_the_root_file_system_is_clean_and_has_our_programs(built: Built) -> None:
     start = int(built.partitions()[1]["start"]) * 512
     built.tool("e2fsck", "-f", "-n", f"{built.name}.img?offset={start}")
-    for program in ("ecdaqd", "ecdaq-record", "ecdaq-dds", "ecdaq"):
+    for program in ("ecdaqd", "ecdaq-record", "ecdaq-dds", "ecdaq-web", "ecdaq-stream", "ecdaq"):
         head = built.root_file(f"/usr/bin/{program}")[:20]
         # 64 bits, little-endian, for AArch64.
         assert head[:6] == b"\x7fELF\x02\x01" and head[18:20] == b"\xb7\x00", program
@@ -179,6 +180,23 @@ def test_the_image_says_what_it_is(built: Built) -> None:
     assert re.fullmatch(r"\d{4}-\d\d-\d\d|unknown", archive)
     assert f"\nIMAGE_ID={name}\nIMAGE_VERSION={version}\n" in release
     assert f"\nECDAQ_ARCHIVE_DATE={archive}\n" in release
+
+
+def test_services_are_switched_on_in_the_slot(built: Built) -> None:
+    """A slot that comes by an update has no first start, at which systemd would do it."""
+    start = int(built.partitions()[1]["start"]) * 512
+    where = f"{built.name}.img?offset={start}"
+    wants = "/etc/systemd/system/multi-user.target.wants"
+    listing = built.tool("debugfs", "-R", f"ls -p {wants}", where).decode()
+    for unit in ("systemd-networkd", "ssh", "chrony", "ecdaqd", "ecdaq-boot-good"):
+        assert f"/{unit}.service/" in listing, unit
+    assert "systemd-timesyncd" not in listing
+
+
+def test_updates_are_taken_of_the_keyring(built: Built) -> None:
+    found = built.root_file("/usr/lib/rauc/system.conf").decode()
+    assert f"\ncompatible={built.machine}\n" in found
+    assert b"BEGIN CERTIFICATE" in built.root_file("/usr/lib/rauc/keyring.pem")
 
 
 def test_the_data_partition_is_made_for_large_files(built: Built) -> None:
@@ -231,7 +249,7 @@ def test_the_block_map_covers_what_is_written(built: Built) -> None:
 
 
 def test_the_firmware_of_the_board_finds_what_it_needs(built: Built) -> None:
-    if built.machine != "raspberrypi4-64":
+    if built.machine != "ecdaq-raspberrypi4-64":
         pytest.skip("QEMU's machine has no firmware")
     settings = built.boot_file("config.txt").decode()
     files = {name: built.boot_file(name) for name in sorted(firmware.files_wanted(settings))}

@@ -19,14 +19,19 @@ EXPOSURE_LIMITS = {
     "ecdaq-record.service": 1.5,
     "ecdaq-dds.service": 2.0,
     "ecdaq-sync0.service": 2.0,
+    "ecdaq-web.service": 1.5,
+    "ecdaq-stream.service": 1.5,
     "ecdaq-boot-config.service": 2.5,
+    "ecdaq-boot-bad.service": 3.5,
     "ecdaq-boot-good.service": 3.5,
     "ecdaq-clock.service": 2.0,
     "ecdaq-firewall.service": 2.5,
+    "ecdaq-health.service": 2.5,
     "ecdaq-names.service": 1.5,
     "ecdaq-nic.service": 3.5,
     "ecdaq-ssh-key.service": 2.0,
     "ecdaq-segment.service": 2.0,
+    "ecdaq-update-media.service": 3.0,
 }
 
 
@@ -115,6 +120,12 @@ def test_passwords_and_root_are_refused_over_ssh(machine: Machine) -> None:
         assert line in settings
 
 
+def test_only_sudo_runs_as_another_user_than_who_starts_it(machine: Machine) -> None:
+    """Of the 14 set-user-ID and set-group-ID programs that Debian's packages bring."""
+    found = machine.run("sudo find / -xdev -type f -perm /6000").split()
+    assert found == ["/usr/bin/sudo"]
+
+
 def test_only_ssh_listens_to_others(machine: Machine) -> None:
     lines = machine.run("sudo ss -H -tuln").splitlines()
     found = {(words[0], *words[4].rsplit(":", 1)) for words in map(str.split, lines)}
@@ -136,6 +147,21 @@ def test_the_journal_is_kept_and_bounded(machine: Machine) -> None:
     assert unit == "K" or float(figure) <= 64
 
 
+def test_udev_takes_our_rules(machine: Machine) -> None:
+    machine.run("sudo udevadm verify --no-style /usr/lib/udev/rules.d/*ecdaq*.rules")
+
+
+def test_without_their_files_nothing_is_sent_and_no_second_clock_runs(machine: Machine) -> None:
+    """Units that come with Debian's packages, and ours that wait for a file."""
+    units = machine.run("systemctl list-units --type=service --plain --no-legend --state=active")
+    for unit in ("journal-upload", "journal-remote", "journal-gatewayd", "ptp4l", "phc2sys"):
+        assert unit not in units
+    assert "timemaster" not in units and "ecdaq-ptp" not in units
+    assert machine.run("systemctl is-active chrony ecdaq-update-media.path").split() == [
+        *("active", "active")
+    ]
+
+
 def test_the_watchdog_is_fed_by_systemd(machine: Machine) -> None:
     usec = machine.run("systemctl show --property=RuntimeWatchdogUSec --value").strip()
     assert usec == "15s"
@@ -148,9 +174,13 @@ def test_a_service_can_neither_command_the_master_nor_take_names_of_its_files(
 ) -> None:
     """ecdaq-dds reads the network: whoever takes it over has what it may."""
     machine.run("ecdaq status > /dev/null")
-    for command in ("ecdaq stop", "touch /run/ecdaq/samples.new", "touch /run/ecdaq/record/status"):
+    for command, refused in (
+        ("ecdaq stop", "no permission to use the admin socket"),
+        ("touch /run/ecdaq/samples.new", "Permission denied"),
+        ("touch /run/ecdaq/record/status", "Permission denied"),
+    ):
         done = machine.run(f"sudo -u ecdaq-dds {command} 2>&1; echo $?")
-        assert "ermission denied" in done and not done.endswith("\n0\n"), done
+        assert refused in done and not done.endswith("\n0\n"), done
     machine.run("sudo -u ecdaq-dds ecdaq status > /dev/null")
     assert machine.run("stat -c %G /run/ecdaq/commands-remote").strip() == "ecdaq-remote"
 

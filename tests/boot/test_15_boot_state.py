@@ -74,7 +74,8 @@ def test_what_linux_writes_is_what_the_next_start_takes(machine: Machine) -> Non
     machine.run("sudo fw_setenv BOOT_B_LEFT 1")
     machine.cut_power()
     assert chosen(machine) == "A 1"
-    latest = max(filter(None, boot_state.read(machine.disk)), key=lambda copy: copy.counter)
+    latest = boot_state.latest(boot_state.read(machine.disk))
+    assert latest is not None
     assert latest.values == slots("A B", 1, 1)
 
 
@@ -115,10 +116,11 @@ def test_the_later_good_copy_counts_and_the_other_one_is_written(
     written: tuple[int, int],
 ) -> None:
     boot_state.write(machine.disk, [c.pack() if c else EMPTY for c in copies])
+    slot, left = wanted.split()
+    assert boot_state.next_slot(boot_state.read(machine.disk)) == slot
     assert chosen(machine) == wanted
     place, counter = written
     after = boot_state.read(machine.disk)
-    slot, left = wanted.split()
     assert after[1 - place] == copies[1 - place], "the copy that was valid is untouched"
     assert after[place] is not None
     assert after[place].counter == counter

@@ -133,6 +133,7 @@ class Partition:
         self.first, self.behind = first_sector, first_sector + sectors
         self.bytes = sectors * SECTOR
         self.count = 0
+        self.writes = 0
         self.pending: list[Entry] = []
         copy_sparse(base, durable, first_sector * SECTOR, self.bytes)
 
@@ -152,6 +153,7 @@ class Partition:
             part = self.part_of(entry)
             if part.sectors > 0:
                 self.pending.append(part)
+                self.writes += 1
         self.count = count
 
     def settle(self) -> None:

@@ -2,19 +2,23 @@
 from __future__ import annotations
 
 import shutil
+import signal
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from ecdaq import Fake
+from browser import Browser, find
+from ecdaq import FAKE, Fake
 from made_machine import Machine
 from recording import PRODUCER, RECORD, Bench
 from terminal import Terminal
+from web_bench import WEB, Web
 
 
 @pytest.fixture
@@ -31,8 +35,8 @@ def fake(run_dir: Path) -> Iterator[Callable[..., Fake]]:
     """Starts a fake ecdaqd with the settings given."""
     started: list[Fake] = []
 
-    def start(*settings: str, how: Sequence[str] = ()) -> Fake:
-        started.append(Fake(run_dir, *settings, how=how))
+    def start(*settings: str, how: Sequence[str] = (), program: Path = FAKE) -> Fake:
+        started.append(Fake(run_dir, *settings, how=how, program=program))
         return started[-1]
 
     yield start
@@ -67,3 +71,40 @@ def terminal() -> Iterator[Terminal]:
     one = Terminal(24, 90)
     yield one
     one.close()
+
+
+@pytest.fixture
+def make_web(bench: Bench) -> Iterator[Callable[..., Web]]:
+    if not WEB.exists():
+        pytest.skip("ecdaq-web is not built: it requires libwebsockets-dev and libcjson-dev")
+    made: list[Web] = []
+
+    def make(config: Path | None = None, **settings: str) -> Web:
+        made.append(Web(bench, config, **{k.replace("_", "."): v for k, v in settings.items()}))
+        return made[-1]
+
+    yield make
+    for web in made:
+        if web.process.poll() is None:
+            web.process.send_signal(signal.SIGCONT)
+            web.stop()
+
+
+@pytest.fixture
+def web(make_web: Callable[..., Web]) -> Web:
+    return make_web()
+
+
+@pytest.fixture
+def make_browser(tmp_path: Path) -> Iterator[Callable[..., Browser]]:
+    if find() is None:
+        pytest.skip("no chromium-headless-shell here: the page is not looked at in a browser")
+    made: list[Browser] = []
+
+    def make(web: Web, place: str = "", **arguments: Any) -> Browser:
+        made.append(Browser(tmp_path, f"http://127.0.0.1:{web.port}/{place}", **arguments))
+        return made[-1]
+
+    yield make
+    for browser in made:
+        browser.close()

@@ -33,11 +33,16 @@ struct fake {
 	int has_jump;
 	int has_recorder;
 	const char *admin;
+	const char *sii_path;
 	unsigned mode;
 	unsigned slaves; /* claimed on the status page */
 	int has_long_names;
+	int has_ebus; /* at port 1 */
+	int is_deaf;  /* to the first request of each entry of a dictionary */
+	uint32_t asked;
 	unsigned alias;      /* of both slaves; 0: 1001 of the second */
 	const char *aliases; /* one each, with commas between; NULL: as alias says */
+	const char *items;   /* of slaves[], from 1, one for each slave; NULL: none is configured */
 	int has_bits;        /* channels that are not whole bytes */
 	int is_noisy;        /* 2 errors more at port 1 of slave 0 in each look */
 	uint8_t noise;       /* as its counter is now */

@@ -10,8 +10,10 @@
 
 #include "base/admin_protocol.h"
 #include "base/bytes.h"
+#include "base/config_change.h"
 #include "base/difference.h"
 #include "base/histogram.h"
+#include "base/startup_record.h"
 #include "fake.h"
 #include "image/image.h"
 #include "wire/al.h"
@@ -42,6 +44,19 @@ static void make_mapping(struct fake *f)
 	}
 }
 
+/* SII=FILE: an image that is one, in place of bytes of all values. */
+static void read_sii(struct fake *f)
+{
+	FILE *file = f->sii_path == NULL ? NULL : fopen(f->sii_path, "rbe");
+
+	if (f->sii_path != NULL && (file == NULL || fread(f->sii, 1, SII_BYTES, file) == 0)) {
+		fake_die(f->sii_path, errno);
+	}
+	if (file != NULL) {
+		fclose(file);
+	}
+}
+
 void fake_listen(struct fake *f)
 {
 	struct sockaddr_un address = { .sun_family = AF_UNIX };
@@ -55,6 +70,7 @@ void fake_listen(struct fake *f)
 	}
 	put_le16(f->sii + SII_ALIAS_BYTE, 17);
 	f->sii[SII_CHECKSUM_BYTE] = sii_checksum(f->sii);
+	read_sii(f);
 	if (strcmp(f->admin, "none") == 0) {
 		return;
 	}
@@ -137,6 +153,9 @@ static void answer_read(struct fake *f, const struct admin_request *rq, struct a
 		give(reply, bytes, 4);
 	} else if (rq->index == 0x1008 && rq->subindex == 0) {
 		give(reply, "FB1111-Piccolo", 14);
+	} else if (rq->index == 0x1c12 || rq->index == 0x1c13) {
+		put_le16(bytes, rq->subindex == 0 ? 1 : rq->index == 0x1c12 ? 0x1600 : 0x1a00);
+		give(reply, bytes, rq->subindex == 0 ? 1 : 2);
 	} else if (rq->index == 0x2000) {
 		f->is_long = 1;
 	} else if (rq->index == 0x8000 && rq->subindex == 2) {
@@ -234,6 +253,8 @@ static void answer_register(struct fake *f, const struct admin_request *rq,
 {
 	if (rq->slave_pos != 0 || rq->address + rq->length > sizeof(f->reg)) {
 		refuse(reply, -ENXIO, "slave 1: 0x0130 does not answer: no such register");
+	} else if (rq->verb == ADMIN_REGISTER_READ && rq->address == 0x0ffe) {
+		give(reply, f->reg, 2 * ADMIN_REGISTER_BYTES); /* more than was asked for */
 	} else if (rq->verb == ADMIN_REGISTER_READ) {
 		give(reply, f->reg + rq->address, rq->length);
 	} else if (rq->address == 0x0120 && rq->argument[1] == 0) {
@@ -253,6 +274,9 @@ static void answer_sii(struct fake *f, const struct admin_request *rq, struct ad
 {
 	uint32_t differ = 0;
 
+	if (rq->verb == ADMIN_SII_READ && rq->argument[0] != 0) {
+		return; /* that of the bring-up: of all slaves the same */
+	}
 	if (rq->slave_pos != 0) {
 		refuse(reply, -EPERM, "slave 1: it is in SAFE-OP or OP");
 	} else if (rq->verb == ADMIN_SII_ALIAS) {
@@ -293,6 +317,7 @@ static void answer_diagnosis(struct fake *f, const struct admin_request *rq,
 		f->noise = (uint8_t)(f->noise < 250 ? f->noise + 2 : 2);
 		found.port[1] = (struct admin_port){ .is_link = 1,
 						     .is_communicating = 1,
+						     .is_ebus = (uint8_t)f->has_ebus,
 						     .rx_errors = f->noise };
 	}
 	give(reply, &found, sizeof(found));
@@ -320,7 +345,12 @@ static void answer_datagrams(const struct fake *f, struct admin_reply *reply)
 /* What is about one slave's objects. */
 static void answer_coe(struct fake *f, const struct admin_request *rq, struct admin_reply *reply)
 {
-	if (rq->verb == ADMIN_SDO_READ) {
+	uint32_t object = (uint32_t)rq->index << 8 | rq->subindex;
+
+	if (f->is_deaf && rq->verb == ADMIN_SDO_ENTRY && f->asked != object) {
+		f->asked = object;
+		refuse(reply, -ETIMEDOUT, "no answer");
+	} else if (rq->verb == ADMIN_SDO_READ) {
 		answer_read(f, rq, reply);
 	} else if (rq->verb == ADMIN_SDO_WRITE) {
 		answer_write(f, rq, reply);
@@ -333,7 +363,33 @@ static void answer_coe(struct fake *f, const struct admin_request *rq, struct ad
 	}
 }
 
-/* One of each sort: a slave, a device, an output; or a note alone. */
+static void answer_startup(struct admin_reply *reply)
+{
+	const struct startup_record record[] = {
+		{ .index = 0x8000,
+		  .subindex = 1,
+		  .len = 1,
+		  .transition = 0,
+		  .origin = STARTUP_OF_ESI },
+		{ .index = 0x8010,
+		  .len = 4,
+		  .is_complete = 1,
+		  .transition = 1,
+		  .origin = STARTUP_OF_CONFIG,
+		  .line = 12 },
+	};
+	const uint8_t data[] = { 7, 1, 2, 3, 4 };
+
+	snprintf(reply->text, sizeof(reply->text), "/etc/ecdaq.yaml");
+	memcpy(reply->data, &record[0], sizeof(record[0]));
+	reply->data[sizeof(record[0])] = data[0];
+	memcpy(reply->data + startup_record_bytes(1), &record[1], sizeof(record[1]));
+	memcpy(reply->data + startup_record_bytes(1) + sizeof(record[1]), data + 1, 4);
+	reply->data_len = (uint32_t)(startup_record_bytes(1) + startup_record_bytes(4));
+	reply->data_total = reply->data_len;
+}
+
+/* One of each sort: a slave, a device; PDOs, an output; or a note. */
 static void answer_compare(const struct fake *f, struct admin_reply *reply)
 {
 	const struct difference diff[] = {
@@ -342,6 +398,7 @@ static void answer_compare(const struct fake *f, struct admin_reply *reply)
 		  .position = 1,
 		  .line = 7,
 		  .name = "rear",
+		  .group = "axes",
 		  .property = "revision",
 		  .expected = "0x00000002",
 		  .found = "0x00000001" },
@@ -350,6 +407,14 @@ static void answer_compare(const struct fake *f, struct admin_reply *reply)
 		  .position = 2,
 		  .name = "EL\x1b[31m",
 		  .found = "vendor 0x00000002" },
+	};
+	const struct difference mapped[] = {
+		{ .kind = DIFFERENCE_PDOS,
+		  .line = 5,
+		  .name = "front",
+		  .property = "PDOs",
+		  .expected = "0x1a01",
+		  .found = "0x1a00, 0x1a01" },
 		{ .kind = DIFFERENCE_CHANNEL,
 		  .position = DIFFERENCE_NOWHERE,
 		  .line = 9,
@@ -364,13 +429,54 @@ static void answer_compare(const struct fake *f, struct admin_reply *reply)
 					 .expected = "vendor any" };
 
 	static_assert(sizeof(diff) <= sizeof(reply->data), "one message");
+	static_assert(sizeof(mapped) <= sizeof(reply->data), "one message");
 	snprintf(reply->text, sizeof(reply->text), "/etc/ecdaq.yaml");
 	if (strcmp(f->admin, "differs") == 0) {
 		give(reply, diff, sizeof(diff));
+	} else if (strcmp(f->admin, "mapped") == 0) {
+		give(reply, mapped, sizeof(mapped));
 	} else if (strcmp(f->admin, "half") == 0) {
 		give(reply, &note, sizeof(note) / 2);
 	} else {
 		give(reply, &note, sizeof(note));
+	}
+}
+
+/* One of each sort; none; or a file with an error. */
+static void answer_reload(const struct fake *f, struct admin_reply *reply)
+{
+	const struct config_change change[] = {
+		{ .effect = CONFIG_EFFECT_NOW,
+		  .option = "bus.op_timeout",
+		  .old_value = "10s",
+		  .new_value = "5s" },
+		{ .effect = CONFIG_EFFECT_RESTART,
+		  .option = "eoe.interface",
+		  .old_value = "",
+		  .new_value = "e\x1b[31m" },
+	};
+
+	static_assert(sizeof(change) <= sizeof(reply->data), "one message");
+	snprintf(reply->text, sizeof(reply->text), "/etc/ecdaq.yaml");
+	if (strcmp(f->admin, "differs") == 0) {
+		give(reply, change, sizeof(change));
+	} else if (strcmp(f->admin, "half") == 0) {
+		give(reply, change, sizeof(change) - 1);
+	} else if (strcmp(f->admin, "wrong") == 0) {
+		reply->result = -EINVAL;
+		snprintf(reply->text, sizeof(reply->text), "/etc/ecdaq.yaml:3: cycle.perid: no");
+	}
+}
+
+static void answer_of_config(const struct fake *f, const struct admin_request *rq,
+			     struct admin_reply *reply)
+{
+	if (rq->verb == ADMIN_COMPARE) {
+		answer_compare(f, reply);
+	} else if (rq->verb == ADMIN_CONFIG_RELOAD) {
+		answer_reload(f, reply);
+	} else {
+		answer_startup(reply);
 	}
 }
 
@@ -419,7 +525,9 @@ static void answer(struct fake *f, const struct admin_request *rq, struct admin_
 		answer_datagrams(f, reply);
 		break;
 	case ADMIN_COMPARE:
-		answer_compare(f, reply);
+	case ADMIN_CONFIG_RELOAD:
+	case ADMIN_STARTUP:
+		answer_of_config(f, rq, reply);
 		break;
 	case ADMIN_SDO_READ:
 	case ADMIN_SDO_WRITE:

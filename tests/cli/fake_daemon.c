@@ -6,11 +6,12 @@
  * input, by `ecdaq stop`, or by SIGKILL.
  *
  * usage: test_fake_daemon RUN_DIR [SPEED=N] [JUMP=1] [RECORDER=0]
- * [ADMIN=mute|garbage|none|differs|half] [MODE=octal] [SLAVES=N] [BRANCHES=1] [BITS=1] [NOISY=1]
- * [ALIAS=N] [FAULTS=N] [BEYOND=N] [ADC_MAX=V]
- * [DEGRADED=BITS] JUMP: every hundredth cycle number is followed by a gap of five. Each 64th frame
- * is lost. The admin socket: piccolo1.led belongs to the control program; objects 0x1018:1,
- * 0x1008:0, 0x8000:2 exist, 0x8000:1 cannot be written now; a one-shot time must be in the future.
+ * [ADMIN=mute|garbage|none|differs|half|wrong] [MODE=octal] [SLAVES=N] [BRANCHES=1] [ITEMS=N,...]
+ * [BITS=1] [NOISY=1] [ALIAS=N] [FAULTS=N] [BEYOND=N] [ADC_MAX=V] [DEGRADED=BITS] [SII=FILE] JUMP:
+ * every hundredth cycle number is followed by a gap of five. Each 64th frame is lost. The admin
+ * socket: piccolo1.led belongs to the control program; objects 0x1018:1, 0x1008:0, 0x8000:2 exist,
+ * 0x8000:1 cannot be written now; a one-shot time must be in the future. After an "l" on standard
+ * input, slave 1 is lost; after any other byte it is not.
  */
 #include <errno.h>
 #include <math.h>
@@ -113,12 +114,18 @@ static void parse(struct fake *f, int argc, char **argv)
 			f->has_recorder = value[0] == '1';
 		} else if (strcmp(argv[i], "ADMIN") == 0) {
 			f->admin = value;
+		} else if (strcmp(argv[i], "SII") == 0) {
+			f->sii_path = value;
 		} else if (strcmp(argv[i], "MODE") == 0) {
 			f->mode = (unsigned)strtoul(value, NULL, 8);
 		} else if (strcmp(argv[i], "SLAVES") == 0) {
 			f->slaves = (unsigned)strtoul(value, NULL, 10);
+		} else if (strcmp(argv[i], "DEAF") == 0) {
+			f->is_deaf = value[0] == '1';
 		} else if (strcmp(argv[i], "LONG") == 0) {
 			f->has_long_names = value[0] == '1';
+		} else if (strcmp(argv[i], "EBUS") == 0) {
+			f->has_ebus = value[0] == '1';
 		} else if (strcmp(argv[i], "BRANCHES") == 0) {
 			f->has_branches = value[0] == '1';
 			f->slaves = 5;
@@ -126,6 +133,8 @@ static void parse(struct fake *f, int argc, char **argv)
 			f->alias = (unsigned)strtoul(value, NULL, 10);
 		} else if (strcmp(argv[i], "ALIASES") == 0) {
 			f->aliases = value;
+		} else if (strcmp(argv[i], "ITEMS") == 0) {
+			f->items = value;
 		} else if (strcmp(argv[i], "BITS") == 0) {
 			f->has_bits = value[0] == '1';
 		} else if (strcmp(argv[i], "NOISY") == 0) {
@@ -173,9 +182,11 @@ static void live(struct fake *f)
 		if (poll(fds, 2, 1) < 0) {
 			fake_die("poll", errno);
 		}
-		if ((fds[0].revents & (POLLIN | POLLHUP)) != 0 &&
-		    read(STDIN_FILENO, &byte, 1) == 0) {
-			break;
+		if ((fds[0].revents & (POLLIN | POLLHUP)) != 0) {
+			if (read(STDIN_FILENO, &byte, 1) == 0) {
+				break;
+			}
+			f->page->slave[1].is_lost = byte == 'l';
 		}
 		if ((fds[1].revents & POLLIN) != 0) {
 			fake_serve_client(f);

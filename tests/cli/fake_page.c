@@ -62,18 +62,22 @@ static void describe_more(struct fake *f)
 	snprintf(adc->unit, sizeof(adc->unit), "V");
 }
 
-static uint16_t alias_of(const struct fake *f, unsigned pos)
+/* The number at @pos of a list with commas between. */
+static uint16_t number_of(const char *list, unsigned pos)
 {
-	const char *list = f->aliases;
-
-	if (list == NULL) {
-		return (uint16_t)(f->alias > 0 ? f->alias : pos == 1 ? 1001 : 0);
-	}
 	for (; pos > 0; pos--) {
 		list += strcspn(list, ",");
 		list += *list == ',';
 	}
 	return (uint16_t)strtoul(list, NULL, 10);
+}
+
+static uint16_t alias_of(const struct fake *f, unsigned pos)
+{
+	return f->aliases != NULL ? number_of(f->aliases, pos)
+				  : (uint16_t)(f->alias > 0 ? f->alias
+					       : pos == 1   ? 1001
+							    : 0);
 }
 
 void fake_describe(struct fake *f)
@@ -112,6 +116,7 @@ void fake_describe(struct fake *f)
 			.slave_pos = (uint16_t)s,
 			.station_addr = (uint16_t)(0x1001 + s),
 			.alias = alias_of(f, s),
+			.config_item = f->items == NULL ? 0 : number_of(f->items, s),
 			.has_dc = 1,
 			.is_dc_reference = s == 0,
 			.dc_delay_ns = (int32_t)s * 310,
@@ -176,6 +181,9 @@ static void show_place(const struct fake *f, unsigned pos)
 	if (f->has_branches) {
 		snprintf(slave->info.name, sizeof(slave->info.name), "piccolo%u", pos);
 		slave->info.alias = alias_of(f, pos);
+		if (slave->info.alias == 1001 || slave->info.alias == 1003) {
+			snprintf(slave->group, sizeof(slave->group), "axes");
+		}
 		place.parent = pos == 3 ? 0 : place.parent;
 		place.parent_port = pos == 1 ? 3 : place.parent_port;
 		place.open_ports = pos == 0 ? 0xb : pos % 2 == 1 ? 3 : 1;

@@ -14,6 +14,7 @@ from ecdaq import FAILED, OK, Result, ecdaq
 CPU = "/sys/devices/system/cpu"
 NET = "/sys/class/net/ecat0"
 CORE = f"{CPU}/cpu3"
+IMAGE = "ecdaq-image-ecdaq-qemuarm64 0.1.0-1a2b3c4, Debian archive: 2026-11-21"
 KTHREAD = 0x00200040
 FIFO, OTHER = 1, 0
 
@@ -38,7 +39,8 @@ GOOD: Files = {
     "/proc/cpuinfo": "processor\t: 0\nFeatures\t: fp asimd\n",
     "/proc/cmdline": "ro isolcpus=managed_irq,domain,3 nohz_full=3 rcu_nocbs=3 irqaffinity=0-2\n",
     "/proc/sys/kernel/osrelease": "6.12.48-ecdaq\n",
-    "/usr/lib/ecdaq/image": "ecdaq-image-qemuarm64 0.1.0-1a2b3c4, Debian archive: 2026-11-21\n",
+    "/usr/lib/ecdaq/image": f"{IMAGE}\n",
+    "/run/ecdaq-slots/slots": "A runs, B: 0.1.0-0f1e2d3\n",
     "/proc/sys/kernel/version": "#1 SMP PREEMPT_RT Debian 6.12.48-1\n",
     "/proc/sys/kernel/sched_rt_runtime_us": "-1\n",
     "/proc/sys/kernel/sched_rt_period_us": "1000000\n",
@@ -86,7 +88,7 @@ GOOD: Files = {
     "/calls/eee.ecat0": "enabled 0\nactive 0\n",
     "/calls/coalesce.ecat0": "rx_us 0\nrx_frames 1\nadaptive 0\n",
     "/calls/addresses.ecat0": "",
-    "/calls/clock": "synchronised 1\nerror_us 850\ntai_offset_s 37\n",
+    "/calls/clock": "synchronised 1\nerror_us 850\ntai_offset_s 37\nutc_s 1795478400\n",
     "/calls/throttled": "flags 0\n",
 }
 

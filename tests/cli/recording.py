@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ecdaq import BIN, BUILD, ECDAQ
-from mcap.reader import make_reader
+from mcap.reader import NonSeekingReader, make_reader
 from mcap_ros2.decoder import DecoderFactory
 
 RECORD = BIN / "ecdaq-record"
@@ -82,6 +82,26 @@ class Bench:
                 reader = make_reader(file, decoder_factories=[DecoderFactory()], validate_crcs=True)
                 for _, _, raw, message in reader.iter_decoded_messages(topics=[topic]):
                     yield raw.log_time, message
+
+    def raw_messages(self, topic: str) -> Iterator[tuple[int, bytes]]:
+        """Log time and data; of a file being written, too."""
+        for path in sorted(self.folder.glob("ecdaq-*")):
+            with path.open("rb") as file:
+                for _, channel, raw in NonSeekingReader(file).iter_messages(topics=[topic]):
+                    assert channel.topic == topic
+                    yield raw.log_time, raw.data
+
+    def schemas(self) -> dict[str, tuple[str, str, str]]:
+        """Name, encoding and text of the schema of each topic."""
+        found = {}
+        for path in self.files():
+            with path.open("rb") as file:
+                summary = make_reader(file).get_summary()
+                assert summary is not None
+                for channel in summary.channels.values():
+                    schema = summary.schemas[channel.schema_id]
+                    found[channel.topic] = (schema.name, schema.encoding, schema.data.decode())
+        return found
 
     def close(self) -> None:
         for process in self.processes:

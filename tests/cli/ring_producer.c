@@ -6,10 +6,13 @@
  * time of the edge.
  *
  * usage: test_ring_producer RUN_DIR --cycles N [--pace] [--first N] [--skip FROM:COUNT] [--depth N]
- *        [--no-close] [--wait] [--events N] [--bad N]
+ *        [--no-close] [--wait] [--events N] [--bad N] [--lost N] [--losses N] [--tai NS]
  * --pace: one sample each millisecond; otherwise at once. --skip: cycle numbers with no sample.
  * --no-close: leave the ring open, as after a crash. --wait: end when standard input does. --bad:
- * in every Nth cycle, from 0, the sample of the last slave is bad.
+ * in every Nth cycle, from 0, the sample of the last slave is bad. --lost: in every Nth the frame
+ * is lost. --events: so many, each 100 cycles after the one before. --losses: then so many of lost
+ * frames, 100 ms apart. --tai: CLOCK_TAI
+ * of the first sample's edge; otherwise now.
  */
 #include <errno.h>
 #include <inttypes.h>
@@ -50,6 +53,9 @@ struct arguments {
 	uint64_t depth;
 	uint64_t events;
 	uint64_t bad_every;
+	uint64_t tai_ns; /* 0: now */
+	uint64_t lost_every;
+	uint64_t losses;
 	int has_pace;
 	int is_left_open;
 	int has_wait;
@@ -83,6 +89,12 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
 			a->events = strtoull(argv[++i] != NULL ? value : "", NULL, 10);
 		} else if (strcmp(argv[i], "--bad") == 0) {
 			a->bad_every = strtoull(argv[++i] != NULL ? value : "", NULL, 10);
+		} else if (strcmp(argv[i], "--tai") == 0) {
+			a->tai_ns = strtoull(argv[++i] != NULL ? value : "", NULL, 10);
+		} else if (strcmp(argv[i], "--losses") == 0) {
+			a->losses = strtoull(argv[++i] != NULL ? value : "", NULL, 10);
+		} else if (strcmp(argv[i], "--lost") == 0) {
+			a->lost_every = strtoull(argv[++i] != NULL ? value : "", NULL, 10);
 		} else if (strcmp(argv[i], "--skip") == 0) {
 			if (sscanf(value, "%" SCNu64 ":%" SCNu64, &a->skip_from, &a->skip_count) !=
 			    2) {
@@ -185,6 +197,9 @@ static void push(struct ring *ring, const struct arguments *a, uint64_t cycle, i
 	if (a->bad_every > 0 && cycle % a->bad_every == 0) {
 		slave_set_add(&h.slaves_bad, SLAVES - 1);
 	}
+	if (a->lost_every > 0 && cycle % a->lost_every == 0) {
+		h.flags |= SAMPLE_LOST;
+	}
 	fill_image(image, cycle, dc_ns);
 	ring_push(ring, &h, sample_head_bytes(SLAVES), image, sizeof(image));
 }
@@ -193,14 +208,26 @@ static void produce(struct ring *ring, struct ring *events, const struct argumen
 {
 	struct platform platform = platform_posix();
 	mono_t deadline = platform.now(platform.ctx);
-	int64_t start_tai_ns = platform.tai_ns(platform.ctx);
+	int64_t start_tai_ns = a->tai_ns > 0 ? (int64_t)a->tai_ns : platform.tai_ns(platform.ctx);
 
 	for (uint64_t i = 0; i < a->events; i++) {
 		struct event ev = { .id = EVENT_OUTPUT_SET,
 				    .mono_ns = (int64_t)i + 1,
 				    .tai_ns = start_tai_ns,
+				    .cycle = a->first + 100 * i,
 				    .value = (int64_t)i,
 				    .slave_pos = 1 };
+
+		ring_push(events, &ev, sizeof(ev), NULL, 0);
+	}
+	for (uint64_t i = 0; i < a->losses; i++) {
+		struct event ev = { .id = EVENT_FRAME_LOST,
+				    .mono_ns = (int64_t)i * 100 * NS_PER_MS,
+				    .tai_ns = start_tai_ns,
+				    .cycle = a->first + 100 * i,
+				    .value = (int64_t)(a->first + 100 * i),
+				    .arg = { 1 },
+				    .slave_pos = EVENT_NO_SLAVE };
 
 		ring_push(events, &ev, sizeof(ev), NULL, 0);
 	}

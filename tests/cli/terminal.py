@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import codecs
 import fcntl
 import os
 import pty
@@ -35,6 +36,8 @@ class Terminal:
         fcntl.ioctl(self.slave, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
         self.before = termios.tcgetattr(self.slave)
         self.text = ""
+        # A read may end within a character.
+        self.decoder = codecs.getincrementaldecoder("utf-8")(errors="replace")
         self.process: subprocess.Popen[bytes] | None = None
 
     def resize(self, rows: int, columns: int) -> None:
@@ -89,7 +92,7 @@ class Terminal:
     def read_some(self) -> bool:
         if not select.select([self.master], [], [], 0.05)[0]:
             return False
-        self.text += os.read(self.master, 65536).decode(errors="replace")
+        self.text += self.decoder.decode(os.read(self.master, 65536))
         return True
 
     def wait_until(self, condition: Callable[[], bool]) -> None:

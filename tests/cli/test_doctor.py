@@ -14,6 +14,7 @@ from made_machine import (
     CORE,
     CPU,
     GOOD,
+    IMAGE,
     KTHREAD,
     NET,
     OF_RUNNING_PROGRAMS,
@@ -36,14 +37,38 @@ def test_a_good_machine_has_nothing_to_fix(machine: Machine) -> None:
     found = checks(machine)
     assert {name for name, check in found.items() if check["level"] != "OK"} == OF_RUNNING_PROGRAMS
     assert "port ecat0, cycle core 3, priority 80" in text.splitlines()[0]
-    assert text.splitlines()[-1] == "32 checks: 29 ok, 0 warn, 0 fail, 3 skipped"
+    assert text.splitlines()[-1] == "33 checks: 30 ok, 0 warn, 0 fail, 3 skipped"
 
 
 def test_the_image_and_the_commit_that_it_was_built_from_are_shown(machine: Machine) -> None:
-    image = "ecdaq-image-qemuarm64 0.1.0-1a2b3c4, Debian archive: 2026-11-21"
-    assert checks(machine)["image"]["value"] == image
+    assert checks(machine)["image"]["value"] == IMAGE
     machine.change({"/usr/lib/ecdaq/image": None})
     assert checks(machine)["image"]["level"] == "SKIP"
+
+
+@pytest.mark.parametrize(("archive", "old"), [("2026-08-26", False), ("2026-08-25", True)])
+def test_an_image_without_three_months_of_security_updates_is_too_old(
+    machine: Machine, archive: str, old: bool
+) -> None:
+    """The made machine's clock is at 2026-11-24."""
+    text = f"ecdaq-image-x 0.1.0-1a2b3c4, Debian archive: {archive}"
+    machine.change({"/usr/lib/ecdaq/image": text + "\n"})
+    check = checks(machine)["image"]
+    if not old:
+        assert (check["level"], check["value"]) == ("OK", text)
+        return
+    assert check["level"] == "WARN"
+    assert check["value"].startswith(f"{text}: 91 days old")
+    assert "--refresh" in check["remedy"]
+    # A clock that was never set says nothing about the age.
+    machine.change({"/calls/clock": "synchronised 0\nerror_us 1\ntai_offset_s 0\nutc_s 0\n"})
+    assert checks(machine)["image"]["level"] == "OK"
+
+
+def test_the_slots_are_shown(machine: Machine) -> None:
+    assert checks(machine)["slots"]["value"] == "A runs, B: 0.1.0-0f1e2d3"
+    machine.change({"/run/ecdaq-slots/slots": None})
+    assert checks(machine)["slots"]["level"] == "SKIP"
 
 
 # check, what is otherwise and still good, expected text
@@ -109,7 +134,7 @@ def test_what_is_good_in_another_way_is_ok(
 ) -> None:
     machine.change(other)
     check = checks(machine)[name]
-    assert check["level"] == "OK" and check["mend"] is None, check
+    assert check["level"] == "OK" and check["remedy"] is None, check
     assert message in check["value"]
 
 
@@ -117,7 +142,7 @@ def test_a_bare_machine_skips_and_never_crashes(tmp_path: Path) -> None:
     result = ecdaq(None, "doctor", "--root", str(tmp_path), "--json")
     found = report(result)
     assert found["config"] == "defaults"
-    assert found["ok"] + found["warn"] + found["fail"] + found["skip"] == 32
+    assert found["ok"] + found["warn"] + found["fail"] + found["skip"] == 33
     assert found["fail"] == 0 and result.returncode == OK
 
 
@@ -160,7 +185,7 @@ def test_garbage_in_every_file_never_crashes(machine: Machine, garbage: str) -> 
         if not name.endswith("/") and not str(content).startswith("-> "):
             machine.change({name: garbage})
     found = report(examine(machine, "--json"))
-    assert len(found["check"]) == 32
+    assert len(found["check"]) == 33
 
 
 # --- with an ecdaqd ---
@@ -195,7 +220,7 @@ def test_a_running_ecdaqd_is_checked(
     machine.change(running_threads(running.process.pid, **thread_is))
     check = checks(machine, running.run_dir)[name]
     assert check["level"] == level, check
-    assert message in f"{check['value']} -> {check['mend']}"
+    assert message in f"{check['value']} -> {check['remedy']}"
 
 
 def test_refused_cpu_dma_latency_shows_in_idle_states(
@@ -266,7 +291,7 @@ def test_the_command_line_of_the_ecdaqd_that_runs_is_what_counts(
 def test_this_machine_is_examined_with_the_port_of_the_ecdaqd_that_runs(daemon: Fake) -> None:
     found = report(daemon("doctor", "--json"))
     assert found["running"] is True and found["interface"] == "ecat0"
-    assert len(found["check"]) == 32
+    assert len(found["check"]) == 33
     assert report(daemon("doctor", "--json", "--interface", "lo"))["interface"] == "lo"
 
 

@@ -16,7 +16,9 @@ SERVICES = {
     "ecdaqd": None,
     "ecdaq-record": "record.enable",
     "ecdaq-dds": "dds.enable",
+    "ecdaq-stream": "stream.enable",
     "ecdaq-sync0": "sync0.enable",
+    "ecdaq-web": "web.enable",
 }
 PROGRAMS = [*SERVICES, "ecdaq"]
 RUN_BY_ECDAQ = ["log", "security"]
@@ -32,8 +34,8 @@ STANDARD = [
 
 def run(program: str, *words: str) -> Result:
     if not (BIN / program).exists():
-        assert program == "ecdaq-dds", f"{program} was not built"
-        pytest.skip("ecdaq-dds was not built")
+        assert program in ("ecdaq-dds", "ecdaq-stream", "ecdaq-web"), f"{program} was not built"
+        pytest.skip(f"{program} was not built")
     return subprocess.run(
         [BIN / program, *words],
         env=environment(None),
@@ -97,7 +99,10 @@ def test_an_argument_is_refused_by_a_service(program: str) -> None:
 @pytest.mark.parametrize("program", SERVICES)
 def test_check_reports_a_valid_file(program: str, tmp_path: Path) -> None:
     config = tmp_path / "ecdaq.yaml"
-    config.write_text(f"record:\n  dir: {tmp_path}\ndds:\n  interface: lo\n  multicast: off\n")
+    config.write_text(
+        f"record:\n  dir: {tmp_path}\ndds:\n  interface: lo\n  multicast: off\n"
+        "stream:\n  servers: nats://127.0.0.1\n"
+    )
     switch = SERVICES[program]
     enable = [] if switch is None else ["--set", f"{switch}=on"]
     result = run(program, "--check", "--config", str(config), *enable)

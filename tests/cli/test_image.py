@@ -29,6 +29,7 @@ def value_of(shown: dict[str, Any], offset: int, length: int) -> int:
 
 def test_the_bytes_are_those_of_the_newest_cycle(daemon: Fake) -> None:
     works(daemon("set", "piccolo0.led=1", "piccolo0.oneshot_time=0x1122334455667788"))
+    daemon.sample(daemon.next_cycle(), "piccolo0.led")
     with daemon.held():
         shown = json_of(daemon("data", "--json"))
         newest = json_of(daemon("status", "--json"))["cycle_number"]

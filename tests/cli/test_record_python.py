@@ -8,6 +8,7 @@ import io
 import itertools
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -16,9 +17,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from catkin_pkg.package import parse_package
 from ecdaq import NOBODY
 from mcap.reader import make_reader
 from recording import RECORD, Bench, wait_until
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 OLD_RECORDING = Path(__file__).parent / "recordings" / "bad_slaves_in_one_word.mcap"
 PERIOD_NS = 1_000_000
@@ -40,7 +43,9 @@ def test_every_sample_decodes_and_is_what_the_ring_held(bench: Bench) -> None:
         assert all(m.good and m.flags == 0 for _, m in samples)
         assert all(m.counter == m.cycle % 65536 for _, m in samples)
         assert all(m.sample_time == m.dc_time_ns for _, m in samples)
-        volt = np.array([m.adc for _, m in samples]) * 3.3 / 4096
+        assert all(m.adc == pytest.approx(m.adc_raw * 3.3 / 4096) for _, m in samples)
+        assert all(m.header.stamp.sec * 10**9 + m.header.stamp.nanosec == t for t, m in samples)
+        volt = np.array([m.adc for _, m in samples])
         angle = 2 * np.pi * (np.arange(3000) / 1000 - 0.25 * slave)
         basis = np.column_stack((np.sin(angle), np.cos(angle), np.ones(3000)))
         (sine, cosine, offset), *_ = np.linalg.lstsq(basis, volt, rcond=None)
@@ -164,7 +169,7 @@ def test_export_is_read_by_csv_readers(bench: Bench) -> None:
     exported = bench.log("export", bench.folder, "--from", "100", "--to", "399")
     rows = list(csv.DictReader(io.StringIO(exported.stdout)))
     assert [int(row["cycle"]) for row in rows] == list(range(100, 400))
-    assert float(rows[150]["piccolo0.adc"]) == pytest.approx(1.5, abs=1e-3)
+    assert float(rows[150]["piccolo0.adc [V]"]) == pytest.approx(1.5, abs=1e-3)
     assert rows[0]["piccolo1.counter"] == "100"
     raw = bench.log("export", bench.folder, "--raw", "--channels", "piccolo0.adc", "--json")
     lines = [json.loads(line) for line in raw.stdout.splitlines()]
@@ -174,6 +179,75 @@ def test_export_is_read_by_csv_readers(bench: Bench) -> None:
     missing = bench.log("export", bench.folder, "--channels", "piccolo9.adc")
     assert missing.returncode == 1
     assert missing.stderr.count("\n") == 1 and "no channel piccolo9.adc" in missing.stderr
+
+
+@pytest.mark.parametrize("values", ["physical", "raw", "both"])
+def test_the_table_is_the_same_however_values_were_recorded(bench: Bench, values: str) -> None:
+    bench.produce("--cycles", "300", "--bad", "7").wait(60)
+    bench.record_all("--set", f"record.values={values}")
+    rows = list(csv.DictReader(io.StringIO(bench.log("export", bench.folder).stdout)))
+    assert list(rows[0])[4:6] == ["piccolo0.good", "piccolo0.adc [V]"]
+    assert float(rows[250]["piccolo0.adc [V]"]) == pytest.approx(1.5, abs=1e-3)
+    assert [row["cycle"] for row in rows if row["piccolo1.adc [V]"] == ""] == [
+        str(n) for n in range(0, 300, 7)
+    ]
+    raw = bench.log("export", bench.folder, "--raw", "--channels", "piccolo0.adc")
+    if values == "physical":
+        assert raw.returncode == 1 and raw.stderr.count("\n") == 1
+        assert "piccolo0.adc was recorded as physical values only (record.values)" in raw.stderr
+        raw = bench.log("export", bench.folder, "--raw", "--channels", "piccolo0.counter")
+        assert raw.stdout.splitlines()[:2][0] == "cycle,utc_ns,piccolo0.counter"
+    else:
+        lines = raw.stdout.splitlines()
+        assert lines[0] == "cycle,utc_ns,piccolo0.adc"
+        assert lines[251].endswith(f",{round(1.5 / 3.3 * 4096)}")
+
+
+def test_the_ros_2_package_defines_what_is_recorded(bench: Bench, tmp_path: Path) -> None:
+    bench.produce("--cycles", "50").wait(60)
+    bench.record_all()
+    package = tmp_path / "ecdaq_msgs"
+    made = bench.log("ros2pkg", *bench.files(), "--output", package)
+    assert (made.returncode, made.stderr) == (0, "")
+    assert made.stdout == f"{package}: package ecdaq_msgs, 6 message types\n"
+    manifest = parse_package(str(package))
+    manifest.validate()
+    assert (manifest.name, manifest.get_build_type()) == ("ecdaq_msgs", "ament_cmake")
+    assert [d.name for d in manifest.buildtool_depends][1:] == ["rosidl_default_generators"]
+    listed = set(re.findall(r"msg/(\w+)\.msg", (package / "CMakeLists.txt").read_text()))
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    types = {}
+    for path in (package / "msg").iterdir():
+        types |= get_types_from_msg(path.read_text(), f"ecdaq_msgs/msg/{path.stem}")
+    assert {name.rpartition("/")[2] for name in types} == listed
+    store.register(types)
+    found = 0
+    with bench.files()[0].open("rb") as file:
+        for schema, channel, raw in make_reader(file).iter_messages():
+            message: Any = store.deserialize_cdr(raw.data, schema.name)
+            if channel.topic == "/ecdaq/piccolo0":
+                found += 1
+                assert message.adc == pytest.approx(message.adc_raw * 3.3 / 4096)
+                stamp = message.header.stamp
+                assert stamp.sec * 10**9 + stamp.nanosec == raw.log_time
+    assert found == 50
+    again = bench.log("ros2pkg", *bench.files(), "--output", package)
+    assert again.returncode == 1
+    assert again.stderr == f"ecdaq: log: {package}: File exists\n"
+
+
+def test_a_package_is_not_made_of_recordings_that_differ(bench: Bench, tmp_path: Path) -> None:
+    bench.produce("--cycles", "20").wait(60)
+    bench.record_all()
+    bench.produce("--cycles", "20").wait(60)
+    bench.record_all("--set", "record.values=raw")
+    first, second = bench.files()
+    made = bench.log("ros2pkg", first, second, "--output", tmp_path / "made")
+    assert made.returncode == 1
+    assert made.stderr == (
+        f"ecdaq: log: {second}: defines Piccolo0 other than a file before: a package for each\n"
+    )
+    assert not (tmp_path / "made").exists()
 
 
 def test_stopped_by_a_signal_it_leaves_a_finished_file(bench: Bench) -> None:
@@ -243,6 +317,7 @@ def test_values_of_a_sample_that_is_not_good_are_not_exported(bench: Bench) -> N
     bench.produce("--cycles", "20", "--bad", "5").wait(60)
     bench.record_all()
     rows = list(csv.DictReader(io.StringIO(bench.log("export", bench.folder).stdout)))
+    rows = [{name.removesuffix(" [V]"): value for name, value in row.items()} for row in rows]
     bad = [row for row in rows if row["piccolo1.good"] == "0"]
     assert [row["cycle"] for row in bad] == ["0", "5", "10", "15"]
     assert {row[f"piccolo1.{name}"] for row in bad for name in ("adc", "counter", "led")} == {""}

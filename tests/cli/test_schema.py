@@ -103,10 +103,33 @@ def test_the_profiles_of_the_image_are_valid(schema: Schema, path: Path) -> None
         ("slaves: {name: a}", "is not of type 'array'"),
         ("slaves: [{nmae: a}]", "nmae"),
         ("slaves: [{sdo: [{index: 0x8000}]}]", "'value' is a required property"),
+        ("slaves: [{sdo: [0x8000 1]}]", "does not match"),
+        ("slaves: [{pdos: [{entries: gap 8}]}]", "'pdo' is a required property"),
+        ("slaves: [{pdos: [[1]]}]", "is not of type"),
+        ("slaves: [{name: a, outputs: [{chanel: led}]}]", "chanel"),
+        ("slaves: [{name: a, outputs: [{max: 1}]}]", "'channel' is a required property"),
+        ("slaves: [{sdo: [7]}]", "is not of type 'object', 'string'"),
     ],
 )
 def test_what_is_not_an_option_is_refused(schema: Schema, text: str, reason: str) -> None:
     assert any(reason in e.message for e in Draft7Validator(schema).iter_errors(load(text)))
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "PS 0x8000:01 UINT = 3  # comment",
+        "0x8000 REAL=0.5",
+        "os 0x1c12 complete OCTETS = 01 00",
+        "IP 0x8000:0x1a string = a#b # c",
+    ],
+)
+def test_a_start_up_sdo_of_one_line_is_valid_and_taken(
+    schema: Schema, tmp_path: Path, line: str
+) -> None:
+    text = f'slaves:\n  - sdo:\n      - "{line}"\n'
+    assert list(Draft7Validator(schema).iter_errors(load(text))) == []
+    assert problems(tmp_path, text) == {}
 
 
 def problems(folder: Path, text: str) -> dict[int, str]:

@@ -46,6 +46,20 @@ def test_lists_and_ranges_of_positions_and_aliases(
     assert [slave["name"] for slave in shown] == [f"piccolo{pos}" for pos in positions]
 
 
+def test_a_group_is_all_of_its_slaves(five: Fake) -> None:
+    for words, positions in ((["@axes"], [1, 3]), (["@axes", "0"], [1, 3, 0])):
+        shown = json_of(five("slaves", "--json", *words))
+        assert [slave["name"] for slave in shown] == [f"piccolo{pos}" for pos in positions]
+    assert [slave["group"] for slave in json_of(five("slaves", "--json"))] == [
+        "", "axes", "", "axes", ""
+    ]  # fmt: skip
+    assert "group            axes" in works(five("slaves", "-v", "1"))
+    assert "group" not in works(five("slaves", "-v", "0"))
+    fails(five("slaves", "@drives"), FAILED, "@drives: no slave is of this group (slaves[].group)")
+    fails(five("slaves", "@"), FAILED, "@: no slave is of this group")
+    fails(five("sdo", "read", "@axes", "0x1000"), FAILED, "@axes: is a group, and one slave is")
+
+
 def test_without_positions_an_alias_goes_on_to_the_next_one(fake: Callable[..., Fake]) -> None:
     daemon = fake("BRANCHES=1", "ALIASES=0,7,0,9,0")
     for words, positions in (

@@ -113,6 +113,22 @@ def test_crc_names_the_cable_of_a_port_with_errors(fake: Callable[..., Fake]) ->
     ]
 
 
+def test_crc_names_the_ebus_of_modules_that_have_no_cable(fake: Callable[..., Fake]) -> None:
+    daemon = fake("EBUS=1", "LONG=1", "NOISY=1")
+    name = "n" * 31
+    lines = works(daemon("crc", "0")).splitlines()
+    assert lines[-4].startswith("    port 0: check the cable between ecat0")
+    assert lines[-2:] == [
+        f"    port 1: check the E-bus between {name}: port 1",
+        f"            and {name}: port 0",
+    ]
+    assert max(len(line) for line in lines) <= 80
+    ports = json_of(daemon("crc", "0", "--json"))[0]["port"]
+    assert [port["ebus"] for port in ports] == [False, True, False, False]
+    again = works(fake("EBUS=1", "NOISY=1")("crc", "0", "-i", "1ms", "-n", "2"))
+    assert again.splitlines()[-1].startswith("    port 1: check the E-bus between ")
+
+
 def test_the_cable_of_slaves_with_long_names_fits_80_columns(fake: Callable[..., Fake]) -> None:
     lines = works(fake("LONG=1", "NOISY=1")("crc", "0")).splitlines()
     name = "n" * 31

@@ -74,7 +74,9 @@ def test_commands_need_the_group_of_the_socket(daemon: Fake, words: list[str]) -
     for name in ("status", "samples", "events"):
         (daemon.run_dir / name).chmod(0o644)
     fails(
-        daemon(*words, user=NOBODY), PERMISSION, "permission denied: run as root or join its group"
+        daemon(*words, user=NOBODY),
+        PERMISSION,
+        f"no permission to use the admin socket {daemon.run_dir}/admin: be root or in its group",
     )
 
 

@@ -5,14 +5,18 @@ from __future__ import annotations
 
 import re
 import signal
+import subprocess
 from collections.abc import Callable, Iterator
 
 import pytest
-from ecdaq import BUILD, OK, Fake, works
-from terminal import ENTER, Terminal, screens
+import yaml
+from ecdaq import BUILD, OK, STAGE, Fake, json_lines, works
+from terminal import ENTER, LEAVE, Terminal, screens
 
+RIGHT, LEFT = "\x1b[C", "\x1b[D"
 UP, DOWN, PAGE_DOWN, END = "\x1b[A", "\x1b[B", "\x1b[6~", "\x1b[F"
 WIDTHS = (60, 80, 200)
+SII = STAGE / "share/ecdaq/fb1111_piccolo/fb1111_piccolo.bin"
 
 
 @pytest.fixture(scope="module")
@@ -194,6 +198,63 @@ def test_a_histogram_fits(daemon: Fake, terminal: Terminal, columns: int) -> Non
 
 
 @pytest.mark.parametrize("columns", WIDTHS)
+def test_a_live_histogram_fits_and_grows(daemon: Fake, terminal: Terminal, columns: int) -> None:
+    terminal.resize(24, columns)
+    terminal.start(daemon, "histogram", "wake", "--interval", "20ms")
+    terminal.wait_for(r"(?s)(\x1b\[H.*){8}")
+    drawn = screens(terminal.text)[:7]
+    leave(terminal)
+    counts = []
+    for screen in drawn:
+        fits(screen, 24, columns)
+        found = re.match(r"wake: (\d+) values, p50 ", screen[0])
+        assert found and "largest" in " ".join(screen[:2])
+        assert any("bars: logarithmic" in line for line in screen[:3])
+        counts.append(int(found.group(1)))
+    assert counts == sorted(counts) and counts[-1] > counts[0]
+
+
+def test_keys_of_a_live_histogram(daemon: Fake, terminal: Terminal) -> None:
+    terminal.resize(8, 80)
+    terminal.start(daemon, "histogram", "wake", "--live")
+    screen_with(terminal, lambda s: s[0].startswith("wake: ") and "rows 1-" in s[-1])
+    terminal.press(DOWN)
+    screen_with(terminal, lambda s: "rows 2-" in s[-1])
+    for key, name in ((RIGHT, "round-trip"), (RIGHT, "phase"), (LEFT, "round-trip")):
+        terminal.press(key)
+        screen_with(terminal, lambda s, name=name: s[0].startswith(f"{name}: "))
+    terminal.press(LEFT + LEFT)
+    screen_with(terminal, lambda s: s[0] == "control: no values yet")
+    terminal.press(RIGHT)
+    terminal.resize(24, 60)
+    screen_with(terminal, lambda s: len(s) > 3 and max(map(len, s)) <= 60)
+    terminal.press("?")
+    screen_with(terminal, lambda s: "left, right" in "\n".join(s[1:]) and s[0] == "keys")
+    terminal.press("?")
+    screen_with(terminal, lambda s: s[0].startswith("wake: "))
+    leave(terminal)
+
+
+def test_a_live_histogram_ends_with_its_count_or_with_ecdaqd(
+    daemon: Fake, terminal: Terminal
+) -> None:
+    terminal.start(daemon, "histogram", "wake", "--count", "2", "--interval", "10ms")
+    assert terminal.end() == (OK, "")
+    # The last one stays in the terminal.
+    assert terminal.is_restored() and "values, p50" in terminal.text.split(LEAVE)[1]
+    piped = works(daemon("histogram", "wake", "--count", "3", "--interval", "10ms"))
+    assert piped.count("bars: logarithmic") == 3 and "\x1b" not in piped
+    three = json_lines(daemon("histogram", "wake", "--count", "3", "--interval", "10ms", "--json"))
+    assert [one["histogram"] for one in three] == ["wake"] * 3
+    assert three[0]["count"] < three[2]["count"]
+    terminal.text = ""
+    terminal.start(daemon, "histogram", "work", "--interval", "10ms")
+    terminal.wait_for("work: ")
+    daemon.kill()
+    assert terminal.end() == (OK, "") and terminal.is_restored()
+
+
+@pytest.mark.parametrize("columns", WIDTHS)
 def test_events_fit_and_are_coloured(daemon: Fake, terminal: Terminal, columns: int) -> None:
     terminal.resize(24, columns)
     terminal.start(daemon, "events", "--all")
@@ -203,6 +264,69 @@ def test_events_fit_and_are_coloured(daemon: Fake, terminal: Terminal, columns: 
     assert max(len(line) for line in lines) <= columns
     joined = " ".join(" ".join(lines).split())
     assert "slave 1 piccolo1: lost" in joined and "started: 2 slaves, period 1000000 ns" in joined
+
+
+def shown(terminal: Terminal, daemon: Fake, columns: int, *words: str) -> str:
+    terminal.resize(24, columns)
+    terminal.start(daemon, *words)
+    assert terminal.end() == (OK, "")
+    text = terminal.text.replace("\r", "")
+    assert [line for line in text.split("\n") if len(line) > columns] == []
+    assert max(len(line) for line in text.split("\n")) > columns * 0.6 or columns == 200
+    return text
+
+
+@pytest.fixture
+def described(fake: Callable[..., Fake]) -> Fake:
+    """Slaves with long names and an SII that has PDOs."""
+    return fake("SPEED=10", "LONG=1", f"SII={SII}")
+
+
+@pytest.mark.parametrize("columns", WIDTHS)
+@pytest.mark.parametrize("verb", ["pdo", "channels", "cstruct"])
+def test_lists_fit_and_nothing_is_cut(
+    described: Fake, terminal: Terminal, verb: str, columns: int
+) -> None:
+    piped = works(described(verb))
+    assert shown(terminal, described, columns, verb).split() == piped.split()
+
+
+def test_names_of_channels_are_in_one_column_where_there_is_room(
+    described: Fake, terminal: Terminal
+) -> None:
+    rows = shown(terminal, described, 80, "channels").splitlines()
+    assert {len(row.split()[3]) + row.index(row.split()[3]) for row in rows if " in " in row} == {
+        rows[0].index(" at") + 3
+    }
+
+
+@pytest.mark.parametrize("columns", WIDTHS)
+def test_the_c_header_on_a_terminal_is_still_one(
+    daemon: Fake, terminal: Terminal, columns: int
+) -> None:
+    text = shown(terminal, daemon, columns, "cstruct")
+    compiler = ["gcc", "-std=c17", "-Wall", "-Werror", "-fsyntax-only", "-xc", "-"]
+    subprocess.run(compiler, input=text, text=True, check=True)
+
+
+@pytest.mark.parametrize("columns", WIDTHS)
+def test_a_scan_on_a_terminal_is_the_same_configuration(
+    fake: Callable[..., Fake], terminal: Terminal, columns: int
+) -> None:
+    """With and without the lists of channels that are comments."""
+    daemon = fake("SPEED=10", f"SII={SII}")
+    piped = works(daemon("scan"))
+    text = shown(terminal, daemon, columns, "scan")
+    assert text.replace("#", "").split() == piped.replace("#", "").split()
+    for make in (str, with_channels):
+        assert yaml.safe_load(make(text)) == yaml.safe_load(make(piped))
+    assert "channels" in yaml.safe_load(with_channels(text))["slaves"][0]
+
+
+def with_channels(text: str) -> str:
+    """@text without the '#' in front of the lists of channels, continued lines included."""
+    lists = re.compile(r"^    #channels:\n(?:    #  (?:- |    ).*\n)+", re.MULTILINE)
+    return lists.sub(lambda found: re.sub(r"(?m)^    #", "    ", found.group()), text)
 
 
 def values_of(screen: list[str]) -> dict[str, list[str]]:
@@ -225,9 +349,10 @@ def test_watch_on_a_terminal_is_a_table_of_values_in_place(
         assert screen[1].split() == ["channel", "value", "unit", "age"]
         assert [line[:8] for line in screen[2:-1]] == ["piccolo0"] + 6 * ["piccolo1"]
     values = [values_of(screen) for screen in shown]
-    first = values[0]["piccolo0.adc"]
-    assert 0.4 < float(first[0]) < 1.6 and first[1] == "V" and first[2] in ("good", "BAD")
-    assert re.match(r"\d+\.\d$", first[3]) and first[4] == "s"
+    for value, unit, state, *age in (one["piccolo0.adc"] for one in values):
+        assert 0.4 < float(value) < 1.6 and unit == "V" and state in ("good", "BAD")
+        # Of the last good sample; there may be none before the first bad ones.
+        assert re.match(r"\d+\.\d s$", " ".join(age)) or (state, age) == ("BAD", ["-"])
     assert any(len(row[0]) == 18 for row in values[0].values())  # sample_time, whole
     assert len({one["piccolo1.counter"][0] for one in values}) > 1
     assert len({screen[2].index("V") for screen in shown}) == 1

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What DDS costs the cycle, how long it takes, what packet loss does; counts and ratios only.
 
-ECDAQ_DDS_SECONDS: how long each looks (20); the figures are printed.
+ECDAQ_DDS_SECONDS: how long each looks (10); the figures are printed.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from test_samples import (
     wait_for_cycle,
 )
 
-SECONDS = float(os.environ.get("ECDAQ_DDS_SECONDS", "20"))
+SECONDS = float(os.environ.get("ECDAQ_DDS_SECONDS", "10"))
 ROUNDS = 2
 STOPPED_S = 4.0
 SUBSCRIBERS = 8

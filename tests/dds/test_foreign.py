@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Subscribers of four vendors at once: what each got is, sample by sample, what was recorded.
 
-ECDAQ_DDS_SECONDS: how long each looks (20).
+ECDAQ_DDS_SECONDS: how long each looks (10).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Peers that mean no good: ecdaq-dds lives, serves the others, and the cycle does not notice.
 
-ECDAQ_DDS_SECONDS: duration of each (20). ECDAQ_DDS_SEED: of the fuzzer.
+ECDAQ_DDS_SECONDS: duration of each (10). ECDAQ_DDS_SEED: of the fuzzer.
 """
 
 from __future__ import annotations

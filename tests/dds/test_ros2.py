@@ -72,7 +72,7 @@ def test_mirror_equals_the_recording(
     assert {slave for slave, *_ in got} == {0, 1}
     for slave in (0, 1):
         recorded = {
-            m.cycle: (m.adc, m.counter)
+            m.cycle: (m.adc_raw, m.counter)
             for m in live.recorded(bench.segment.record_dir, f"/ecdaq/piccolo{slave}")
         }
         mine = {cycle: (adc, counter) for s, cycle, adc, counter in got if s == slave}

@@ -46,7 +46,7 @@ def of_recording(bench: Bench) -> dict[tuple[int, int], tuple[int, ...]]:
             int(m.good),
             int(m.led),
             m.oneshot_time,
-            m.adc,
+            m.adc_raw,
             m.counter,
             m.sample_time,
             m.status,

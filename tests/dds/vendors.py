@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).parent / "foreign"))
 
 import build
 
-SECONDS = float(os.environ.get("ECDAQ_DDS_SECONDS", "20"))
+SECONDS = float(os.environ.get("ECDAQ_DDS_SECONDS", "10"))
 DOMAIN = DDS_SETTINGS["dds.domain"]
 
 

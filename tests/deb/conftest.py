@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Two versions of the packages as README builds them, and a machine to install them on."""
+"""Packages as README builds them, of two versions; those for arm64; machines for them."""
 
 from __future__ import annotations
 
 import os
+import re
+import shutil
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,7 +14,7 @@ import pytest
 
 TOP = Path(__file__).resolve().parents[2]
 TOOLS = TOP / "app/tools/deb"
-OLD, NEW = "~old", ""
+OLD = "~old"
 
 
 class Machine:
@@ -53,27 +55,64 @@ class Machine:
         self.shell.wait(60)
 
 
+def build(folder: Path, arch: str) -> None:
+    if os.geteuid() != 0:
+        pytest.skip("needs root: the packages are built and installed in chroots")
+    command = [TOP / "build.sh", "deb", "--to", folder, arch]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-6000:]
+
+
+def with_suffix(package: Path, suffix: str, folder: Path) -> None:
+    """The same package with an older version; its relations to the others are of that version."""
+    tree = folder / package.stem
+    subprocess.run(["dpkg-deb", "--raw-extract", package, tree], check=True)
+    control = tree / "DEBIAN/control"
+    text = control.read_text()
+    (version,) = re.findall(r"^Version: (.*)$", text, re.MULTILINE)
+    text = text.replace(f"Version: {version}", f"Version: {version}{suffix}")
+    control.write_text(text.replace(f"(= {version})", f"(= {version}{suffix})"))
+    name, _, arch = package.stem.split("_")
+    to = folder / f"{name}_{version}{suffix}_{arch}.deb"
+    subprocess.run(["dpkg-deb", "--root-owner-group", "-Znone", "--build", tree, to], check=True)
+    shutil.rmtree(tree)
+
+
 @pytest.fixture(scope="session")
 def packages(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder with old/ and new/."""
-    if os.geteuid() != 0:
-        pytest.skip("needs root: the packages are built and installed in chroots")
     folder = tmp_path_factory.mktemp("packages")
-    for name, suffix in (("old", OLD), ("new", NEW)):
-        command = [TOP / "build.sh", "deb", "--to", folder / name]
-        if suffix:
-            command += ["--suffix", suffix]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr[-6000:]
+    (folder / "old").mkdir()
+    build(folder / "new", "amd64")
+    for package in (folder / "new").glob("*.deb"):
+        with_suffix(package, OLD, folder / "old")
     return folder
 
 
 @pytest.fixture(scope="session")
-def machine(packages: Path) -> Iterator[Machine]:
-    files = sorted((packages / "new").glob("*.deb"))
+def arm64_packages(packages: Path) -> Path:
+    """The same folder, with arm64/ too."""
+    build(packages / "arm64", "arm64")
+    return packages
+
+
+def installable(files: list[Path], folder: Path) -> Machine:
     tree = subprocess.run(
         [TOOLS / "install-tree.sh", *files], stdout=subprocess.PIPE, text=True, check=True
     ).stdout.strip()
-    machine = Machine(tree, packages)
+    return Machine(tree, folder)
+
+
+@pytest.fixture(scope="session")
+def machine(packages: Path) -> Iterator[Machine]:
+    machine = installable(sorted((packages / "new").glob("*.deb")), packages)
+    yield machine
+    machine.close()
+
+
+@pytest.fixture(scope="session")
+def arm64_machine(arm64_packages: Path) -> Iterator[Machine]:
+    """It has programs and libraries of arm64 beside its own."""
+    machine = installable(sorted((arm64_packages / "arm64").glob("*.deb")), arm64_packages)
     yield machine
     machine.close()

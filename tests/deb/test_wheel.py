@@ -25,4 +25,5 @@ def test_its_wheel_brings_all_that_reading_and_recording_need(tmp_path: Path) ->
     subprocess.run([python, "-m", "pip", "--quiet", "install", wheel], check=True, env=clean)
     use = f"import {', '.join(MODULES)}; print(ecdaq.read, ecdaq.connect)"
     subprocess.run([python, "-c", use], check=True, env=clean, cwd=tmp_path)
-    subprocess.run([python.parent / "ecdaq-remote", "--help"], check=True, env=clean)
+    for program in ("ecdaq-parquet", "ecdaq-remote"):
+        subprocess.run([python.parent / program, "--help"], check=True, env=clean)

@@ -6,6 +6,7 @@ They stand beside tests/fuzz/TARGET/corpus/, which holds what is easier kept as 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -72,9 +73,44 @@ def coe() -> Iterator[tuple[str, bytes]]:
         yield f"answer-{name}-once", upload + mail + bytes([3, len(answer)]) + answer
 
 
+ENI_ELEMENT = re.compile(r"<(\w+)>([^<]+)</\1>")
+
+
+def eni() -> Iterator[tuple[str, bytes]]:
+    """A plan, and behind a zero byte one that has each element otherwise, or not at all; and plans
+    that have something that is none."""
+    corpus = Path(__file__).resolve().parent / "eni" / "corpus"
+    plans = {
+        name: (corpus / name).read_text("latin-1") for name in ("two-slaves", "piccolos", "foreign")
+    }
+    for one, text in plans.items():
+        for other, second in plans.items():
+            yield f"pair-{one}-{other}", f"{text}\0{second}".encode("latin-1")
+    text = plans["two-slaves"]
+    for n, found in enumerate(ENI_ELEMENT.finditer(text)):
+        start, end = found.span(2)
+        value = found.group(2)
+        others = {"digit": value[:-1] + ("2" if value[-1] != "2" else "3"), "text": "zz"}
+        for name, other in others.items():
+            yield f"{name}-{n}", f"{text}\0{text[:start]}{other}{text[end:]}".encode("latin-1")
+        yield f"none-{n}", f"{text}\0{text[: found.start()]}{text[found.end() :]}".encode("latin-1")
+        if value.lstrip("-").isdigit():
+            for bad in ("#x", "99999999999999999999", "-1", "#x1zz"):
+                yield f"bad-{n}-{bad[:2]}", f"{text[:start]}{bad}{text[end:]}".encode("latin-1")
+    deep = "".join(f"<a{n}>" for n in range(40))
+    for name, bad in (
+        *(("deep", f"<EtherCATConfig>{deep}"), ("open", text[: len(text) // 2])),
+        *(("odd", text.replace("<Data>", "<Data>0")), ("none", "<a/>"), ("empty", "")),
+        *(("long", text.replace("<Data>", "<Data>" + "00" * 9000)), ("latin", "<a>\xe4</a>")),
+        ("token", f'<EtherCATConfig x="{"y" * (1 << 20)}"/>'),
+    ):
+        yield f"xml-{name}", bad.encode("latin-1")
+
+
 SEEDS: dict[str, Callable[[], Iterator[tuple[str, bytes]]]] = {
     "bring_up": bring_up,
     "coe": coe,
+    "eni": eni,
 }
 
 

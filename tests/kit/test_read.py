@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import datetime
+import operator
 import struct
 import subprocess
 import sys
@@ -44,11 +45,9 @@ def assert_topics_are_equal(path: Path) -> None:
         columns = recording.topic(name)
         assert columns.pop("log_time_ns").tolist() == [time for time, _ in messages]
         for field, values in columns.items():
-            assert "." not in field
-            assert [plain(v) for v in values.tolist()] == [
-                plain(getattr(m, field)) for _, m in messages
-            ], f"{name} {field}"
-        assert set(columns) == set(messages[0][1].__slots__)
+            expected = [plain(operator.attrgetter(field)(m)) for _, m in messages]
+            assert repr([plain(v) for v in values.tolist()]) == repr(expected), f"{name} {field}"
+        assert {column.split(".")[0] for column in columns} == set(messages[0][1].__slots__)
 
 
 @pytest.mark.parametrize("compression", ["0", "3"])
@@ -97,9 +96,12 @@ def test_values_equal_those_of_the_export(sample: Path, tmp_path: Path) -> None:
     exported = pandas.read_csv(tmp_path / "all.csv")
     frame = ecdaq.read(sample).to_pandas()
     frame = frame[frame["cycle"].isin(exported["cycle"])]
-    for name in frame.attrs["units"]:
+    for name, unit in frame.attrs["units"].items():
+        title = f"{name} [{unit}]" if unit else name
         found = frame[name].astype("float64").to_numpy()
-        assert np.allclose(found, exported[name].astype("float64"), rtol=1e-8, equal_nan=True), name
+        assert np.allclose(found, exported[title].astype("float64"), rtol=1e-8, equal_nan=True), (
+            name
+        )
 
 
 def test_raw_values_are_those_of_the_process_image(sample: Path) -> None:
@@ -107,10 +109,32 @@ def test_raw_values_are_those_of_the_process_image(sample: Path) -> None:
     recording = ecdaq.read(path, "piccolo1.adc", raw=True)
     signal = recording["piccolo1.adc"]
     assert signal.unit == ""
-    expected = {m.cycle: m.adc for _, m in decoded(path)["/ecdaq/piccolo1"]}
+    expected = {m.cycle: m.adc_raw for _, m in decoded(path)["/ecdaq/piccolo1"]}
     assert (
         dict(zip(signal.cycle[signal.valid], signal.exact[signal.valid], strict=True)) == expected
     )
+
+
+@pytest.mark.parametrize("values", ["physical", "raw", "both"])
+def test_values_are_the_same_however_they_were_recorded(
+    recorded: Callable[..., Path], values: str
+) -> None:
+    folder = recorded("--cycles", "200", "--bad", "7", settings=(f"record.values={values}",))
+    (path,) = files(folder)
+    signal = ecdaq.read(path)["piccolo1.adc"]
+    counts = np.round(signal.values[signal.valid] * 4096 / 3.3)
+    assert signal.unit == "V"
+    assert np.allclose(signal.values[signal.valid], counts * 3.3 / 4096)
+    assert np.flatnonzero(~signal.valid).tolist() == list(range(0, 200, 7))
+    names = set(decoded(path)["/ecdaq/piccolo1"][0][1].__slots__)
+    assert ("adc_raw" in names) == (values == "both")
+    if values == "physical":
+        with pytest.raises(ecdaq.RecordingError, match="recorded as physical values only"):
+            ecdaq.read(path, "piccolo1.adc", raw=True)["piccolo1.adc"]
+        assert ecdaq.read(path, "piccolo1.counter", raw=True)["piccolo1.counter"].valid.all()
+    else:
+        raw = ecdaq.read(path, raw=True)["piccolo1.adc"]
+        assert np.array_equal(raw.exact[signal.valid], counts)
 
 
 def test_a_gap_is_rows_without_values_and_an_entry_in_the_list(sample: Path) -> None:
@@ -274,7 +298,8 @@ int8 left
 float32[] right
 """
     metadata = {
-        "slave": "s", "adc.channel": "s.adc", "adc.unit": "V", "adc_raw.channel": "s.adc",
+        "slave": "s", "adc.channel": "s.adc", "adc.unit": "V", "adc.raw": "adc_raw",
+        "adc_raw.channel": "s.adc", "adc_raw.scale": "0.5",
     }  # fmt: skip
     content = topic(7, "/ecdaq/s", schema, metadata)
     for n in range(10):

@@ -76,6 +76,25 @@ def test_what_the_slaves_add_is_what_is_expected_and_measured(bus: Segment) -> N
     assert any(d["command"] == "LRW" for d in found["datagram"])
 
 
+def test_an_eeprom_is_shown_as_the_bus_uses_it(bus: Segment) -> None:
+    for slave in show(bus, "slaves"):
+        found = show(bus, "sii", "show", str(slave["position"]))
+        for key in ("vendor", "product", "revision"):
+            assert found[key] == slave[key]
+        assert found["checksum_ok"] and found["name"] == slave["device"]
+        for direction in ("input", "output"):
+            bits = [
+                entry["bits"]
+                for pdo in found["pdo"]
+                if pdo["sync_manager"] is not None and pdo["direction"] == direction
+                for entry in pdo["entry"]
+            ]
+            assert sum(bits) == slave[f"{direction}_bits"]
+    text = bus.ecdaq("sii", "show", "2").stdout
+    assert "TxPDO 0x1a00" in text and "0x6000:11  16 bit  Value" in text
+    assert max(len(line) for line in text.splitlines()) <= 80
+
+
 def test_outputs_that_were_set_are_in_the_image(bus: Segment) -> None:
     outputs = [c for c in show(bus, "channels") if c["direction"] == "output"]
     channel = outputs[-1]
@@ -106,6 +125,8 @@ def test_all_but_the_image_is_shown_below_op(
     found = show(segment, "domains")
     assert all(datagram["measured"] is None for datagram in found["datagram"])
     assert len(found["slave"]) == 5
-    assert [len(slave["port"]) for slave in show(segment, "crc")] == [4] * 5
+    coupler, terminal = [False, True, False, False], [True, True, False, False]
+    ebus = [[port["ebus"] for port in slave["port"]] for slave in show(segment, "crc")]
+    assert ebus == [coupler, terminal, terminal, coupler, terminal]
     got = segment.ecdaq("data", check=False)
     assert got.returncode == 16 and got.stderr.count("\n") == 1

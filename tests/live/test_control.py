@@ -12,6 +12,8 @@ from typing import Any
 
 from segment import BIN, ROOT, Segment, recorded, wait_for
 
+# These measure time, or need a cycle in time.
+IDLE = True
 BUILD = Path(os.environ.get("ECDAQ_BUILD", ROOT / "build" / "release"))
 TROUBLE = BUILD / "tests" / "control" / "trouble.so"
 CONTROL_EXIT = 15

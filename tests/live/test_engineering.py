@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from bus import tell
 from segment import Segment, wait_for
 
 # Without mailbox, with CoE, with more PDOs than are assigned, with a fixed mapping.
@@ -215,4 +216,31 @@ def test_without_a_mailbox_the_pdos_are_those_of_the_sii(
     assert piccolo["source"] == "sii"
     assert piccolo["not_by_coe"]
     assert mapped(piccolo, "input")
+    assert segment.stop("daemon") == 0
+
+
+def test_a_lost_answer_is_asked_for_again_and_a_lost_mailbox_is_said_in_a_line(
+    make_segment: Callable[..., Segment],
+) -> None:
+    segment = make_segment(
+        slaves="el3104", settings={"bus.target": "preop", "bus.mailbox_timeout": "300ms"}
+    )
+    file = segment.folder / "ecdaq.yaml"
+    control = segment.folder / "control"
+    segment.start_sim("--control", str(control))
+    segment.start_waiting_daemon()
+    waiting(segment, "PREOP")
+    (before,) = pdos(segment).values()
+    assert tell(control, "at=0s mailbox kind=silent count=1 slave=0") == "ok"
+    (after,) = pdos(segment).values()
+    assert after == before
+    assert (after["source"], after["not_by_coe"]) == ("coe", None)
+    assert tell(control, "at=0s mailbox kind=silent count=1000 slave=0") == "ok"
+    (silent,) = pdos(segment).values()
+    assert silent["source"] == "sii"
+    assert "no answer" in silent["not_by_coe"]
+    written = segment.ecdaq("scan", "--write", str(file))
+    assert "slave 0: PDOs by SII, not by CoE: " in written.stderr
+    assert "# PDOs by SII, not by CoE: " in file.read_text()
+    assert "slave 0: PDOs by SII, not by CoE: " in segment.ecdaq("xml", "0").stderr
     assert segment.stop("daemon") == 0

@@ -53,6 +53,63 @@ def esi_of(image: bytes, pdos: list[dict[str, Any]]) -> str:
     return ESI.format(vendor=vendor, product=product, revision=revision, pdos="".join(texts))
 
 
+COMMAND = (
+    "<InitCmd><Transition>{}</Transition><Index>#x8000</Index><SubIndex>{}</SubIndex>"
+    "<Data>{}</Data></InitCmd>"
+)
+
+
+def board_with(folder: Path, *commands: str) -> Path:
+    """A folder with the ESI file of a board with these start-up commands."""
+    text = ESI.format(
+        vendor=2,
+        product=0x04570862,
+        revision=0,
+        pdos=f"<Mailbox><CoE>{''.join(commands)}</CoE></Mailbox>",
+    )
+    (folder / "esi").mkdir()
+    (folder / "esi" / "board.xml").write_text(text)
+    return folder / "esi"
+
+
+@pytest.mark.parametrize(
+    ("sdo", "wanted"), [("[]", "25"), ("[IP 0x8000:02 UINT = 30]", "30")], ids=["esi", "replaced"]
+)
+def test_start_up_commands_of_an_esi_are_written_unless_the_configuration_has_others(
+    tmp_path: Path, sdo: str, wanted: str
+) -> None:
+    folder = board_with(tmp_path, COMMAND.format("IP", 2, "1900"))
+    (tmp_path / "run").mkdir()
+    (tmp_path / "ecdaq.yaml").write_text(f"slaves:\n  - name: a\n    sdo: {sdo}\n")
+    segment = in_preop(tmp_path / "run", "fb1111_piccolo", **{"bus.esi_dir": str(folder)})
+    try:
+        segment.start_sim()
+        segment.start_daemon("--config", str(tmp_path / "ecdaq.yaml"))
+        wait_for_preop(segment)
+        got = segment.ecdaq("sdo", "read", "a", "0x8000:2", "--type", "UINT").stdout.strip()
+        assert got == wanted
+    finally:
+        segment.close()
+
+
+def test_a_start_up_command_of_an_esi_that_is_refused_is_named_as_such(tmp_path: Path) -> None:
+    folder = board_with(tmp_path, COMMAND.format("PS", 1, "07"))
+    (tmp_path / "run").mkdir()
+    segment = Segment(
+        tmp_path / "run", slaves="fb1111_piccolo", settings={"bus.esi_dir": str(folder)}
+    )
+    try:
+        segment.start_sim()
+        segment.start_waiting_daemon()
+        wait_for("waiting", lambda: segment.status().get("waiting"), 120)
+        assert show(segment, "state")["message"].endswith(
+            ": start-up SDO 0x8000:01 at PS (InitCmd of its ESI description) rejected: abort "
+            "0x06090030, value out of range"
+        )
+    finally:
+        segment.close()
+
+
 def show(bus: Segment, *words: str) -> Any:
     got = bus.ecdaq(*words, "--json", check=False)
     assert (got.returncode, got.stderr) == (0, "")
@@ -152,3 +209,52 @@ def test_a_slave_without_names_has_those_of_its_esi(bus: Segment, tmp_path: Path
         assert "warning: bus.esi_dir: " in log and "a bad one.xml:2: no XML: mismatched tag" in log
     finally:
         segment.close()
+
+
+def dictionary_of(pdos: list[dict[str, Any]]) -> str:
+    """An object of one entry, with a name and a unit, for each that is mapped."""
+    kind = "<DataType><Name>R</Name><SubItem><SubIdx>1</SubIdx><Name>Open</Name><Type>BOOL</Type>"
+    objects = [
+        f"<Object><Index>#x{entry['index']:04x}</Index><Name>Valve</Name><Type>R</Type><Info>"
+        "<SubItem><Name>Open</Name><Info><Unit>#x00410000</Unit></Info></SubItem></Info></Object>"
+        for pdo in pdos
+        for entry in pdo["entry"]
+    ]
+    return (
+        f"<Profile><Dictionary><DataTypes>{kind}</SubItem></DataType></DataTypes>"
+        f"<Objects>{''.join(objects)}</Objects></Dictionary></Profile>"
+    )
+
+
+def test_names_types_and_units_are_those_of_the_dictionary_of_its_esi(
+    bus: Segment, tmp_path: Path
+) -> None:
+    sii, esi = tmp_path / "sii", tmp_path / "esi"
+    sii.mkdir()
+    esi.mkdir()
+    bus.ecdaq("sii", "read", "0", "--output", str(tmp_path / "el2004.bin"))
+    image = (tmp_path / "el2004.bin").read_bytes()
+    (sii / "mute.bin").write_bytes(hide(image, STRINGS))
+    vendor, product, revision = struct.unpack_from("<III", image, 0x10)
+    text = ESI.format(
+        vendor=vendor,
+        product=product,
+        revision=revision,
+        pdos=dictionary_of(show(bus, "pdo", "0")[0]["pdo"]),
+    )
+    (esi / "el2004.xml").write_text(text)
+    (tmp_path / "run").mkdir()
+    segment = Segment(tmp_path / "run", slaves="mute", settings={"bus.esi_dir": str(esi)})
+    try:
+        segment.start_sim("--sii", str(sii))
+        segment.start_daemon()
+        segment.wait_for_op()
+        channels = show(segment, "channels")
+        assert [channel["unit"] for channel in channels] == ["deg"] * 4
+        assert all("open" in channel["name"] for channel in channels)
+        (slave,) = show(segment, "pdo")
+        assert {entry["name"] for pdo in slave["pdo"] for entry in pdo["entry"]} == {"Open"}
+    finally:
+        segment.close()
+    (device,) = described(esi / "el2004.xml")
+    assert [one["unit"] for one in device["unit"]] == ["deg"] * 4

@@ -9,6 +9,8 @@ from collections.abc import Callable
 
 from segment import BIN, ROOT, Segment, recorded, wait_for
 
+# These measure time, or need a cycle in time.
+IDLE = True
 CONFIG = ROOT / "app" / "examples" / "loopback" / "ecdaq.yaml"
 SEND_LINE = ROOT / "app" / "tools" / "tell-segment.py"
 LAMPS = 0xF8

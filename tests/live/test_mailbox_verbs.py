@@ -19,7 +19,10 @@ SLAVES = "akd,every,el2004,el3104"
 
 def make_drive(folder: Path) -> Path:
     """A folder with the EEPROM of a drive that has every mailbox protocol."""
-    segment = Segment(folder, slaves="akd", settings={"bus.target": "preop"})
+    try:
+        segment = Segment(folder, slaves="akd", settings={"bus.target": "preop"})
+    except PermissionError as why:
+        pytest.skip(f"not permitted: {why}")
     try:
         segment.start_sim()
         segment.start_daemon()
@@ -37,10 +40,7 @@ def make_drive(folder: Path) -> Path:
 @pytest.fixture(scope="module")
 def bus(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Segment]:
     """The four slaves in OP."""
-    try:
-        sii = make_drive(tmp_path_factory.mktemp("sii"))
-    except PermissionError as why:
-        pytest.skip(f"not permitted: {why}")
+    sii = make_drive(tmp_path_factory.mktemp("sii"))
     segment = Segment(tmp_path_factory.mktemp("mailboxes"), slaves=SLAVES)
     try:
         segment.start_sim("--sii", str(sii))

@@ -13,6 +13,8 @@ from typing import Any
 from segment import Segment, Undisturbed, recorded, wait_for
 from test_sync0 import Checked
 
+# These measure time, or need a cycle in time.
+IDLE = True
 SLAVE, OTHER = 1, 0
 # Far enough ahead for a refresh of the slave's outputs, on a busy machine, too.
 AHEAD = "500ms"

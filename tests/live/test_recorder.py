@@ -14,6 +14,8 @@ from typing import Any
 import pytest
 from segment import Segment, Undisturbed, recorded, wait_for
 
+# These measure time, or need a cycle in time.
+IDLE = True
 SHORT_RING = {"ring.depth": "2s"}
 RING_CYCLES = 2048  # at 1 ms, rounded up to a power of two
 SECONDS = 60

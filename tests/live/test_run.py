@@ -17,6 +17,8 @@ from typing import Any
 import numpy as np
 from segment import BIN, ROOT, Segment, recorded, wait_for
 
+# These measure time, or need a cycle in time.
+IDLE = True
 PERIOD_NS = 1_000_000
 MINUTE_CYCLES = int(os.environ.get("ECDAQ_LIVE_CYCLES", "60000"))
 PICCOLOS = ("piccolo0", "piccolo1")
@@ -98,7 +100,7 @@ def check_values(samples: dict[int, Any]) -> None:
     time_s = np.array(
         [(samples[k].dc_time_ns - samples[numbers[0]].dc_time_ns) / 1e9 for k in numbers]
     )
-    volt = np.array([samples[k].adc for k in numbers]) * 3.3 / 4095
+    volt = np.array([samples[k].adc for k in numbers])
     frequency, amplitude, offset = fit_sine(time_s, volt)
     print(
         f"sine: {frequency:.4f} Hz, {amplitude:.4f} V around {offset:.4f} V, {len(numbers)} samples"

@@ -9,6 +9,9 @@ from collections.abc import Callable
 
 from segment import Segment, wait_for
 
+# These measure time, or need a cycle in time.
+IDLE = True
+
 # tests/sim checks on virtual time that a stop takes a second. Here: it waits for none of these.
 PATIENT = {"bus.op_timeout": "120s", "bus.scan_timeout": "60s", "bus.mailbox_timeout": "60s"}
 LIMIT_S = 30.0

@@ -13,6 +13,8 @@ from typing import Any
 
 from segment import BIN, Segment, Undisturbed, recorded, wait_for
 
+# These measure time, or need a cycle in time.
+IDLE = True
 WINDOW = "1s"
 
 

@@ -11,6 +11,9 @@ from pathlib import Path
 import pytest
 from segment import BIN, Segment, Undisturbed, wait_for
 
+# These measure time, or need a cycle in time.
+IDLE = True
+
 
 def run_daemon(segment: Segment, *more: str) -> subprocess.CompletedProcess[str]:
     return segment.space.run(

@@ -63,7 +63,7 @@ def graph(folder: Path, releases: list[str]) -> Graph:
     folder.mkdir()
     (folder / "archive.conf").write_text(archive.configuration(releases))
     settings = {
-        **{"MACHINE": "qemuarm64", "DISTRO": "ecdaq", "TMPDIR": str(folder)},
+        **{"MACHINE": "ecdaq-qemuarm64", "DISTRO": "ecdaq", "TMPDIR": str(folder)},
         **{"ECDAQ_TOP": str(TOP), "ECDAQ_COMMIT": "1a2b3c4"},
     }
     return Graph(Metadata(TOP, folder / "build", settings))

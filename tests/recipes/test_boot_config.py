@@ -44,6 +44,8 @@ class Place:
             "ECDAQ_RECORD_ROOT": str(base),
             "ECDAQ_HOSTS": str(base / "hosts"),
             "ECDAQ_CONSOLE": str(self.console),
+            "ECDAQ_UPLOAD_DIR": str(base / "upload"),
+            "ECDAQ_WPA_SUPPLICANT": str(base / "wpa_supplicant"),
         }
 
     def run(self) -> str:
@@ -209,3 +211,124 @@ def test_the_port_is_set_unless_the_file_has_that_of_the_bus(
     (place.source / "ecdaq.yaml").write_text(text)
     place.run()
     assert ("bus.interface=ecat0" in place.options()) is is_set_by_machine
+
+
+# PTP
+
+
+@pytest.mark.parametrize(
+    ("text", "transport", "domain"),
+    [
+        ("enp1s0\n", "UDPv4", 0),
+        ("# our clock\r\nenp1s0 udp 3\r\n", "UDPv4", 3),
+        ("enp1s0 24", "UDPv4", 24),
+        ("enp1s0 l2 # frames\n", "L2", 0),
+    ],
+)
+def test_a_port_follows_a_ptp_server(place: Place, text: str, transport: str, domain: int) -> None:
+    (place.source / "ptp").write_text(text)
+    assert "ptp:" not in place.run()
+    found = (place.target / "ptp/enp1s0.conf").read_text().splitlines()
+    assert found[0] == "[global]" and found[-1] == "[enp1s0]"
+    # It never offers its own time.
+    assert {"clientOnly 1", f"domainNumber {domain}", f"network_transport {transport}"} < set(found)
+    assert (place.target / "ptp/enp1s0.domain").read_text() == f"{domain}\n"
+    assert "refclock SHM 0" in (place.target / "chrony.conf.d/ptp.conf").read_text()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("ecat0", "ecsim0 l2", "enp1s0 tcp", "enp1s0 l2 256", "enp1s0 l2 -1", "enp1s0 udp 0 x"),
+        *("enp1s0\nenp2s0", "a;b", "[global]", "enp1s0 l2 0xf", "# nothing", "x" * 16),
+    ],
+)
+def test_what_is_no_ptp_port_is_ignored(place: Place, text: str) -> None:
+    (place.source / "ptp").write_text(text + "\n")
+    assert "ptp: not one line" in place.run()
+    assert list((place.target / "ptp").iterdir()) == []
+    assert (place.target / "chrony.conf.d/ptp.conf").read_text() == ""
+
+
+def test_without_a_file_chrony_has_no_ptp(place: Place) -> None:
+    place.run()
+    assert list((place.target / "ptp").iterdir()) == []
+    assert (place.target / "chrony.conf.d/ptp.conf").read_text() == ""
+
+
+# Copies of the journal
+
+
+def upload(place: Place) -> dict[str, str]:
+    path = place.target.parent / "upload/50-boot.conf"
+    if not path.exists():
+        return {}
+    first, *lines = path.read_text().splitlines()
+    assert first == "[Upload]"
+    return dict(line.split("=", 1) for line in lines)
+
+
+def test_the_journal_stays_here_unless_a_file_says_where_it_goes(place: Place) -> None:
+    (place.source / "journal-upload").write_text("# ours\r\nhttps://logs.example:19532\r\n")
+    place.run()
+    assert upload(place) == {
+        "URL": "https://logs.example:19532",
+        "ServerKeyFile": "-",
+        "ServerCertificateFile": "-",
+        "TrustedCertificateFile": "/etc/ssl/certs/ca-certificates.crt",
+    }
+    (place.source / "journal-upload").unlink()
+    place.run()
+    assert upload(place) == {}
+
+
+def test_keys_for_the_journal_are_of_the_boot_partition(place: Place) -> None:
+    (place.source / "journal-upload").write_text("https://[2001:db8::1]:19532/\n")
+    for name in ("journal-upload.key", "journal-upload.pem", "journal-upload-ca.pem"):
+        (place.source / name).write_text("-----BEGIN X-----\r\n")
+    place.run()
+    found = upload(place)
+    assert found.pop("URL") == "https://[2001:db8::1]:19532/"
+    assert len(found) == 3
+    assert [Path(path).read_text() for path in found.values()] == ["-----BEGIN X-----\n"] * 3
+    (place.source / "journal-upload-ca.pem").write_text("a letter\n")
+    assert "journal-upload-ca.pem: no PEM file, ignored" in place.run()
+    # The server is still checked: by the authorities of the image.
+    assert upload(place)["TrustedCertificateFile"] == "/etc/ssl/certs/ca-certificates.crt"
+
+
+@pytest.mark.parametrize(
+    "text", ["logs.example", "ftp://a", "https://", "https://a\nhttps://b", "http://a b", "# none"]
+)
+def test_what_is_no_url_uploads_nothing(place: Place, text: str) -> None:
+    (place.source / "journal-upload").write_text(text + "\n")
+    assert "journal-upload: '" in place.run()
+    assert upload(place) == {}
+
+
+# Wi-Fi
+
+WIFI = (
+    'ctrl_interface=/run/x\r\ncountry=DE\r\nnetwork={\r\n\tssid="hall"\r\n\tpsk="12345678"\r\n}\r\n'
+)
+
+
+def test_wifi_needs_an_image_that_has_it(place: Place) -> None:
+    (place.source / "wifi").write_bytes(WIFI.encode())
+    assert "wifi: this image was built without Wi-Fi, ignored" in place.run()
+    assert not (place.target / "wifi.conf").exists()
+    (place.target.parent / "wpa_supplicant").touch(0o755)
+    assert "wifi:" not in place.run()
+    path = place.target / "wifi.conf"
+    assert path.read_text() == 'country=DE\nnetwork={\n\tssid="hall"\n\tpsk="12345678"\n}\n'
+    assert path.stat().st_mode & 0o777 == 0o600
+
+
+def test_a_wifi_file_without_a_network_or_with_a_program_is_not_used(place: Place) -> None:
+    (place.target.parent / "wpa_supplicant").touch(0o755)
+    (place.source / "wifi").write_text("ssid hall\n")
+    assert "wifi: no network={...}" in place.run()
+    assert not (place.target / "wifi.conf").exists()
+    (place.source / "wifi").write_text("pkcs11_module_path=/x.so\nnetwork={\n}\n")
+    place.run()
+    assert (place.target / "wifi.conf").read_text() == "network={\n}\n"

@@ -66,6 +66,7 @@ class Place:
         self.environment = os.environ | {
             "ECDAQ_CONFIGURATION": str(self.settings),
             "ECDAQ_FIREWALL_FILE": str(self.opened),
+            "ECDAQ_PTP_DIR": str(base / "ptp"),
             "ECDAQ_TOOL": str(base / "ecdaq"),
             "ECDAQ_CONSOLE": str(self.console),
         }
@@ -112,6 +113,24 @@ def test_a_gateway_for_others_is_open_and_one_for_this_machine_is_not(place: Pla
     assert place.accepted() == ALWAYS
 
 
+def test_a_page_for_others_is_open_and_one_for_this_machine_is_not(place: Place) -> None:
+    place.settings.write_text("web.enable on\nweb.listen 10.0.0.1\nweb.port 8765\n")
+    assert place.accepted() - ALWAYS == {"tcp dport 8765 accept"}
+    place.settings.write_text("web.enable on\nweb.listen loopback\nweb.port 8765\n")
+    assert place.accepted() == ALWAYS
+    place.settings.write_text("web.enable off\nweb.listen 10.0.0.1\nweb.port 8765\n")
+    assert place.accepted() == ALWAYS
+
+
+def test_ptp_over_udp_is_open_on_its_port_only(place: Place) -> None:
+    folder = place.settings.parent / "ptp"
+    folder.mkdir()
+    (folder / "lan0.conf").write_text("[global]\nnetwork_transport L2\n[lan0]\n")
+    assert place.accepted() == ALWAYS
+    (folder / "lan0.conf").write_text("[global]\nnetwork_transport UDPv4\n[lan0]\n")
+    assert place.accepted() - ALWAYS == {'iifname "lan0" udp dport 319-320 accept'}
+
+
 def test_a_file_on_the_boot_partition_opens_ports(place: Place) -> None:
     place.opened.write_bytes(b"# a web server\r\ntcp 8080\r\n\nudp 5000-5010 eth1\ntcp 99")
     assert place.accepted() - ALWAYS == {
@@ -150,6 +169,70 @@ def test_settings_that_cannot_be_shown_leave_ssh_open_and_dds_closed(place: Plac
     place.settings.unlink()
     assert place.accepted() == ALWAYS
     assert "no settings: DDS stays closed" in place.console.read_text()
+
+
+# Stands in for nft: keeps what it is given, and refuses so many of its first calls.
+NFT = """#!/bin/sh
+n=$(ls "$ECDAQ_RULES" | wc -l)
+cat > "$ECDAQ_RULES/$n"
+[ "$n" -ge "$ECDAQ_REFUSALS" ]
+"""
+
+
+def applied(place: Place, refusals: int = 0) -> tuple[int, list[str]]:
+    """Exit code, and what nft was given."""
+    folder = place.settings.parent
+    (folder / "bin").mkdir()
+    (folder / "bin/nft").write_text(NFT)
+    (folder / "bin/nft").chmod(0o755)
+    (folder / "rules").mkdir()
+    environment = place.environment | {
+        "PATH": f"{folder / 'bin'}:{os.environ['PATH']}",
+        "ECDAQ_RULES": str(folder / "rules"),
+        "ECDAQ_REFUSALS": str(refusals),
+    }
+    done = subprocess.run([PROGRAM], env=environment, capture_output=True, text=True, check=False)
+    return done.returncode, [f.read_text() for f in sorted((folder / "rules").iterdir())]
+
+
+def is_only_ssh(rules: str) -> bool:
+    lines = {line.strip() for line in rules.splitlines()}
+    return {x for x in lines if "dport" in x} == ALWAYS and rules.count("policy drop;") == 2
+
+
+def test_rules_that_are_taken_are_set_once(place: Place) -> None:
+    place.settings.write_text(DDS)
+    code, given = applied(place)
+    assert (code, given) == (0, [place.rules()])
+
+
+def test_rules_that_are_refused_leave_ssh_alone_open(place: Place) -> None:
+    place.settings.write_text(DDS)
+    code, given = applied(place, refusals=1)
+    assert code == 1
+    assert len(given) == 2 and "9150-9359" in given[0] and is_only_ssh(given[1])
+    assert "only SSH comes in" in place.console.read_text()
+
+
+def test_rules_that_cannot_be_made_leave_ssh_alone_open(place: Place) -> None:
+    place.settings.write_text(DDS.replace("domain 7", "domain 7x"))
+    code, given = applied(place)
+    assert code == 1
+    assert len(given) == 1 and is_only_ssh(given[0])
+
+
+def test_a_machine_without_a_packet_filter_says_so(place: Place) -> None:
+    code, given = applied(place, refusals=2)
+    assert (code, len(given)) == (1, 2)
+    assert "no packet filter: every port is open" in place.console.read_text()
+
+
+def test_the_unit_is_started_without_settings_too() -> None:
+    """A filter that is not started leaves the machine open."""
+    unit = (PROGRAM.parents[1] / "systemd/system/ecdaq-firewall.service").read_text()
+    assert "Requires=" not in unit and "Requisite=" not in unit and "BindsTo=" not in unit
+    assert "EnvironmentFile=-/run/" in unit
+    assert "Before=network-pre.target" in unit and "Wants=network-pre.target" in unit
 
 
 @pytest.fixture

@@ -5,10 +5,13 @@ the kernel checks that the final configuration has what the fragments request (k
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import pytest
 from conftest import TOP
+from graph import Graph, Task
 from kconfig import read
+from metadata import Metadata
 
 FRAGMENTS = sorted((TOP / "kernel-config").glob("*.cfg"))
 ASKED = {name: value for path in FRAGMENTS for name, (value, _) in read(path).items()}
@@ -65,6 +68,9 @@ def test_every_adapter_of_the_documentation_has_its_driver() -> None:
         ("NVMe disk", ("PCIE_BRCMSTB", "BLK_DEV_NVME")),
         ("clock chip", ("I2C_BCM2835", "I2C_MUX_PINCTRL", "RTC_DRV_PCF85063", "RTC_HCTOSYS")),
         ("clock chip set", ("RTC_SYSTOHC",)),
+        ("verity of a bundle", ("BLK_DEV_DM", "DM_VERITY", "CRYPTO_SHA256")),
+        ("contents of a bundle", ("SQUASHFS", "SQUASHFS_ZSTD", "SQUASHFS_ZLIB")),
+        ("bundle in a file, over HTTP", ("BLK_DEV_LOOP", "BLK_DEV_NBD")),
     ],
 )
 def test_what_is_needed_before_modules_can_be_loaded_is_built_in(
@@ -84,3 +90,32 @@ def test_every_sysctl_has_the_kernel_feature_that_it_sets() -> None:
 def test_the_kernel_is_hardened_where_that_costs_no_latency() -> None:
     wanted = dict.fromkeys(HARDENING, "y") | dict.fromkeys((*UNUSED, *COSTLY), "n")
     assert {symbol: ASKED.get(f"CONFIG_{symbol}") for symbol in wanted} == wanted
+
+
+def test_wifi_is_built_on_request_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without the request neither the kernel nor an image changes."""
+
+    def parsed(name: str) -> Metadata:
+        settings = {"MACHINE": "ecdaq-raspberrypi4-64", "DISTRO": "ecdaq", "TMPDIR": "/tmp"}
+        return Metadata(TOP, tmp_path / name, settings | {"ECDAQ_TOP": str(TOP)})
+
+    monkeypatch.delenv("ECDAQ_WIFI", raising=False)
+    without = parsed("without")
+    monkeypatch.setenv("ECDAQ_WIFI", "1")
+    wifi = parsed("wifi")
+    packages = {
+        m: set(m.recipes["ecdaq-image"].value("IMAGE_PREINSTALL").split()) for m in (without, wifi)
+    }
+    assert packages[wifi] - packages[without] == {
+        *("wpasupplicant", "wireless-regdb", "firmware-brcm80211")
+    }
+    kernels = [m.recipes["linux-ecdaq"] for m in (without, wifi)]
+    fragments = [k.value("KERNEL_FRAGMENTS").split() for k in kernels]
+    assert "wifi.cfg" not in fragments[0] and fragments[1] == [*fragments[0], "wifi.cfg"]
+    assert ["allow_wifi" in k.flag("do_unpack", "postfuncs") for k in kernels] == [False, True]
+    graphs = [Graph(m).hash(Task("linux-ecdaq", "do_dpkg_build")) for m in (without, wifi)]
+    assert graphs[0] != graphs[1]
+    # What the function takes away is what would contradict the fragment.
+    assert ASKED["CONFIG_WLAN"] == "n"
+    optional = read(TOP / "kernel-config/optional/wifi.cfg")
+    assert {name for name in optional if name in ASKED} == {"CONFIG_WLAN"}

@@ -106,6 +106,14 @@ def test_every_patch_says_where_it_is_upstream(path: Path) -> None:
     assert rules.patch_status(path.name, path.read_text()) == []
 
 
+def test_no_file_has_the_name_of_one_of_another_layer() -> None:
+    """BitBake takes the first of BBPATH: qemuarm64 and raspberrypi4-64 are Isar's, OE-core's and
+    meta-raspberrypi's."""
+    found = [p for d in ("conf/machine", "conf/distro", "wic") for p in (LAYER / d).rglob("*.*")]
+    assert len(found) >= 6
+    assert [p.name for p in found if not p.name.startswith("ecdaq")] == []
+
+
 def test_the_layer_says_who_maintains_it_and_on_what_terms() -> None:
     readme = (LAYER / "README.md").read_text()
     for word in ("maintainer", "patch", "security.md", "dependencies"):

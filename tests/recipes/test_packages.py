@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 from fnmatch import fnmatch
 from pathlib import Path
 
@@ -43,3 +44,18 @@ def test_every_installed_file_is_in_a_package() -> None:
 def test_a_file_that_no_package_lists_is_found() -> None:
     assert not is_packaged("usr/lib/triplet/cmake/other/a.cmake", patterns())
     assert is_packaged("usr/bin/ecdaq-log", patterns())
+
+
+def test_cross_compiling_without_a_way_to_run_the_programs_is_refused(tmp_path: Path) -> None:
+    """They write their completion and manual pages: an empty page must not be installed."""
+    machine = ["-DCMAKE_SYSTEM_NAME=Linux", "-DCMAKE_SYSTEM_PROCESSOR=aarch64"]
+    done = subprocess.run(
+        ["cmake", "-S", TOP / "app", "-B", tmp_path, "-DECDAQ_TESTS=OFF", *machine],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    said = " ".join(done.stderr.split())
+    assert done.returncode != 0 and "set CMAKE_CROSSCOMPILING_EMULATOR" in said, said
+    rules = (PACKAGES / "rules").read_text()
+    assert "-DCMAKE_CROSSCOMPILING_EMULATOR=" in rules

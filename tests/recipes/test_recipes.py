@@ -158,7 +158,12 @@ def test_an_image_names_the_commit_that_it_is_built_from(metadata: Metadata) -> 
 
 
 def image_hash(top: Path, **more: str) -> str:
-    settings = {"MACHINE": "qemuarm64", "DISTRO": "ecdaq", "TMPDIR": "/tmp", "ECDAQ_TOP": str(TOP)}
+    settings = {
+        "MACHINE": "ecdaq-qemuarm64",
+        "DISTRO": "ecdaq",
+        "TMPDIR": "/tmp",
+        "ECDAQ_TOP": str(TOP),
+    }
     settings |= more
     return Graph(Metadata(top, top.parent / "build", settings)).hash(
         Task("ecdaq-image", "do_image")

@@ -30,10 +30,25 @@ def exit_code(name: str) -> str:
     return re.findall(rf"EXIT_CODE_{name} = (\d+),", text)[0]
 
 
-def test_the_master_is_not_restarted_after_a_requested_stop_or_a_crash_of_control() -> None:
+def test_the_master_is_not_restarted_where_that_would_end_in_the_same_way() -> None:
+    """A requested stop, a crash of the control program, a port that is refused."""
     assert values("ecdaqd.service", "Restart") == ["always"]
-    codes = [exit_code("OVERRUN"), exit_code("CONTROL")]
+    codes = [exit_code("BUSY"), exit_code("OVERRUN"), exit_code("CONTROL")]
     assert values("ecdaqd.service", "RestartPreventExitStatus") == codes
+
+
+def test_a_reload_tells_its_error_to_whoever_asked_for_it() -> None:
+    words = values("ecdaqd.service", "ExecReload")
+    assert words == ["/usr/bin/ecdaq", "--run-dir", "/run/ecdaq", "config", "reload"]
+    start = values("ecdaqd.service", "ExecStart")
+    assert start[start.index("--run-dir") + 1] == words[2]
+
+
+def test_the_units_of_the_debian_packages_have_the_same_rules(tmp_path: Path) -> None:
+    subprocess.run(["sh", TOP / "app/packaging/debian-units.sh", ROOT, tmp_path], check=True)
+    text = (tmp_path / "units/ecdaqd.service").read_text()
+    for key in ("RestartPreventExitStatus", "ExecReload", "Restart"):
+        assert f"{key}={' '.join(values('ecdaqd.service', key))}\n" in text
 
 
 @pytest.mark.parametrize("key", ["RuntimeWatchdogSec", "RebootWatchdogSec"])
@@ -59,24 +74,65 @@ def test_libc_reads_what_is_written_when_the_network_changes() -> None:
     assert "L /etc/resolv.conf - - - - /run/ecdaq-names/resolv.conf\n" in links
 
 
+def exposure(path: Path) -> float:
+    command = ["systemd-analyze", "security", "--offline=true", "--no-pager", str(path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return float(re.findall(r"exposure level for \S+: ([\d.]+) ", done.stdout)[0])
+
+
 @pytest.mark.skipif(not shutil.which("systemd-analyze"), reason="no systemd-analyze here")
 @pytest.mark.parametrize("path", SERVICES, ids=lambda p: p.stem)
 def test_every_service_is_sandboxed(path: Path) -> None:
-    command = ["systemd-analyze", "security", "--offline=true", "--no-pager", str(path)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    figure = float(re.findall(r"exposure level for \S+: ([\d.]+) ", done.stdout)[0])
+    figure = exposure(path)
     print(f"{path.stem}: {figure}")
     assert figure < EXPOSURE_LIMIT
 
 
 def test_a_service_writes_in_its_own_folder_of_the_run_directory_only() -> None:
     folders = (ROOT / "usr/lib/tmpfiles.d/ecdaq.conf").read_text()
-    for unit in ("ecdaq-record", "ecdaq-dds", "ecdaq-sync0"):
+    for unit in ("ecdaq-record", "ecdaq-dds", "ecdaq-sync0", "ecdaq-stream"):
         own = "/run/ecdaq/" + unit.removeprefix("ecdaq-")
         assert f"d {own} 2750 {unit} ecdaq-read -\n" in folders
         writes = " ".join(values(f"{unit}.service", "ReadWritePaths")).split()
         assert [p for p in writes if p.startswith("/run/")] == [own]
     assert "d /run/ecdaq 2750 ecdaqd ecdaq-read -\n" in folders
+
+
+def test_the_page_writes_nothing_and_its_user_is_its_own() -> None:
+    assert values("ecdaq-web.service", "ReadWritePaths") == []
+    assert values("ecdaq-web.service", "ProtectSystem") == ["strict"]
+    assert values("ecdaq-web.service", "User") == ["ecdaq-web"]
+    text = (ROOT / "usr/lib/sysusers.d/ecdaq.conf").read_text()
+    assert re.findall(r"^u ecdaq-web (\d+):900 ", text, re.MULTILINE) == ["908"]
+    assert "m ecdaq-web" not in text
+    # Whoever takes it over has the network, and little else.
+    if shutil.which("systemd-analyze"):
+        assert exposure(UNITS / "ecdaq-web.service") < 1.5
+
+
+def test_the_page_is_off_until_it_is_configured() -> None:
+    """The unit is started on every machine, and the program ends well."""
+    options = (TOP / "app/doc/reference/ecdaq.sample.yaml").read_text()
+    found = re.findall(r"^  (\w+): (\S+)$", options.split("\nweb:\n")[1], re.MULTILINE)
+    assert found[:2] == [("enable", "off"), ("listen", "loopback")]
+    assert values("ecdaq-web.service", "Restart") == ["on-failure"]
+
+
+def test_the_stream_writes_its_status_only_and_is_off_until_it_is_configured() -> None:
+    unit = "ecdaq-stream.service"
+    assert values(unit, "ReadWritePaths") == ["/run/ecdaq/stream"]
+    assert values(unit, "ProtectSystem") == ["strict"]
+    assert values(unit, "User") == ["ecdaq-stream"]
+    assert values(unit, "CapabilityBoundingSet") == []
+    assert values(unit, "Restart") == ["on-failure"]
+    text = (ROOT / "usr/lib/sysusers.d/ecdaq.conf").read_text()
+    assert re.findall(r"^u ecdaq-stream (\d+):900 ", text, re.MULTILINE) == ["910"]
+    assert "m ecdaq-stream" not in text
+    options = (TOP / "app/doc/reference/ecdaq.sample.yaml").read_text()
+    found = re.findall(r"^  (\w+): (\S+)$", options.split("\nstream:\n")[1], re.MULTILINE)
+    assert found[0] == ("enable", "off")
+    if shutil.which("systemd-analyze"):
+        assert exposure(UNITS / unit) < 1.5
 
 
 def test_only_an_operator_commands_the_master_and_only_dds_sets_remote_outputs() -> None:
@@ -88,3 +144,30 @@ def test_only_an_operator_commands_the_master_and_only_dds_sets_remote_outputs()
     for unit in UNITS.glob("*.service"):
         assert values(unit.name, "Group") in ([], ["ecdaq-read"])
         assert values(unit.name, "SupplementaryGroups") == []
+
+
+def test_units_that_come_with_debians_packages_are_off_or_wait_for_a_file() -> None:
+    """preset-all would turn on a second time service, and sockets that others reach."""
+    preset = (ROOT / "usr/lib/systemd/system-preset/60-ecdaq.preset").read_text().splitlines()
+    for unit in (
+        *("timemaster.service", "ptp4l@.service", "phc2sys@.service", "wpa_supplicant.service"),
+        *("systemd-journal-remote.socket", "systemd-journal-gatewayd.socket"),
+    ):
+        assert f"disable {unit}" in preset, unit
+    waits = (UNITS / "systemd-journal-upload.service.d/60-ecdaq.conf").read_text()
+    assert "ConditionPathExists=/run/systemd/journal-upload.conf.d/50-boot.conf\n" in waits
+    for unit in ("ecdaq-ptp@.service", "ecdaq-wifi@.service"):
+        assert values(unit, "ConditionPathExists")[0].startswith("/run/ecdaq-boot/")
+
+
+def test_a_port_without_a_ptp_clock_is_said_and_not_used(tmp_path: Path) -> None:
+    (tmp_path / "lan0/device").mkdir(parents=True)
+    (tmp_path / "console").touch()
+    environment = {"ECDAQ_NET_CLASS": str(tmp_path), "ECDAQ_CONSOLE": str(tmp_path / "console")}
+    command = [ROOT / "usr/lib/ecdaq/ptp-port", "lan0"]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "lan0 has no PTP clock" in done.stderr
+    assert (tmp_path / "console").read_text() == done.stderr
+    (tmp_path / "lan0/device/ptp/ptp0").mkdir(parents=True)
+    subprocess.run(command, env=environment, check=True)

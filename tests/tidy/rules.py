@@ -29,9 +29,11 @@ MODULES: dict[str, dict[str, set[str]]] = {
     "core": {
         "base": set(),
         "wire": {"base"},
-        "esi": {"base", "wire"},
+        "xml": {"base"},
+        "esi": {"base", "wire", "xml"},
+        "eni": {"base", "wire", "xml"},
         "config": {"base", "image"},
-        "program": {"base", "config"},
+        "program": {"base", "config", "wire/al.h"},
         "image": {"base", "wire"},
         "reader": {"base", "image", "config/config.h"},  # names of the files in the run directory
     },
@@ -51,13 +53,20 @@ MODULES: dict[str, dict[str, set[str]]] = {
         "keystore": {"base", "program"},
         "publish": READERS | {"keystore"},
         "sync0": READERS,
+        "web": READERS
+        | {"record/layout.h", "record/messages.h"}
+        | {"record/file_io.h", "record/overview.h", "record/store.h"}
+        | {"wire/al.h"},
+        "stream": READERS
+        | {"record/layout.h", "record/messages.h"}
+        | {"record/file_io.h", "record/mcap_reader.h", "record/store.h", "record/track.h"},
     },
     "cli": {
         "cli": READERS
         | {"wire/al.h", "wire/sii.h"}
         | {"wire/aoe.h", "wire/eoe.h", "wire/soe.h"}
-        | {"wire/datagram.h", "wire/fmmu.h"}
-        | {"esi", "wire/coe_type.h"}
+        | {"wire/datagram.h", "wire/esc_reg.h", "wire/fmmu.h"}
+        | {"eni", "esi", "wire/coe_type.h"}
     },
     "sim": {
         "firmware": {"base", "wire"},
@@ -79,7 +88,10 @@ FOREIGN_HEADERS: list[tuple[str, set[str]]] = [
     (r"gpiod\.h|linux/gpio\.h", {"sync0"}),
     (r"yaml\.h", {"config"}),
     (r"zstd\w*\.h", {"record"}),
-    (r"expat\.h", {"esi"}),
+    (r"expat\.h", {"xml"}),
+    (r"libwebsockets\.h", {"web"}),
+    (r"cjson/.*", {"web", "stream"}),
+    (r"nats/.*", {"stream"}),
 ]
 
 # Programs talk to a person; what is not matched here is library code.

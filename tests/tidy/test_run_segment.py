@@ -82,11 +82,11 @@ class Bench:
     def log(self) -> list[str]:
         return self.log_file.read_text().splitlines()
 
-    def start(self, *options: str) -> subprocess.Popen[str]:
+    def start(self, *options: str, web: str = "--no-web") -> subprocess.Popen[str]:
         places = {"ECDAQ_BIN_DIR": str(self.bin), "LOG": str(self.log_file)}
         places["PATH"] = f"{self.path}:{os.environ['PATH']}"
         return subprocess.Popen(
-            [SCRIPT, "--record", str(self.folder / "record"), *options],
+            [SCRIPT, "--record", str(self.folder / "record"), *filter(None, (*options, web))],
             env=os.environ | places,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
@@ -406,3 +406,63 @@ def test_a_check_that_ends_by_itself_ends_nothing_else(
     assert run.returncode == 0
     assert not err
     assert ends(bench) == ["end ecdaqd", "end ecdaq-record", "end ecdaq-sim"]
+
+
+def web_line(bench: Bench) -> str:
+    return next((line for line in bench.log if line.startswith("start ecdaq-web")), "")
+
+
+def test_the_page_is_served_on_loopback_and_its_address_printed(bench: Bench) -> None:
+    bench.program("ecdaq-web", STAND_IN.replace("{body}", ""))
+    run = bench.start("--seconds", "1", "--no-dds", web="")
+    bench.wait_for_log("start ecdaq-web", "start ecdaq-sync0", "start ecdaqd", "start ecdaq-record")
+    run.terminate()
+    _, err = run.communicate(timeout=SECONDS)
+    assert run.returncode == 0
+    [port] = re.findall(r"^-- page: http://127\.0\.0\.1:(\d+)/ \(Foxglove: ws://", err, re.M)
+    settings = f"--set web.enable=on --set web.listen=loopback --set web.port={port}"
+    settings += f" --set record.dir={bench.folder / 'record'}"
+    assert web_line(bench) == f"start ecdaq-web {settings}"
+    assert "end ecdaq-web" in ends(bench)
+
+
+def test_a_web_section_of_the_configuration_is_used(bench: Bench) -> None:
+    bench.program("ecdaq-web", STAND_IN.replace("{body}", ""))
+    config = bench.folder / "ecdaq.yaml"
+    config.write_text("web:\n  enable: on\n  port: 80\n")
+    run = bench.start("--config", str(config), "--no-dds", web="")
+    bench.wait_for_log("start ecdaq-web", "start ecdaq-sync0")
+    run.terminate()
+    run.communicate(timeout=SECONDS)
+    settings = f"--config {config} --set record.dir={bench.folder / 'record'}"
+    assert web_line(bench) == f"start ecdaq-web {settings}"
+
+
+@pytest.mark.parametrize(
+    ("program", "why"),
+    [
+        (None, "ecdaq-web is not built"),
+        ("#!/bin/sh\necho 'ecdaq-web: why not' >&2\nexit 3\n", "ecdaq-web: why not"),
+    ],
+)
+def test_an_unavailable_page_is_one_line_and_the_run_continues(
+    bench: Bench, program: str | None, why: str
+) -> None:
+    if program is not None:
+        bench.program("ecdaq-web", program)
+    run = bench.start("--no-dds", web="")
+    bench.wait_for_log(*(f"start {name}" for name in PROGRAMS if name != "ecdaq-dds"))
+    run.terminate()
+    _, err = run.communicate(timeout=SECONDS)
+    assert run.returncode == 0
+    assert sum(line.startswith(f"-- no page: {why}") for line in err.splitlines()) == 1
+
+
+def test_the_run_continues_when_the_page_ends(bench: Bench) -> None:
+    bench.program("ecdaq-web", STAND_IN.replace("{body}", WHEN_RUN.format(count=5) + "exit 1"))
+    alone = 'until grep -q "^start ecdaq-web" "$LOG"; do sleep 0.01; done; sleep 2\nexit 0\n'
+    bench.make_it("ecdaqd", alone)
+    run = bench.start("--no-dds", web="")
+    _, err = run.communicate(timeout=SECONDS)
+    assert run.returncode == 0, err
+    assert "-- ecdaq-web has ended: there is no page any more" in err.splitlines()

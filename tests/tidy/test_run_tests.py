@@ -56,9 +56,17 @@ def wait_for_lines(paths: list[Path]) -> None:
         time.sleep(0.01)
 
 
+def is_running(process: Path) -> bool:
+    """Of a folder in /proc. It is there until the parent, init perhaps, has asked for the end."""
+    try:
+        return (process / "stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
 def wait_until_gone(paths: list[Path]) -> None:
     end = time.monotonic() + 60
-    while any(path.exists() for path in paths):
+    while any(is_running(path) for path in paths):
         assert time.monotonic() < end
         time.sleep(0.01)
 
@@ -159,23 +167,30 @@ def test_an_image_that_cannot_be_made_fails_its_suite(
 def test_images_are_built_beside_other_groups_and_a_failed_one_fails_its_suite(
     monkeypatch: pytest.MonkeyPatch, own_build: Path, tmp_path: Path
 ) -> None:
-    """Each of the two waits for the other; the build takes only idle time."""
-    unit, image = tmp_path / "unit", tmp_path / "image"
+    """Each of the two waits for the other; the build takes only idle time, and is over before what
+    measures time begins."""
+    unit, image, built = tmp_path / "unit", tmp_path / "image", tmp_path / "built"
     script = own_build / "build.sh"
     script.write_text(
-        f"#!/bin/sh\n[ $3 = qemuarm64 ] || {{ echo 'no kernel'; exit 1; }}\n"
-        f"chrt --pid $$ > {image}; until [ -s {unit} ]; do sleep 0.01; done\n"
+        f"#!/bin/sh\n[ $3 = ecdaq-qemuarm64 ] || {{ echo 'no kernel'; exit 1; }}\n"
+        f"cat /proc/self/autogroup > {image} 2> /dev/null\n"
+        f"chrt --pid $$ >> {image}; until [ -s {unit} ]; do sleep 0.01; done\n"
+        f"sleep 1; touch {built}\n"
     )
     script.chmod(0o755)
     booting = Suite("boot", "release", lambda *_: Outcome(passed=1), images=run_tests.IMAGES)
+    live = Suite("live", "release", lambda *_: Outcome(passed=int(built.exists())))
     monkeypatch.setitem(run_tests.GROUPS, "unit", [meeting(unit, image)])
     monkeypatch.setitem(run_tests.GROUPS, "replay", [meeting(unit, image)])
     monkeypatch.setitem(run_tests.GROUPS, "boot", [booting])
+    monkeypatch.setitem(run_tests.GROUPS, "live", [live])
     options = argparse.Namespace(only="", fail_fast=False, fuzz_seconds=1, groups=["boot"])
-    outcome = run_tests.run_in_order(["unit", "replay", "boot"], ReadyBuilder(), options)
-    assert outcome.totals() == "2 passed, 1 failed, 0 skipped"
+    outcome = run_tests.run_in_order(["unit", "replay", "live", "boot"], ReadyBuilder(), options)
+    assert outcome.totals() == "3 passed, 1 failed, 0 skipped"
     assert "no kernel" in outcome.failures[0]
     assert "SCHED_IDLE" in image.read_text()
+    if Path("/proc/self/autogroup").exists():
+        assert "nice 19" in image.read_text()
 
 
 def test_without_root_no_image_is_built_and_the_reason_is_printed(
@@ -278,6 +293,25 @@ def test_fuzz_targets_need_a_corpus_and_the_canary_must_be_found(own_build: Path
     )
 
 
+def test_a_search_of_an_hour_is_not_ended_before(
+    monkeypatch: pytest.MonkeyPatch, own_build: Path
+) -> None:
+    limits = []
+
+    def logged(_: object, log: Path, _env: object, seconds: int = run_tests.SUITE_SECONDS) -> int:
+        limits.append(seconds)
+        log.parent.mkdir(parents=True, exist_ok=True)
+        log.write_text("stat::number_of_executed_units: 100000\n")
+        return 0
+
+    monkeypatch.setattr(run_tests, "run_logged", logged)
+    corpus_for(own_build, "long")
+    target = own_build / "fuzz_long"
+    outcome = run_tests.run_fuzz_target(run_tests.GROUPS["fuzz"][0], target, 3600)
+    assert (outcome.passed, outcome.failures) == (2, [])
+    assert limits[1] > 3600
+
+
 BOOTED = """
 import time
 from pathlib import Path
@@ -295,7 +329,7 @@ def test_it(request):
 """
 
 
-def test_machines_boot_side_by_side_but_those_that_need_an_idle_host(
+def test_files_run_side_by_side_but_those_that_need_an_idle_host(
     own_build: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(os, "cpu_count", lambda: 2)
@@ -313,7 +347,7 @@ def test_machines_boot_side_by_side_but_those_that_need_an_idle_host(
             "    import time\n    time.sleep(1)\n"
             f"    (here / '{own}.running').unlink()\n"
         )
-    outcome = run_tests.run_booted(run_tests.booted("boot", "test_*.py"), OPTIONS)
+    outcome = run_tests.run_files(run_tests.booted("boot", "test_*.py"), OPTIONS)
     assert outcome.failures == []
     assert outcome.totals() == "4 passed, 0 failed, 0 skipped"
 
@@ -374,5 +408,5 @@ def start():
     wait_for_lines(pids)
     runner.terminate()
     assert runner.wait(60) == 143
-    # They would run for ten minutes. Init may need a while to collect what was killed.
+    # They would run for ten minutes.
     wait_until_gone([Path(f"/proc/{path.read_text().strip()}") for path in pids])

@@ -12,11 +12,11 @@
 #include "cli/doctor/check.h"
 #include "cli/doctor/thread.h"
 #include "cli/resolve.h"
-#include "cli/running.h"
 #include "cli/source.h"
 #include "cli/sync0_source.h"
 #include "cli/text.h"
 #include "program/json.h"
+#include "reader/page.h"
 
 #define CYCLE_THREAD "ecdaqd-cycle"
 
@@ -51,7 +51,7 @@ static enum exit_code find_daemon(struct doctor *d)
 		return EXIT_CODE_OK;
 	}
 	t->sync0 = sync0_source_try(d->cli);
-	if (t->sync0 != NULL && !running_is_alive(t->sync0->pid)) {
+	if (t->sync0 != NULL && !page_is_alive(t->sync0->pid)) {
 		sync0_source_close(t->sync0);
 		t->sync0 = NULL;
 	}
@@ -59,7 +59,7 @@ static enum exit_code find_daemon(struct doctor *d)
 	if (r < 0 && r != -ENOENT) {
 		t->page_err = r;
 		t->pid = resolve_find_daemon(&t->probe);
-	} else if (r == 0 && running_is_alive(page->pid)) {
+	} else if (r == 0 && page_is_alive(page->pid)) {
 		t->page = page;
 		t->pid = page->pid;
 	} else if (r == 0) {
@@ -213,9 +213,9 @@ static void write_json(const struct doctor *d)
 		json_text(&js, "level", finding_level_to_str(f->level));
 		json_text(&js, "value", f->value);
 		if (f->remedy[0] == '\0') {
-			json_null(&js, "mend");
+			json_null(&js, "remedy");
 		} else {
-			json_text(&js, "mend", f->remedy);
+			json_text(&js, "remedy", f->remedy);
 		}
 		json_truth(&js, "wants_root", f->needs_root);
 		json_object_end(&js);

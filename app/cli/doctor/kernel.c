@@ -4,6 +4,7 @@
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 #include "base/cpu_list.h"
 #include "base/event.h"
@@ -13,6 +14,7 @@
 #define CORE_DIR CPU_DIR "/cpu{core}"
 #define RT_RUNTIME "/proc/sys/kernel/sched_rt_runtime_us"
 #define RT_PERIOD "/proc/sys/kernel/sched_rt_period_us"
+#define IMAGE "/usr/lib/ecdaq/image"
 #define TIMER_MIGRATION "/proc/sys/kernel/timer_migration"
 #define NO_CLAIM                                                                                   \
 	"latencies measured here do not apply to hardware" REMEDY "measure on the target "         \
@@ -21,6 +23,8 @@
 /* A shorter exit latency does not make a cycle late. */
 #define IDLE_TOLERABLE_US 10
 
+/* Debian's point releases come every two to three months, security updates in between. */
+enum { ARCHIVE_DAYS_MAX = 90, SECONDS_OF_DAY = 86400 };
 enum { CMDLINE_BYTES = 4096, CPUINFO_LINES = 64, IDLE_STATES_MAX = 16 };
 
 /* --- what it is --- */
@@ -91,6 +95,44 @@ static void judge_machine(const struct target *t, struct finding *f)
 		finding_set(f, FINDING_WARN, "a virtual machine (%s): " NO_CLAIM, under);
 	} else {
 		finding_set(f, FINDING_OK, "%.100s", model[0] == '\0' ? "hardware" : model);
+	}
+}
+
+/* Days from the date behind "Debian archive: " to now. -1: no date, or a clock before it. */
+static int64_t days_since_archive(const struct target *t, const char *image)
+{
+	static const char before[] = "Debian archive: ";
+	const char *date = strstr(image, before);
+	char clock[PROBE_TEXT_BYTES];
+	struct tm day = { 0 };
+	int64_t now_s;
+
+	if (date == NULL || strptime(date + strlen(before), "%Y-%m-%d", &day) == NULL ||
+	    probe_call(&t->probe, "clock", "", clock) < 0 ||
+	    probe_figure(clock, "utc_s", &now_s) < 0 || now_s < timegm(&day)) {
+		return -1;
+	}
+	return (now_s - timegm(&day)) / SECONDS_OF_DAY;
+}
+
+static void judge_image(const struct target *t, struct finding *f)
+{
+	char image[PROBE_TEXT_BYTES] = "";
+	int r = probe_text(&t->probe, image, IMAGE);
+	int64_t days = days_since_archive(t, image);
+
+	if (r == -ENOENT) {
+		finding_set(f, FINDING_SKIP, "not an image of ecdaq");
+	} else if (r < 0) {
+		finding_unread(f, IMAGE, r);
+	} else if (days > ARCHIVE_DAYS_MAX) {
+		finding_set(f, FINDING_WARN,
+			    "%.150s: %" PRId64
+			    " days old, without the security updates since" REMEDY
+			    "./build.sh bundle with --refresh before it, then ecdaq-update install",
+			    image, days);
+	} else {
+		finding_set(f, FINDING_OK, "%.200s", image);
 	}
 }
 
@@ -299,9 +341,11 @@ static void judge_idle_states(const struct target *t, struct finding *f)
 
 const struct check checks_of_kernel[] = {
 	{ .name = "machine", .judge = judge_machine },
-	{ .name = "image",
-	  .fact = "/usr/lib/ecdaq/image",
-	  .rules = { { FINDING_SKIP, "not an image of ecdaq", IF_ABSENT, NULL, NULL },
+	{ .name = "image", .judge = judge_image },
+	{ .name = "slots",
+	  .fact = "/run/ecdaq-slots/slots",
+	  .rules = { { FINDING_SKIP, "not a machine with two slots, or its start is not good yet",
+		       IF_ABSENT, NULL, NULL },
 		     { .level = FINDING_OK, .text = "{text}" } } },
 	{ .name = "kernel",
 	  .fact = "/proc/sys/kernel/osrelease",

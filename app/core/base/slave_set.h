@@ -132,6 +132,43 @@ static inline int slave_set_is_equal(const struct slave_set *a, const struct sla
 	return differs == 0;
 }
 
+/* 1 if @a and @b differ in one of their first @words words. */
+static inline int slave_set_differs(const struct slave_set *a, const struct slave_set *b,
+				    unsigned words)
+{
+	uint64_t differs = 0;
+
+	for (unsigned i = 0; i < words; i++) {
+		differs |= a->word[i] ^ b->word[i];
+	}
+	return differs != 0;
+}
+
+/* Consecutive positions. */
+struct slave_run {
+	unsigned first;
+	unsigned end; /* behind the last */
+};
+
+/* Takes the lowest run of bits out of *@rest, what is left of word @word of a set. 0: none is left.
+ * Most sets are one run: a loop over it costs less than one over its bits. */
+static inline int slave_set_take_run(uint64_t *rest, unsigned word, struct slave_run *ret_run)
+{
+	unsigned first;
+	uint64_t above;
+
+	if (*rest == 0) {
+		return 0;
+	}
+	first = (unsigned)__builtin_ctzll(*rest);
+	above = *rest + (UINT64_C(1) << first); /* carries through the run; 0: to the end */
+	ret_run->first = word * SLAVE_SET_WORD_BITS + first;
+	ret_run->end = word * SLAVE_SET_WORD_BITS +
+		       (above == 0 ? SLAVE_SET_WORD_BITS : (unsigned)__builtin_ctzll(above));
+	*rest &= above;
+	return 1;
+}
+
 /* The first position in @set that is not below @from; LIMIT_SLAVES: none. */
 static inline unsigned slave_set_next(const struct slave_set *set, unsigned from)
 {

@@ -16,6 +16,7 @@ enum { READ_TRIES = 100 };
 static const char *const bus_names[] = { "DOWN",       "SCANNING", "PREOP",  "SAFEOP", "OP",
 					 "RECOVERING", "STOPPED",  "FAILED", "INIT" };
 static const char *const dc_names[] = { "off", "acquiring", "locked", "lost" };
+static const char *const stream_names[] = { "connecting", "waiting", "recordings", "live" };
 static const char *const record_names[] = { "waiting", "running", "disk full", "ended", "failed" };
 
 static const char *name_of(const char *const *names, size_t count, uint32_t state)
@@ -42,6 +43,11 @@ static const char *const control_names[] = {
 const char *control_state_to_str(uint32_t state)
 {
 	return name_of(control_names, sizeof(control_names) / sizeof(control_names[0]), state);
+}
+
+const char *stream_state_to_str(uint32_t state)
+{
+	return name_of(stream_names, sizeof(stream_names) / sizeof(stream_names[0]), state);
 }
 
 const char *record_state_to_str(uint32_t state)

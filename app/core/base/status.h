@@ -120,6 +120,7 @@ struct slave_status {
 	_Atomic uint32_t minimum_cycle_ns;    /* 0x1C32:05, 0x1C33:05, the larger; 0: not given */
 	_Atomic uint32_t place;               /* base/slave_place.h; 0: not known */
 	_Atomic int32_t cable_ns;             /* one way, from the slave before it; -1: not known */
+	char group[32]; /* slaves[].group; "": none. Written before the count */
 };
 
 struct status_page {
@@ -199,6 +200,41 @@ struct dds_status {
 	_Atomic uint64_t heartbeat;
 };
 
+#define STREAM_STATUS_MAGIC UINT64_C(0x3172747373716463) /* "cdqsstr1" */
+
+enum stream_state {
+	STREAM_CONNECTING = 0,
+	STREAM_WAITING,    /* for ecdaqd */
+	STREAM_RECORDINGS, /* sends what the ring no longer has */
+	STREAM_LIVE
+};
+
+/* Status of ecdaq-stream ("stream/status" in the run directory). [streamer] */
+struct stream_status {
+	uint64_t magic;
+	uint32_t bytes;
+	uint32_t reserved;
+	int64_t pid;
+	char stream[64];
+	char appliance[64];
+	_Atomic uint64_t text_sequence;
+	char server[256];       /* "": not connected */
+	char message[256];      /* latest problem; "": none */
+	_Atomic uint32_t state; /* enum stream_state */
+	_Atomic uint64_t session;
+	_Atomic uint64_t next_cycle; /* of the session, to be sent next */
+	_Atomic uint64_t blocks;     /* messages of slaves that were stored */
+	_Atomic uint64_t cycles;     /* in them, each slave's counted */
+	_Atomic uint64_t bytes_sent; /* of them */
+	_Atomic uint64_t events;
+	_Atomic uint64_t events_lost; /* had left the ring */
+	_Atomic uint64_t gaps;
+	_Atomic uint64_t cycles_missing; /* in the gaps */
+	_Atomic uint64_t connects;
+	_Atomic uint64_t lag_cycles; /* in the ring, not read yet */
+	_Atomic uint64_t heartbeat;
+};
+
 enum record_state {
 	RECORD_WAITING = 0,
 	RECORD_RUNNING,
@@ -211,6 +247,7 @@ const char *bus_state_to_str(uint32_t state);
 const char *dc_state_to_str(uint32_t state);
 const char *record_state_to_str(uint32_t state);
 const char *control_state_to_str(uint32_t state);
+const char *stream_state_to_str(uint32_t state);
 
 /**
  * Make a page of @bytes at @path (any size that starts with magic and bytes) and map it for

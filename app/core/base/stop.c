@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "base/host_clock.h"
 
 enum { EXIT_OF_SIGNAL = 128 };
 
@@ -15,21 +16,13 @@ static int64_t grace_of_first_ns;
 static void (*on_first)(void);
 static sigset_t outside; /* the mask while waiting */
 
-static int64_t now_ns(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return now.tv_sec * NS_PER_S + now.tv_nsec;
-}
-
 static void on_signal(int number)
 {
-	if (is_requested && now_ns() - requested_at_ns >= grace_of_first_ns) {
+	if (is_requested && host_clock_ns(CLOCK_MONOTONIC) - requested_at_ns >= grace_of_first_ns) {
 		_exit(EXIT_OF_SIGNAL + number);
 	}
 	if (!is_requested) {
-		requested_at_ns = now_ns();
+		requested_at_ns = host_clock_ns(CLOCK_MONOTONIC);
 		if (on_first != NULL) {
 			on_first();
 		}

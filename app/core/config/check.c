@@ -6,7 +6,6 @@
 
 #include "config/gateway.h"
 #include "config/option.h"
-#include "config/sdo_value.h"
 
 #define HOST_CHARS                                                                                 \
 	"abcdefghijklmnopqrstuvwxyz"                                                               \
@@ -75,6 +74,8 @@ static int check_relations(const struct config *cfg, const struct option_lines *
 		{ "gateway.listen", "gateway.listen",
 		  config_gateway_address(cfg, &address, &address_bytes) >= 0,
 		  "expected off, loopback, or an IPv4 or IPv6 address" },
+		{ "web.listen", "web.listen", config_web_address(cfg, &address, &address_bytes) > 0,
+		  "expected loopback, or an IPv4 or IPv6 address" },
 		{ "eoe.interface", "bus.interface",
 		  cfg->eoe_interface[0] == '\0' || strcmp(cfg->eoe_interface, cfg->interface) != 0,
 		  "is bus.interface, which is for EtherCAT alone" },
@@ -129,6 +130,43 @@ static int check_dds(const struct config *cfg, const struct option_lines *lines,
 		line = line_of(lines, "dds.enable");
 	}
 	return faults->add(faults->ctx, key, line, fault);
+}
+
+static int is_token(const char *text)
+{
+	return is_made_of(text, CONFIG_STREAM_TOKEN);
+}
+
+static int check_stream(const struct config *cfg, const struct option_lines *lines,
+			const struct option_faults *faults)
+{
+	const char *key = "stream.servers";
+	const char *fault = NULL;
+	int line;
+
+	if (!cfg->stream_enable) {
+		return 0;
+	}
+	if (cfg->stream_servers[0] == '\0') {
+		fault = "is required while stream.enable is on";
+	} else if (strchr(cfg->stream_servers, '@') != NULL) {
+		fault = "must be without user and password: use stream.credentials";
+	} else if (!is_token(cfg->stream_appliance)) {
+		key = "stream.appliance";
+		fault = "must be letters, digits, - and _";
+	} else if (cfg->stream_name[0] == '\0' || !is_token(cfg->stream_name)) {
+		key = "stream.stream";
+		fault = "must be letters, digits, - and _";
+	} else if ((cfg->stream_certificate[0] == '\0') != (cfg->stream_key[0] == '\0')) {
+		key = "stream.certificate";
+		fault = "and stream.key require each other";
+	}
+	if (fault == NULL) {
+		return 0;
+	}
+	line = line_of(lines, key);
+	return faults->add(faults->ctx, key, line != 0 ? line : line_of(lines, "stream.enable"),
+			   fault);
 }
 
 /* Slave @i against those before it. */
@@ -233,28 +271,35 @@ static int check_channels(const struct config *cfg, const struct option_faults *
 	return 0;
 }
 
-static const char *output_fault(const struct config *cfg, size_t i, const char **ret_key)
+static const char *output_fault(const struct config *cfg, size_t i, const char **ret_key,
+				char *reason)
 {
 	const struct config_output *output = &cfg->output[i];
 
-	*ret_key = "outputs[].channel";
+	*ret_key = "channel";
 	if (output->channel[0] == '\0') {
 		return "is missing";
 	}
 	for (size_t j = 0; j < i; j++) {
-		if (strcmp(output->channel, cfg->output[j].channel) == 0) {
+		if (strcmp(output->channel, cfg->output[j].channel) != 0) {
+			continue;
+		}
+		if (cfg->output[j].line == 0) {
 			return "duplicate channel";
 		}
+		snprintf(reason, OPTION_WHY_BYTES, "%s is already in line %d", output->channel,
+			 cfg->output[j].line);
+		return reason;
 	}
-	*ret_key = "outputs[].max";
+	*ret_key = "max";
 	if (!(output->min <= output->max)) {
 		return "is below min";
 	}
-	*ret_key = "outputs[].fail_safe";
+	*ret_key = "fail_safe";
 	if (!(output->fail_safe >= output->min && output->fail_safe <= output->max)) {
 		return "is not within min and max";
 	}
-	*ret_key = "outputs[].timeout";
+	*ret_key = "timeout";
 	if (output->timeout_ns != 0 && output->owner != CONFIG_OWNER_REMOTE) {
 		return "requires owner: remote";
 	}
@@ -263,11 +308,20 @@ static const char *output_fault(const struct config *cfg, size_t i, const char *
 
 static int check_outputs(const struct config *cfg, const struct option_faults *faults)
 {
-	for (size_t i = 0; i < cfg->output_count; i++) {
-		const char *key;
-		const char *fault = output_fault(cfg, i, &key);
+	char reason[OPTION_WHY_BYTES];
+	char key[OPTION_KEY_BYTES];
 
-		if (fault != NULL && faults->add(faults->ctx, key, cfg->output[i].line, fault)) {
+	for (size_t i = 0; i < cfg->output_count; i++) {
+		const struct config_output *output = &cfg->output[i];
+		const char *option;
+		const char *fault = output_fault(cfg, i, &option, reason);
+
+		if (fault == NULL) {
+			continue;
+		}
+		snprintf(key, sizeof(key), "%soutputs[].%s",
+			 output->slave_pos == CONFIG_NO_SLAVE ? "" : "slaves[].", option);
+		if (faults->add(faults->ctx, key, output->line, fault)) {
 			return 1;
 		}
 	}
@@ -296,31 +350,9 @@ int option_cross_check(const struct config *cfg, const struct option_lines *line
 	int is_over = check_relations(cfg, lines, &all);
 
 	is_over = is_over || check_dds(cfg, lines, &all);
+	is_over = is_over || check_stream(cfg, lines, &all);
 	is_over = is_over || check_slaves(cfg, &all);
 	is_over = is_over || check_channels(cfg, &all);
 	is_over = is_over || check_outputs(cfg, &all);
 	return is_over || counted.count > 0 ? -EINVAL : 0;
-}
-
-int option_sdo_finish(const struct option_sdo *item, struct config_sdo *ret_sdo, char *reason)
-{
-	enum sdo_type type = (enum sdo_type)item->type;
-	uint64_t bits;
-	int r = sdo_value_parse(type, item->value, &bits);
-
-	if (r == -ERANGE) {
-		snprintf(reason, OPTION_WHY_BYTES, "%.40s does not fit into %s", item->value,
-			 sdo_type_to_str(type));
-		return r;
-	}
-	if (r < 0) {
-		snprintf(reason, OPTION_WHY_BYTES, "\"%.40s\" is not a valid %s", item->value,
-			 sdo_type_to_str(type));
-		return r;
-	}
-	ret_sdo->index = item->index;
-	ret_sdo->subindex = item->subindex;
-	ret_sdo->bytes = (uint8_t)sdo_type_bytes(type);
-	ret_sdo->value = bits;
-	return 0;
 }

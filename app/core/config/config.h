@@ -37,6 +37,16 @@ enum config_channel_type {
 };
 
 enum config_when_full { CONFIG_WHEN_FULL_OLDEST, CONFIG_WHEN_FULL_STOP };
+/* When a start-up SDO is written (slaves[].sdo[].transition). */
+enum config_transition {
+	CONFIG_TRANSITION_IP, /* as soon as the slave is in PRE-OP */
+	CONFIG_TRANSITION_PS, /* in PRE-OP, before the mapping is read and SAFE-OP is requested */
+	CONFIG_TRANSITION_SO, /* in SAFE-OP, before OP is requested */
+	CONFIG_TRANSITION_OS, /* in OP, before SAFE-OP is requested */
+	CONFIG_TRANSITIONS
+};
+
+enum config_record_values { CONFIG_RECORD_PHYSICAL, CONFIG_RECORD_RAW, CONFIG_RECORD_BOTH };
 enum config_sync_type { CONFIG_SYNC_TYPE_SHOW, CONFIG_SYNC_TYPE_WRITE };
 /* slaves[].assign_activate, besides words of 1 to 0xffff */
 enum { CONFIG_ASSIGN_SII = 0, CONFIG_ASSIGN_NONE = 0x10000 };
@@ -45,13 +55,17 @@ enum {
 	CONFIG_LIMIT_SDOS = 4 * LIMIT_SLAVES,     /* of all slaves together */
 	CONFIG_LIMIT_CHANNELS = 4 * LIMIT_SLAVES, /* items of slaves[].channels[], the same */
 	CONFIG_LIMIT_OUTPUTS = LIMIT_OUTPUTS,
+	CONFIG_LIMIT_PDOS = 4 * LIMIT_SLAVES, /* items of slaves[].pdos[], the same */
+	CONFIG_LIMIT_PDO_ENTRIES = 4096,      /* of all of them together */
+	CONFIG_LIMIT_OCTETS = 65536, /* of slaves[].sdo[].value of types OCTETS and STRING */
 	CONFIG_PATH_BYTES = 256,
 };
-enum { CONFIG_OPTIONS_BYTES = 512 };
+enum { CONFIG_OPTIONS_BYTES = 512, CONFIG_COMMENT_BYTES = 64 };
 
 /* slaves[]: what is expected at each position, and how it is set up. */
 struct config_slave {
 	char name[32];     /* "" = made from the device name and position */
+	char group[32];    /* "" = none */
 	uint32_t vendor;   /* 0 = any */
 	uint32_t product;  /* 0 = any */
 	uint32_t revision; /* 0 = any */
@@ -65,22 +79,39 @@ struct config_slave {
 	char sync0_line[96];      /* GPIO line its SYNC0 is wired to; "" = none */
 	uint32_t assign_activate; /* or CONFIG_ASSIGN_SII, CONFIG_ASSIGN_NONE */
 	enum config_sync_type sync_type;
-	int64_t preop_timeout_ns;
-	int64_t op_timeout_ns; /* 0: bus_op_timeout_ns */
-	int line;              /* in the file, for messages */
+	int64_t preop_timeout_ns; /* 0: by its ESI description, else CONFIG_PREOP_TIMEOUT_NS */
+	int64_t op_timeout_ns;    /* 0: by its ESI description, else bus_op_timeout_ns */
+	int line;                 /* in the file, for messages */
 };
 
-/* slaves[].preop_timeout of a slave that is not listed */
-#define CONFIG_PREOP_TIMEOUT "3s"
+/* of a slave that has no other */
 #define CONFIG_PREOP_TIMEOUT_NS INT64_C(3000000000)
 
-/* slaves[].sdo[]: written in PRE-OP, in order. */
+/* What slaves[].sdo[].type may say besides the types of sdo_value.h. */
+enum config_sdo_octets { CONFIG_SDO_STRING = 64, CONFIG_SDO_OCTETS, CONFIG_SDO_AUTO };
+
+/* slaves[].sdo[]: start-up SDOs, written in a transition, in order. */
 struct config_sdo {
 	uint16_t slave_pos;
 	uint16_t index;
 	uint8_t subindex;
-	uint8_t bytes; /* 1, 2, 4, 8 */
-	uint64_t value;
+	uint8_t is_complete; /* complete access, from subindex 0 or 1 on */
+	uint8_t type;        /* enum sdo_type, enum config_sdo_octets */
+	enum config_transition transition;
+	uint16_t bytes;
+	uint64_t value;  /* little-endian; of enum config_sdo_octets: not used */
+	uint32_t octets; /* where they begin in config.octets; CONFIG_SDO_AUTO: the value's text */
+	char comment[CONFIG_COMMENT_BYTES];
+	int line;
+};
+
+/* slaves[].pdos[]: the PDOs that are assigned, in this order. */
+struct config_pdo {
+	uint16_t slave_pos;
+	uint16_t index; /* 0: by its name */
+	char pdo[LIMIT_NAME_BYTES];
+	uint16_t entry_first; /* in config.pdo_entry */
+	uint16_t entry_count; /* 0: its mapping stays as it is */
 	int line;
 };
 
@@ -98,9 +129,14 @@ struct config_channel {
 	int line;
 };
 
-/* outputs[]: by channel name. */
+/* of an item of the list outputs[], not of slaves[].outputs[] */
+enum { CONFIG_NO_SLAVE = 0xffff };
+
+/* outputs[] and slaves[].outputs[]: by channel name. */
 struct config_output {
-	char channel[LIMIT_NAME_BYTES];
+	char channel[LIMIT_NAME_BYTES]; /* with the slave's name, as soon as the file is read */
+	uint16_t slave_pos;             /* of slaves[], or CONFIG_NO_SLAVE */
+	uint16_t item;                  /* place in its list of the file */
 	enum config_owner owner;
 	double fail_safe; /* physical value */
 	double min;       /* physical */
@@ -174,6 +210,7 @@ struct config {
 	int64_t record_rotate_period_ns;
 	uint64_t record_rotate_bytes;
 	enum config_when_full record_when_full;
+	enum config_record_values record_values;
 	uint64_t record_budget_bytes;  /* of all recordings; 0: none, and nothing is deleted */
 	uint64_t record_reserve_bytes; /* stays free */
 	int32_t record_compression;    /* zstd level, 0 = none */
@@ -189,6 +226,25 @@ struct config {
 	uint32_t dds_command_rate;            /* commands a second and commander */
 	char dds_security[CONFIG_PATH_BYTES]; /* folder of our keys; "" = no DDS Security */
 	uint32_t dds_ros2_mirror;
+	/* web */
+	uint32_t web_enable;
+	char web_listen[64]; /* loopback or an address */
+	uint32_t web_port;
+	uint32_t web_clients;              /* WebSockets at a time */
+	char web_hosts[CONFIG_PATH_BYTES]; /* names in the header Host, comma between; "" = none */
+	char web_origins[CONFIG_PATH_BYTES]; /* of pages that may connect, the same */
+	/* stream */
+	uint32_t stream_enable;
+	char stream_servers[CONFIG_PATH_BYTES];     /* URLs, comma between */
+	char stream_appliance[64];                  /* "" = host name */
+	char stream_name[64];                       /* of the JetStream stream */
+	char stream_credentials[CONFIG_PATH_BYTES]; /* files; "" = none */
+	uint32_t stream_tls;
+	char stream_ca[CONFIG_PATH_BYTES];
+	char stream_certificate[CONFIG_PATH_BYTES];
+	char stream_key[CONFIG_PATH_BYTES];
+	uint32_t stream_block_cycles;
+	uint64_t stream_memory_bytes;
 	/* sync0 */
 	uint32_t sync0_enable;
 	char sync0_edges[CONFIG_PATH_BYTES]; /* edge file of ecdaq-sim instead of lines; "" = lines
@@ -209,6 +265,12 @@ struct config {
 	size_t slave_count;
 	struct config_sdo sdo[CONFIG_LIMIT_SDOS];
 	size_t sdo_count;
+	uint8_t octets[CONFIG_LIMIT_OCTETS]; /* values of start-up SDOs that are longer */
+	size_t octet_count;
+	struct config_pdo pdo[CONFIG_LIMIT_PDOS];
+	size_t pdo_count;
+	uint32_t pdo_entry[CONFIG_LIMIT_PDO_ENTRIES]; /* index << 16 | subindex << 8 | bits */
+	size_t pdo_entry_count;
 	struct config_channel channel[CONFIG_LIMIT_CHANNELS];
 	size_t channel_count;
 	struct config_output output[CONFIG_LIMIT_OUTPUTS];
@@ -262,6 +324,12 @@ int config_assemble_from(const struct config_source *source, struct config *cfg,
  * -EINVAL. */
 int config_check(const struct config *cfg, char *error, size_t error_bytes);
 
+/** What @sdo of @cfg writes, sdo->bytes long: in @cfg, or in @buffer. Context: any. */
+const uint8_t *config_sdo_data(const struct config *cfg, const struct config_sdo *sdo,
+			       uint8_t buffer[8]);
+/** "IP", "PS", "SO", "OS". */
+const char *config_transition_to_str(enum config_transition transition);
+
 /** Does the slave convert on command: by its mode, or else by its SDO 0x8000:01? Context: any. */
 int config_is_oneshot(const struct config *cfg, uint16_t slave_pos);
 
@@ -274,6 +342,9 @@ enum { CONFIG_WHY_BYTES = 192 };
  */
 int config_parse_duration(const char *text, int64_t *ret_ns, char *reason);
 
+/* What a token of a NATS subject, and the name of a stream, may be made of here. */
+#define CONFIG_STREAM_TOKEN "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-"
+
 /* Files of the run directory, which is ecdaqd's; a service has a folder of its own in it. */
 #define CONFIG_RUN_SAMPLES "samples"                 /* ring of samples */
 #define CONFIG_RUN_EVENTS "events"                   /* ring of events */
@@ -283,6 +354,7 @@ int config_parse_duration(const char *text, int64_t *ret_ns, char *reason);
 #define CONFIG_RUN_COMMANDS_REMOTE "commands-remote" /* socket that gives ecdaq-dds its board */
 #define CONFIG_RUN_RECORD_STATUS "record/status"     /* struct record_status */
 #define CONFIG_RUN_DDS_STATUS "dds/status"           /* struct dds_status */
+#define CONFIG_RUN_STREAM_STATUS "stream/status"     /* struct stream_status */
 #define CONFIG_RUN_SYNC0 "sync0/results"             /* ring of struct sync0_result */
 #define CONFIG_RUN_SYNC0_EVENTS "sync0/events"       /* ring of events of ecdaq-sync0 */
 #define CONFIG_RUN_SYNC0_STATUS "sync0/status"       /* struct sync0_status */

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/grow.h"
 #include "config/number.h"
 #include "config/option.h"
 
@@ -14,12 +15,12 @@ struct setting {
 	char *text; /* of the option, zero, of the value, zero */
 	const char *value;
 	int line;
+	size_t order;
 };
 
 struct settings {
 	struct setting *at;
 	size_t count;
-	size_t room;
 	int result; /* 0 or -ENOMEM */
 };
 
@@ -30,39 +31,36 @@ struct listing {
 	void *ctx;
 };
 
-static int grow(struct settings *settings)
-{
-	size_t room = settings->room == 0 ? 64 : 2 * settings->room;
-	struct setting *at;
-
-	if (settings->count < settings->room) {
-		return 0;
-	}
-	at = realloc(settings->at, room * sizeof(*at));
-	if (at == NULL) {
-		return -ENOMEM;
-	}
-	settings->at = at;
-	settings->room = room;
-	return 0;
-}
-
 static void take(void *ctx, const char *option, const char *value, int line)
 {
 	struct settings *settings = ctx;
 	size_t option_len = strlen(option) + 1;
 	size_t value_len = strlen(value) + 1;
+	size_t order = settings->count;
 	char *text = malloc(option_len + value_len);
+	struct setting *at =
+		text == NULL ? NULL : array_grow(settings->at, &settings->count, sizeof(*at));
 
-	if (text == NULL || grow(settings) < 0) {
+	if (at == NULL) {
 		free(text);
 		settings->result = -ENOMEM;
 		return;
 	}
 	memcpy(text, option, option_len);
 	memcpy(text + option_len, value, value_len);
-	settings->at[settings->count++] =
-		(struct setting){ .text = text, .value = text + option_len, .line = line };
+	settings->at = at;
+	at[order] = (struct setting){
+		.text = text, .value = text + option_len, .line = line, .order = order
+	};
+}
+
+static int by_text(const void *a, const void *b)
+{
+	const struct setting *one = a;
+	const struct setting *other = b;
+	int r = strcmp(one->text, other->text);
+
+	return r != 0 ? r : (one->order > other->order) - (one->order < other->order);
 }
 
 static void release(struct settings *settings)
@@ -73,15 +71,23 @@ static void release(struct settings *settings)
 	free(settings->at);
 }
 
-/* The newest one counts: --set comes after the file. */
+/* Of sorted settings. The newest one counts: --set comes after the file. */
 static const struct setting *find(const struct settings *settings, const char *option)
 {
-	for (size_t i = settings->count; i-- > 0;) {
-		if (strcmp(settings->at[i].text, option) == 0) {
-			return &settings->at[i];
+	size_t low = 0; /* the first one behind @option */
+	size_t high = settings->count;
+
+	while (low < high) {
+		size_t middle = low + (high - low) / 2;
+
+		if (strcmp(settings->at[middle].text, option) <= 0) {
+			low = middle + 1;
+		} else {
+			high = middle;
 		}
 	}
-	return NULL;
+	return low > 0 && strcmp(settings->at[low - 1].text, option) == 0 ? &settings->at[low - 1]
+									  : NULL;
 }
 
 /* The one default that depends on the file: a list of slaves is exact (walk.c). */
@@ -103,7 +109,9 @@ static void list_one(const struct listing *listing, const struct option *option,
 	struct config_item item = { .option = key,
 				    .value = value,
 				    .unit = option->unit,
-				    .default_value = option->default_value };
+				    .default_value = option->default_value,
+				    .effect = option->effect,
+				    .place = option_place(option) };
 
 	snprintf(key, sizeof(key), "%s%s", shown, name);
 	setting = find(listing->settings, key);
@@ -135,16 +143,42 @@ static void list_options(const struct listing *listing, const char *pattern, con
 	}
 }
 
+/* outputs[] with CONFIG_NO_SLAVE, else those beside slave @slave_pos. */
+static void list_outputs(const struct listing *listing, unsigned slave_pos)
+{
+	char list[24] = "";
+	char shown[48];
+
+	if (slave_pos != CONFIG_NO_SLAVE) {
+		snprintf(list, sizeof(list), "slaves[%u].", slave_pos);
+	}
+	for (size_t i = 0; i < listing->cfg->output_count; i++) {
+		const struct config_output *output = &listing->cfg->output[i];
+
+		if (output->slave_pos == slave_pos) {
+			snprintf(shown, sizeof(shown), "%soutputs[%u].", list, output->item);
+			list_options(listing, "outputs[].", shown);
+		}
+	}
+}
+
 static void list_slaves(const struct listing *listing)
 {
 	char shown[48];
 
 	for (size_t i = 0; i < listing->cfg->slave_count; i++) {
+		size_t pdos = 0;
 		size_t sdos = 0;
 		size_t channels = 0;
 
 		snprintf(shown, sizeof(shown), "slaves[%zu].", i);
 		list_options(listing, "slaves[].", shown);
+		for (size_t j = 0; j < listing->cfg->pdo_count; j++) {
+			if (listing->cfg->pdo[j].slave_pos == i) {
+				snprintf(shown, sizeof(shown), "slaves[%zu].pdos[%zu].", i, pdos++);
+				list_options(listing, "slaves[].pdos[].", shown);
+			}
+		}
 		for (size_t j = 0; j < listing->cfg->sdo_count; j++) {
 			if (listing->cfg->sdo[j].slave_pos == i) {
 				snprintf(shown, sizeof(shown), "slaves[%zu].sdo[%zu].", i, sdos++);
@@ -158,6 +192,7 @@ static void list_slaves(const struct listing *listing)
 				list_options(listing, "slaves[].channels[].", shown);
 			}
 		}
+		list_outputs(listing, (unsigned)i);
 	}
 }
 
@@ -170,15 +205,11 @@ static void list_all(const struct listing *listing)
 		list_options(listing, shown, shown);
 	}
 	list_slaves(listing);
-	for (size_t i = 0; i < listing->cfg->output_count; i++) {
-		snprintf(shown, sizeof(shown), "outputs[%zu].", i);
-		list_options(listing, "outputs[].", shown);
-	}
+	list_outputs(listing, CONFIG_NO_SLAVE);
 }
 
-int config_effective(const struct config_source *source,
-		     void (*item)(void *ctx, const struct config_item *item), void *ctx,
-		     char *error, size_t error_bytes)
+int config_effective_into(const struct config_source *source, struct config *cfg,
+			  const struct config_listener *listener, char *error, size_t error_bytes)
 {
 	struct settings settings = { .at = NULL };
 	const struct config_source watched = { .path = source->path,
@@ -186,23 +217,36 @@ int config_effective(const struct config_source *source,
 					       .set_count = source->set_count,
 					       .seen = take,
 					       .ctx = &settings };
+	struct listing listing = { cfg, &settings, listener->item, listener->ctx };
+	int r = config_assemble_from(&watched, cfg, error, error_bytes);
+
+	if (r == 0 && settings.result < 0) {
+		r = settings.result;
+		snprintf(error, error_bytes, "out of memory");
+	}
+	if (r == 0) {
+		if (settings.count > 0) {
+			qsort(settings.at, settings.count, sizeof(*settings.at), by_text);
+		}
+		list_all(&listing);
+	}
+	release(&settings);
+	return r;
+}
+
+int config_effective(const struct config_source *source,
+		     void (*item)(void *ctx, const struct config_item *item), void *ctx,
+		     char *error, size_t error_bytes)
+{
+	const struct config_listener listener = { .item = item, .ctx = ctx };
 	struct config *cfg = malloc(sizeof(*cfg));
-	struct listing listing = { cfg, &settings, item, ctx };
 	int r;
 
 	if (cfg == NULL) {
 		snprintf(error, error_bytes, "out of memory");
 		return -ENOMEM;
 	}
-	r = config_assemble_from(&watched, cfg, error, error_bytes);
-	if (r == 0 && settings.result < 0) {
-		r = settings.result;
-		snprintf(error, error_bytes, "out of memory");
-	}
-	if (r == 0) {
-		list_all(&listing);
-	}
-	release(&settings);
+	r = config_effective_into(source, cfg, &listener, error, error_bytes);
 	free(cfg);
 	return r;
 }

@@ -5,6 +5,7 @@
 
 #include <stddef.h>
 
+#include "base/config_change.h"
 #include "config/config.h"
 
 enum config_origin { CONFIG_ORIGIN_DEFAULT, CONFIG_ORIGIN_FILE, CONFIG_ORIGIN_SET };
@@ -14,8 +15,15 @@ struct config_item {
 	const char *value; /* as the file would have it; durations, sizes and per cents with unit */
 	const char *unit;  /* of a plain number; "" */
 	const char *default_value; /* NULL: the option is required */
+	enum config_effect effect;
 	enum config_origin origin;
-	int line; /* CONFIG_ORIGIN_FILE: of the file; else 0 */
+	int line;     /* CONFIG_ORIGIN_FILE: of the file; else 0 */
+	size_t place; /* of its row in the option table */
+};
+
+struct config_listener {
+	void (*item)(void *ctx, const struct config_item *item);
+	void *ctx;
 };
 
 /**
@@ -26,6 +34,10 @@ struct config_item {
 int config_effective(const struct config_source *source,
 		     void (*item)(void *ctx, const struct config_item *item), void *ctx,
 		     char *error, size_t error_bytes);
+
+/** The same, and the configuration itself into @cfg; @cfg is untouched on failure. */
+int config_effective_into(const struct config_source *source, struct config *cfg,
+			  const struct config_listener *listener, char *error, size_t error_bytes);
 
 /** "default", "file", "command line". */
 const char *config_origin_to_str(enum config_origin origin);

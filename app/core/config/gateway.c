@@ -5,17 +5,14 @@
 #include <errno.h>
 #include <string.h>
 
-int config_gateway_address(const struct config *cfg, struct sockaddr_in6 *ret, socklen_t *ret_bytes)
+static int find_address(const char *listen, uint32_t number, struct sockaddr_in6 *ret,
+			socklen_t *ret_bytes)
 {
-	int is_loopback = strcmp(cfg->gateway_listen, "loopback") == 0;
-	const char *address = is_loopback ? "127.0.0.1" : cfg->gateway_listen;
-	uint16_t port = htons((uint16_t)cfg->gateway_port);
+	const char *address = strcmp(listen, "loopback") == 0 ? "127.0.0.1" : listen;
+	uint16_t port = htons((uint16_t)number);
 	struct sockaddr_in ip4 = { .sin_family = AF_INET, .sin_port = port };
 	struct sockaddr_in6 ip6 = { .sin6_family = AF_INET6, .sin6_port = port };
 
-	if (strcmp(cfg->gateway_listen, "off") == 0) {
-		return 0;
-	}
 	if (inet_pton(AF_INET, address, &ip4.sin_addr) == 1) {
 		memset(ret, 0, sizeof(*ret));
 		memcpy(ret, &ip4, sizeof(ip4));
@@ -28,4 +25,17 @@ int config_gateway_address(const struct config *cfg, struct sockaddr_in6 *ret, s
 		return 1;
 	}
 	return -EINVAL;
+}
+
+int config_gateway_address(const struct config *cfg, struct sockaddr_in6 *ret, socklen_t *ret_bytes)
+{
+	if (strcmp(cfg->gateway_listen, "off") == 0) {
+		return 0;
+	}
+	return find_address(cfg->gateway_listen, cfg->gateway_port, ret, ret_bytes);
+}
+
+int config_web_address(const struct config *cfg, struct sockaddr_in6 *ret, socklen_t *ret_bytes)
+{
+	return find_address(cfg->web_listen, cfg->web_port, ret, ret_bytes);
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Where the mailbox gateway listens, from gateway.listen and gateway.port. Context: any. */
+/* Where the mailbox gateway and ecdaq-web listen: gateway.listen and gateway.port, web.listen and
+ * web.port. Context: any. */
 #ifndef CONFIG_GATEWAY_H
 #define CONFIG_GATEWAY_H
 
@@ -14,5 +15,8 @@
  */
 int config_gateway_address(const struct config *cfg, struct sockaddr_in6 *ret,
 			   socklen_t *ret_bytes);
+
+/** The same for ecdaq-web: 1; -EINVAL: web.listen is neither loopback nor an address. */
+int config_web_address(const struct config *cfg, struct sockaddr_in6 *ret, socklen_t *ret_bytes);
 
 #endif

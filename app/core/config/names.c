@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Names of options, lists and sections: what is there, and what may have been meant. */
 #include <errno.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "config/option.h"
@@ -13,6 +14,12 @@ int option_list_find(const char *name)
 		}
 	}
 	return -ENOENT;
+}
+
+void option_list_prefix(const struct option_list *list, char ret_prefix[])
+{
+	snprintf(ret_prefix, OPTION_KEY_BYTES, "%s[].",
+		 list->like != NULL ? list->like : list->name);
 }
 
 int option_is_section(const char *name)

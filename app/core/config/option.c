@@ -7,6 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "config/output.h"
+
 const struct option *option_find(const char *name)
 {
 	for (size_t i = 0; i < option_count(); i++) {
@@ -68,6 +70,27 @@ static int split_index(const char *name, char *ret_pattern, size_t *ret_index)
 	return 0;
 }
 
+/* Item @index of outputs[], or a fresh one behind the last; NULL. */
+static struct config_output *output_at(struct config *cfg, size_t index)
+{
+	const struct config_output *old = config_output_at(cfg, CONFIG_NO_SLAVE, index);
+	struct config_output *output = &cfg->output[cfg->output_count];
+
+	if (old != NULL) {
+		return &cfg->output[old - cfg->output];
+	}
+	if (cfg->output_count == CONFIG_LIMIT_OUTPUTS ||
+	    (index > 0 && config_output_at(cfg, CONFIG_NO_SLAVE, index - 1) == NULL)) {
+		return NULL;
+	}
+	memset(output, 0, sizeof(*output));
+	option_fill_defaults("outputs[].", output);
+	output->slave_pos = CONFIG_NO_SLAVE;
+	output->item = (uint16_t)index;
+	cfg->output_count++;
+	return output;
+}
+
 /* A place for item @index of the list at @count: an old item, or a fresh one behind the last. */
 static void *item_at(struct config *cfg, const char *pattern, size_t index)
 {
@@ -82,15 +105,7 @@ static void *item_at(struct config *cfg, const char *pattern, size_t index)
 		}
 		return &cfg->slave[index];
 	}
-	if (index > cfg->output_count || index >= CONFIG_LIMIT_OUTPUTS) {
-		return NULL;
-	}
-	if (index == cfg->output_count) {
-		memset(&cfg->output[index], 0, sizeof(cfg->output[index]));
-		option_fill_defaults("outputs[].", &cfg->output[index]);
-		cfg->output_count++;
-	}
-	return &cfg->output[index];
+	return output_at(cfg, index);
 }
 
 static int set_value(struct config *cfg, const char *name, const char *value, char *reason)

@@ -11,6 +11,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "base/config_change.h"
 #include "config/config.h"
 
 enum option_type {
@@ -34,7 +35,11 @@ struct option {
 	const char *default_value; /* NULL: required (in lists only) */
 	const char *min;           /* numbers: inclusive bounds; else NULL */
 	const char *max;
-	char unit[12];         /* of a plain number; "" for none */
+	char unit[12]; /* of a plain number; "" for none */
+	/* Of another value, while ecdaqd runs. CONFIG_EFFECT_NOW: of scalars that nothing but the
+	 * service thread reads, and of outputs[] as far as outputs_rules_set() hands them to the
+	 * cycle. */
+	enum config_effect effect;
 	const char *otherwise; /* when the default is another one, for the pages; mostly NULL */
 	/* OPTION_WORD: "auto|spin|sleep", in the order of the enum. OPTION_HEX: words beside the
 	 * numbers; the first one is 0 (below @min), the others are @max + 1, @max + 2 ... */
@@ -49,7 +54,7 @@ const struct option *option_at(size_t place);
 /** The place of @option, a row of the table. */
 size_t option_place(const struct option *option);
 
-enum { OPTION_LIMIT = 128, OPTION_WHY_BYTES = CONFIG_WHY_BYTES, OPTION_KEY_BYTES = 96 };
+enum { OPTION_LIMIT = 160, OPTION_WHY_BYTES = CONFIG_WHY_BYTES, OPTION_KEY_BYTES = 96 };
 
 /* A list of the file. Its items are filled by the options whose name starts with name and "[].". */
 struct option_list {
@@ -57,16 +62,25 @@ struct option_list {
 	size_t limit;
 	const char *limit_name; /* as it is called in the sources */
 	const char *prose;
+	/* An item may be a line of text, too: its form, as a regular expression. NULL: no. */
+	const char *line_pattern;
+	int is_number_line; /* or a number, which YAML reads as such */
+	const char *like;   /* another list whose options its items have; NULL: its own */
 };
 
 enum option_list_id {
 	OPTION_LIST_SLAVES,
+	OPTION_LIST_PDOS,
 	OPTION_LIST_SDOS,
 	OPTION_LIST_CHANNELS,
+	OPTION_LIST_SLAVE_OUTPUTS,
 	OPTION_LIST_OUTPUTS,
 	OPTION_LISTS
 };
 extern const struct option_list option_lists[OPTION_LISTS];
+
+/** What the options of @list's items start with: "slaves[].sdo[].". */
+void option_list_prefix(const struct option_list *list, char ret_prefix[]);
 
 /* Sections of the file in their order, for the pages: name and prose. */
 struct option_section {
@@ -79,11 +93,20 @@ extern const size_t option_section_count;
 
 /* An item of slaves[].sdo[] while it is parsed; becomes a struct config_sdo when it is whole. */
 struct option_sdo {
+	enum config_transition transition;
 	uint16_t index;
 	uint8_t subindex;
-	uint32_t type; /* enum sdo_type */
-	char value[64];
+	uint32_t is_complete;
+	uint32_t type; /* enum sdo_type, and those behind it: STRING, OCTETS, AUTO */
+	char value[CONFIG_OPTIONS_BYTES];
+	char comment[CONFIG_COMMENT_BYTES];
 	int value_line;
+};
+
+/* An item of slaves[].pdos[] while it is parsed. */
+struct option_pdo {
+	char pdo[LIMIT_NAME_BYTES];
+	char entries[CONFIG_OPTIONS_BYTES];
 };
 
 /** The option named @name; NULL. */
@@ -130,7 +153,13 @@ struct option_faults {
 int option_cross_check(const struct config *cfg, const struct option_lines *lines,
 		       const struct option_faults *faults);
 
-/** Turn a whole item of slaves[].sdo[] into @ret_sdo. 0, or -EINVAL or -ERANGE with @reason. */
-int option_sdo_finish(const struct option_sdo *item, struct config_sdo *ret_sdo, char *reason);
+/** Turn a whole item of slaves[].sdo[] into @ret_sdo, and its octets into @cfg. 0, or -EINVAL or
+ * -ERANGE with @reason, and the option at fault in @ret_key ("value"). */
+int option_sdo_finish(const struct option_sdo *item, struct config *cfg, struct config_sdo *ret_sdo,
+		      const char **ret_key, char *reason);
+
+/** Turn a whole item of slaves[].pdos[] into @ret_pdo, and its entries into @cfg; as above. */
+int option_pdo_finish(const struct option_pdo *item, struct config *cfg, struct config_pdo *ret_pdo,
+		      const char **ret_key, char *reason);
 
 #endif

@@ -15,6 +15,9 @@
 #define SDO(member)                                                                                \
 	.offset = offsetof(struct option_sdo, member),                                             \
 	.bytes = sizeof(((struct option_sdo *)0)->member)
+#define PDO(member)                                                                                \
+	.offset = offsetof(struct option_pdo, member),                                             \
+	.bytes = sizeof(((struct option_pdo *)0)->member)
 #define CHANNEL(member)                                                                            \
 	.offset = offsetof(struct config_channel, member),                                         \
 	.bytes = sizeof(((struct config_channel *)0)->member)

@@ -11,6 +11,12 @@ static const struct option rows[] = {
 	  .default_value = "",
 	  .prose = "Name of the slave and first part of its channels' names. Empty: made from "
 		   "the device name and the position." },
+	{ .name = "slaves[].group",
+	  .type = OPTION_NAME,
+	  SLAVE(group),
+	  .default_value = "",
+	  .prose = "Group of slaves that this one is of: verbs that take several slaves take "
+		   "`@GROUP` for all of them. Empty: none." },
 	{ .name = "slaves[].vendor",
 	  .type = OPTION_HEX,
 	  SLAVE(vendor),
@@ -89,6 +95,7 @@ static const struct option rows[] = {
 	  .type = OPTION_TEXT,
 	  SLAVE(sync0_line),
 	  .default_value = "",
+	  .effect = CONFIG_EFFECT_SYNC0,
 	  .prose = "GPIO line that this slave's SYNC0 is wired to: its name (GPIO17), or chip "
 		   "label and number (pinctrl-bcm2711:17). Empty: none." },
 	{ .name = "slaves[].assign_activate",
@@ -114,12 +121,12 @@ static const struct option rows[] = {
 	{ .name = "slaves[].preop_timeout",
 	  .type = OPTION_DURATION,
 	  SLAVE(preop_timeout_ns),
-	  .default_value = CONFIG_PREOP_TIMEOUT,
-	  .min = "100ms",
+	  .default_value = "0s",
+	  .min = "0s",
 	  .max = "5min",
 	  .unit = "s",
-	  .prose = "Time this slave has in recovery to reach INIT or PRE-OP (ESI: "
-		   "PreopTimeout)." },
+	  .prose = "Time this slave has in recovery to reach INIT or PRE-OP. 0s: PreopTimeout of "
+		   "its ESI description (bus.esi_dir), else 3s." },
 	{ .name = "slaves[].op_timeout",
 	  .type = OPTION_DURATION,
 	  SLAVE(op_timeout_ns),
@@ -127,9 +134,30 @@ static const struct option rows[] = {
 	  .min = "0s",
 	  .max = "5min",
 	  .unit = "s",
-	  .prose = "Time this slave has in recovery to reach SAFE-OP, and OP (ESI: "
-		   "SafeopOpTimeout). 0s: bus.op_timeout." },
+	  .prose = "Time this slave has in recovery to reach SAFE-OP, and OP. 0s: SafeopOpTimeout "
+		   "of its ESI description (bus.esi_dir), else bus.op_timeout." },
+	/* slaves[].pdos[] */
+	{ .name = "slaves[].pdos[].pdo",
+	  .type = OPTION_TEXT,
+	  PDO(pdo),
+	  .default_value = NULL,
+	  .prose = "The PDO: its index (`0x1a01`), or its name as `ecdaq pdo` shows it." },
+	{ .name = "slaves[].pdos[].entries",
+	  .type = OPTION_TEXT,
+	  PDO(entries),
+	  .default_value = "",
+	  .prose = "What it maps, for a PDO that can be configured: object and bits, commas "
+		   "between (`0x6040:00 16, gap 8, 0x607a:00 32`), the subindex in hexadecimal. "
+		   "Empty: as the slave has it." },
 	/* slaves[].sdo[] */
+	{ .name = "slaves[].sdo[].transition",
+	  .type = OPTION_WORD,
+	  SDO(transition),
+	  .default_value = "PS",
+	  .words = "IP|PS|SO|OS",
+	  .prose = "When it is written. IP: as soon as the slave is in PRE-OP. PS: in PRE-OP, "
+		   "before the mapping is read and SAFE-OP is requested. SO: in SAFE-OP, before OP "
+		   "is requested. OS: in OP, on the way down, before SAFE-OP is requested." },
 	{ .name = "slaves[].sdo[].index",
 	  .type = OPTION_HEX,
 	  SDO(index),
@@ -144,18 +172,32 @@ static const struct option rows[] = {
 	  .min = "0",
 	  .max = "255",
 	  .prose = "Subindex." },
+	{ .name = "slaves[].sdo[].complete",
+	  .type = OPTION_WORD,
+	  SDO(is_complete),
+	  .default_value = "false",
+	  .words = "false|true",
+	  .prose = "true: complete access, the whole object from subindex 0 or 1 on in one "
+		   "transfer; requires type OCTETS." },
 	{ .name = "slaves[].sdo[].type",
 	  .type = OPTION_WORD,
 	  SDO(type),
-	  .default_value = NULL,
-	  .words = SDO_TYPE_WORDS,
-	  .prose = "Data type of the object; it determines the length." },
+	  .default_value = "AUTO",
+	  .words = SDO_TYPE_WORDS "|STRING|OCTETS|AUTO",
+	  .prose = "Data type of the object; it determines the length. AUTO: as the slave's object "
+		   "dictionary has it. Any other is compared with the dictionary, where the slave "
+		   "has one; OCTETS are not." },
 	{ .name = "slaves[].sdo[].value",
 	  .type = OPTION_TEXT,
 	  SDO(value),
 	  .default_value = NULL,
 	  .prose = "Value: a number in decimal or 0x hex, a float for REAL and LREAL, true or "
-		   "false for BOOL." },
+		   "false for BOOL, a text for STRING, bytes in hexadecimal for OCTETS." },
+	{ .name = "slaves[].sdo[].comment",
+	  .type = OPTION_TEXT,
+	  SDO(comment),
+	  .default_value = "",
+	  .prose = "What it is for; shown by `ecdaq config show`." },
 	/* slaves[].channels[] */
 	{ .name = "slaves[].channels[].match",
 	  .type = OPTION_TEXT,
@@ -219,7 +261,8 @@ static const struct option rows[] = {
 	  .type = OPTION_TEXT,
 	  OUTPUT(channel),
 	  .default_value = NULL,
-	  .prose = "Name of the output channel, as `ecdaq channels` lists it." },
+	  .prose = "Name of the output channel, as `ecdaq channels` lists it; in "
+		   "slaves[].outputs without the slave's." },
 	{ .name = "outputs[].owner",
 	  .type = OPTION_WORD,
 	  OUTPUT(owner),
@@ -233,6 +276,7 @@ static const struct option rows[] = {
 	  .default_value = "0",
 	  .min = "-1e300",
 	  .max = "1e300",
+	  .effect = CONFIG_EFFECT_NOW,
 	  .prose = "Physical value while the bus is not in OP or its owner is silent, and in place "
 		   "of a value that is not a number." },
 	{ .name = "outputs[].min",
@@ -241,6 +285,7 @@ static const struct option rows[] = {
 	  .default_value = "-inf",
 	  .min = "-inf",
 	  .max = "1e300",
+	  .effect = CONFIG_EFFECT_NOW,
 	  .prose = "Smallest physical value; a smaller one is limited to it." },
 	{ .name = "outputs[].max",
 	  .type = OPTION_NUMBER,
@@ -248,6 +293,7 @@ static const struct option rows[] = {
 	  .default_value = "inf",
 	  .min = "-1e300",
 	  .max = "inf",
+	  .effect = CONFIG_EFFECT_NOW,
 	  .prose = "Largest physical value; a larger one is limited to it." },
 	{ .name = "outputs[].timeout",
 	  .type = OPTION_DURATION,
@@ -256,6 +302,7 @@ static const struct option rows[] = {
 	  .min = "0s",
 	  .max = "1h",
 	  .unit = "ms",
+	  .effect = CONFIG_EFFECT_NOW,
 	  .prose = "Remote owners only: after this time without a heartbeat of the "
 		   "owner, the output goes to its fail-safe value. Rounded up to whole cycles. "
 		   "0s: never." },

@@ -8,12 +8,14 @@ static const struct option rows[] = {
 	  .type = OPTION_TEXT,
 	  FIELD(run_dir),
 	  .default_value = "",
+	  .effect = CONFIG_EFFECT_RESTART,
 	  .prose = "Directory on a tmpfs for rings, status pages and the admin socket. Empty: "
 		   "$ECDAQ_RUN_DIR, else /run/ecdaq for root, else /dev/shm/ecdaq-UID." },
 	{ .name = "runtime.group",
 	  .type = OPTION_TEXT,
 	  FIELD(group),
 	  .default_value = "",
+	  .effect = CONFIG_EFFECT_RESTART,
 	  .prose = "Group that may read the run directory: rings and status pages. Empty: "
 		   "`ecdaq-read` where that group exists and the daemon is in it, else the "
 		   "daemon's own group." },
@@ -21,6 +23,7 @@ static const struct option rows[] = {
 	  .type = OPTION_TEXT,
 	  FIELD(admin_group),
 	  .default_value = "",
+	  .effect = CONFIG_EFFECT_RESTART,
 	  .prose = "Group that may command the daemon through the admin socket: stop it, change "
 		   "states, write objects. Its members have to be in `runtime.group`, too. Empty: "
 		   "as there, with `ecdaq-admin`." },
@@ -28,6 +31,7 @@ static const struct option rows[] = {
 	  .type = OPTION_TEXT,
 	  FIELD(remote_group),
 	  .default_value = "",
+	  .effect = CONFIG_EFFECT_RESTART,
 	  .prose = "Group that may set outputs of owner remote: ecdaq-dds. Empty: as there, with "
 		   "`ecdaq-remote`." },
 	/* bus */
@@ -35,6 +39,7 @@ static const struct option rows[] = {
 	  .type = OPTION_TEXT,
 	  FIELD(interface),
 	  .default_value = "",
+	  .effect = CONFIG_EFFECT_RESTART,
 	  .prose = "Network interface of the EtherCAT segment. ecdaqd needs it here or as "
 		   "--interface." },
 	{ .name = "bus.esi_dir",
@@ -44,8 +49,9 @@ static const struct option rows[] = {
 	  .prose = "Folder of ESI files (*.xml) of the slaves' vendors. Read at each scan, for "
 		   "what a "
 		   "slave does not say itself: names of the device, of PDOs and entries, types, "
-		   "and the "
-		   "DC mode where its SII has none. A file that cannot be read is reported and "
+		   "units, and the "
+		   "DC mode where its SII has none; its start-up commands (InitCmd), also of its "
+		   "modules, and time-outs. A file that cannot be read is reported and "
 		   "passed "
 		   "over. Empty: none." },
 	{ .name = "bus.scan_timeout",
@@ -55,6 +61,7 @@ static const struct option rows[] = {
 	  .min = "100ms",
 	  .max = "5min",
 	  .unit = "s",
+	  .effect = CONFIG_EFFECT_NOW,
 	  .prose = "Time to search for slaves and to wait until all reach PRE-OP." },
 	{ .name = "bus.target",
 	  .type = OPTION_WORD,
@@ -71,6 +78,7 @@ static const struct option rows[] = {
 	  .min = "10ms",
 	  .max = "5min",
 	  .unit = "s",
+	  .effect = CONFIG_EFFECT_NOW,
 	  .prose = "Time a slave has for the answer to one mailbox message. A transfer of many "
 		   "messages may take longer." },
 	{ .name = "bus.op_timeout",
@@ -80,6 +88,7 @@ static const struct option rows[] = {
 	  .min = "100ms",
 	  .max = "5min",
 	  .unit = "s",
+	  .effect = CONFIG_EFFECT_NOW,
 	  .prose = "Timeout for all slaves, for each step from PRE-OP to OP." },
 	{ .name = "bus.frame_timeout",
 	  .type = OPTION_DURATION,
@@ -107,6 +116,7 @@ static const struct option rows[] = {
 	  .min = "1",
 	  .max = "1000",
 	  .unit = "cycles",
+	  .effect = CONFIG_EFFECT_NOW,
 	  .prose = "Number of cycles with a low WKC of the process data, consecutive or not, after "
 		   "which the service thread checks all slaves at once instead of at its next "
 		   "regular check (every 100 ms)." },
@@ -116,6 +126,7 @@ static const struct option rows[] = {
 	  .default_value = "10",
 	  .min = "1",
 	  .max = "1000000",
+	  .effect = CONFIG_EFFECT_NOW,
 	  .prose = "How often a slave that refuses a state, is late or falls back at once is "
 		   "brought to OP again, with pauses of 1, 2, 4 to 30 s. After that it is left "
 		   "alone until `ecdaq clear` or a power cycle. AL status codes 0x0030, 0x0035, "
@@ -156,6 +167,7 @@ static const struct option rows[] = {
 	  .min = "250us",
 	  .max = "10ms",
 	  .unit = "ms",
+	  .effect = CONFIG_EFFECT_RESTART,
 	  .prose = "Time between two process data frames; also the period of SYNC0." },
 	{ .name = "cycle.phase",
 	  .type = OPTION_NUMBER,
@@ -181,6 +193,7 @@ static const struct option rows[] = {
 	  .default_value = "-1",
 	  .min = "-1",
 	  .max = "1023",
+	  .effect = CONFIG_EFFECT_RESTART,
 	  .prose = "Isolated core that the cycle thread is pinned to. -1: not pinned." },
 	{ .name = "cycle.priority",
 	  .type = OPTION_UINT,
@@ -208,6 +221,7 @@ static const struct option rows[] = {
 	  .type = OPTION_SWITCH,
 	  FIELD(cycle_lock_memory),
 	  .default_value = "on",
+	  .effect = CONFIG_EFFECT_RESTART,
 	  .prose = "Lock all memory of ecdaqd (mlockall), so that the cycle never faults." },
 	{ .name = "cycle.cpu_dma_latency",
 	  .type = OPTION_INT,
@@ -216,6 +230,7 @@ static const struct option rows[] = {
 	  .min = "-1us",
 	  .max = "1s",
 	  .unit = "us",
+	  .effect = CONFIG_EFFECT_RESTART,
 	  .prose = "Longest wake-up latency that CPU idle states may have "
 		   "(/dev/cpu_dma_latency). -1us: unchanged." },
 	/* dc */
@@ -298,6 +313,7 @@ static const struct option rows[] = {
 	  .min = "100ms",
 	  .max = "10min",
 	  .unit = "s",
+	  .effect = CONFIG_EFFECT_NOW,
 	  .prose = "Timeout for the lock; OP is not requested without it." },
 	{ .name = "dc.burst_frames",
 	  .type = OPTION_UINT,
@@ -306,7 +322,8 @@ static const struct option rows[] = {
 	  .min = "0",
 	  .max = "1000000",
 	  .unit = "frames",
-	  .prose = "Frames of static drift compensation before the cycle starts." },
+	  .prose = "Frames of static drift compensation before the cycle starts, at most: it ends "
+		   "when 500 in a row read differences (0x092C) of a sixteenth of dc.diff_limit." },
 	{ .name = "dc.sync0_pulse",
 	  .type = OPTION_DURATION,
 	  FIELD(dc_sync0_pulse_ns),
@@ -357,6 +374,7 @@ static const struct option rows[] = {
 	  .type = OPTION_TEXT,
 	  FIELD(gateway_listen),
 	  .default_value = "off",
+	  .effect = CONFIG_EFFECT_RESTART,
 	  .prose =
 		  "Mailbox gateway for configuration tools. off: none. loopback: on 127.0.0.1, for "
 		  "every program of this machine. An IPv4 or IPv6 address of this machine: for "
@@ -367,6 +385,7 @@ static const struct option rows[] = {
 	  .default_value = "34980",
 	  .min = "1",
 	  .max = "65535",
+	  .effect = CONFIG_EFFECT_RESTART,
 	  .prose = "UDP and TCP port of the mailbox gateway. 34980 (0x88A4) is the one that tools "
 		   "expect." },
 	/* eoe */
@@ -374,6 +393,7 @@ static const struct option rows[] = {
 	  .type = OPTION_NAME,
 	  FIELD(eoe_interface),
 	  .default_value = "",
+	  .effect = CONFIG_EFFECT_RESTART,
 	  .prose = "TAP device of this machine that is switched to all slaves with EoE. One that "
 		   "does not exist is created if ecdaqd may do so (CAP_NET_ADMIN). Empty: EoE "
 		   "frames of slaves are dropped." },
@@ -394,6 +414,7 @@ static const struct option rows[] = {
 	  .min = "64",
 	  .max = "1048576",
 	  .unit = "events",
+	  .effect = CONFIG_EFFECT_RESTART,
 	  .prose = "Size of the event ring." },
 };
 

@@ -16,6 +16,26 @@ static const char *const owner_names[] = {
 	[CONFIG_OWNER_REMOTE] = "remote",
 };
 
+static int is_item(const struct config_output *output, unsigned slave_pos, size_t item)
+{
+	return output->slave_pos == slave_pos && output->item == item;
+}
+
+const struct config_output *config_output_at(const struct config *cfg, unsigned slave_pos,
+					     size_t item)
+{
+	/* Mostly there is one list, and its items are in their places. */
+	if (item < cfg->output_count && is_item(&cfg->output[item], slave_pos, item)) {
+		return &cfg->output[item];
+	}
+	for (size_t i = 0; i < cfg->output_count; i++) {
+		if (is_item(&cfg->output[i], slave_pos, item)) {
+			return &cfg->output[i];
+		}
+	}
+	return NULL;
+}
+
 const struct config_output *config_output_find(const struct config *cfg, const char *channel)
 {
 	for (size_t i = 0; i < cfg->output_count; i++) {

@@ -10,6 +10,11 @@
 #include "base/sample.h"
 #include "config/config.h"
 
+/** Item @item of the list outputs[], or of slaves[@slave_pos].outputs[]; NULL. CONFIG_NO_SLAVE: of
+ * outputs[]. */
+const struct config_output *config_output_at(const struct config *cfg, unsigned slave_pos,
+					     size_t item);
+
 /** The rules of the output @channel. NULL: none configured, which means owner local and no limits.
  */
 const struct config_output *config_output_find(const struct config *cfg, const char *channel);

@@ -60,28 +60,33 @@ static void write_default(const struct option *option, FILE *out)
 	}
 }
 
-static void write_rows(const char *prefix, FILE *out)
+/* The options below @prefix, with their names below @shown. */
+static void write_rows(const char *prefix, const char *shown, FILE *out)
 {
-	fputs("\n| option | default | range | plain number in | what it is |\n"
-	      "| --- | --- | --- | --- | --- |\n",
+	fputs("\n| option | default | range | plain number in | takes effect | what it is |\n"
+	      "| --- | --- | --- | --- | --- | --- |\n",
 	      out);
 	for (size_t i = 0; i < option_count(); i++) {
 		const struct option *option = option_at(i);
 
-		if (name_under(option, prefix) == NULL) {
+		const char *name = name_under(option, prefix);
+
+		if (name == NULL) {
 			continue;
 		}
-		fprintf(out, "| `%s` | ", option->name);
+		fprintf(out, "| `%s%s` | ", shown, name);
 		write_default(option, out);
 		fputs(" | ", out);
 		write_range(option, out);
-		fprintf(out, " | %s | %s |\n", option->unit, option->prose);
+		fprintf(out, " | %s | %s | %s |\n", option->unit,
+			config_effect_to_str((uint32_t)option->effect), option->prose);
 	}
 }
 
 void pages_write_reference(FILE *out)
 {
 	char prefix[OPTION_KEY_BYTES];
+	char shown[OPTION_KEY_BYTES];
 
 	fputs("# Options of ecdaq.yaml\n\n"
 	      "Generated from the option table (`app/core/config/options.c`) by `ecdaq-options "
@@ -93,22 +98,28 @@ void pages_write_reference(FILE *out)
 	      "us, ms, s,\n"
 	      "min, h and d; sizes take B, kB, MB, GB, TB, KiB, MiB, GiB and TiB. A plain number "
 	      "is in the\n"
-	      "unit of the fifth column. Switches take on and off (also true, false, yes, no).\n\n"
+	      "unit of the fourth column. Switches take on and off (also true, false, yes, no).\n\n"
 	      "A mistake in the file is one line, `FILE:LINE: option: why`, and nothing of the "
 	      "file is used.\n"
 	      "On a command line the same options are set one by one: `cycle.period=500us`,\n"
-	      "`slaves[0].mode=oneshot`.\n",
+	      "`slaves[0].mode=oneshot`.\n\n"
+	      "`ecdaq config reload`, or SIGHUP to `ecdaqd`, reads the file again. \"takes "
+	      "effect\" says when\n"
+	      "another value does: `at once`; at the next `rescan`, as every other bring-up; or "
+	      "after a `restart`\n"
+	      "of the program that uses it.\n",
 	      out);
 	for (size_t i = 0; i < option_section_count; i++) {
 		fprintf(out, "\n## %s\n\n%s\n", option_sections[i].name, option_sections[i].prose);
 		snprintf(prefix, sizeof(prefix), "%s.", option_sections[i].name);
-		write_rows(prefix, out);
+		write_rows(prefix, prefix, out);
 	}
 	for (int i = 0; i < OPTION_LISTS; i++) {
 		fprintf(out, "\n## %s[]\n\n%s At most %zu (`%s`).\n", option_lists[i].name,
 			option_lists[i].prose, option_lists[i].limit, option_lists[i].limit_name);
-		snprintf(prefix, sizeof(prefix), "%s[].", option_lists[i].name);
-		write_rows(prefix, out);
+		option_list_prefix(&option_lists[i], prefix);
+		snprintf(shown, sizeof(shown), "%s[].", option_lists[i].name);
+		write_rows(prefix, shown, out);
 	}
 }
 
@@ -184,13 +195,17 @@ static void write_example(const char *prefix, const char *indent, FILE *out)
 	} examples[] = {
 		{ "slaves[].sync0_line", "pinctrl-bcm2711:17" },
 		{ "slaves[].name", "piccolo0" },
+		{ "slaves[].group", "front" },
 		{ "slaves[].vendor", "0x00000002" },
 		{ "slaves[].product", "0x04570862" },
 		{ "slaves[].mode", "periodic" },
+		{ "slaves[].pdos[].pdo", "0x1a01" },
+		{ "slaves[].pdos[].entries", "0x6000:11 16, gap 8" },
 		{ "slaves[].sdo[].index", "0x8000" },
 		{ "slaves[].sdo[].subindex", "2" },
 		{ "slaves[].sdo[].type", "UINT" },
 		{ "slaves[].sdo[].value", "10" },
+		{ "slaves[].sdo[].comment", "refresh time" },
 		{ "slaves[].channels[].match", "adc" },
 		{ "slaves[].channels[].name", "pressure" },
 		{ "slaves[].channels[].unit", "bar" },
@@ -235,12 +250,17 @@ void pages_write_sample(FILE *out)
 	write_comment("#", option_lists[OPTION_LIST_SLAVES].prose, out);
 	fputs("#slaves:\n", out);
 	write_example("slaves[].", "  ", out);
+	write_comment("#    #", option_lists[OPTION_LIST_PDOS].prose, out);
+	fputs("#    pdos:\n", out);
+	write_example("slaves[].pdos[].", "      ", out);
 	write_comment("#    #", option_lists[OPTION_LIST_SDOS].prose, out);
 	fputs("#    sdo:\n", out);
 	write_example("slaves[].sdo[].", "      ", out);
 	write_comment("#    #", option_lists[OPTION_LIST_CHANNELS].prose, out);
 	fputs("#    channels:\n", out);
 	write_example("slaves[].channels[].", "      ", out);
+	write_comment("#    #", option_lists[OPTION_LIST_SLAVE_OUTPUTS].prose, out);
+	fputs("#    outputs: []\n", out);
 	fputc('\n', out);
 	write_comment("#", option_lists[OPTION_LIST_OUTPUTS].prose, out);
 	fputs("#outputs:\n", out);

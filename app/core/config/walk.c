@@ -6,6 +6,8 @@
 #include <string.h>
 #include <strings.h>
 
+#include "config/startup.h"
+
 /* Place of a mapping in the file's structure. */
 struct scope {
 	const char *pattern; /* "", "cycle.", "slaves[]." */
@@ -164,6 +166,37 @@ static int read_slave(struct walk *walk, const yaml_node_t *node, unsigned index
 	return read_item(walk, &scope, node);
 }
 
+/* The short form: its parts are options, as if each had a line of its own. */
+static int read_sdo_line(struct walk *walk, const struct scope *scope, const yaml_node_t *node)
+{
+	struct startup_line line;
+	char reason[OPTION_WHY_BYTES] = "";
+	char key[OPTION_KEY_BYTES];
+
+	snprintf(key, sizeof(key), "%.*s", (int)strlen(scope->shown) - 1, scope->shown);
+	if (strlen(text_of(node)) != node->data.scalar.length) {
+		return walk_fail(walk, line_of(node), key, "contains a control character");
+	}
+	if (startup_line_cut(text_of(node), &line, reason) < 0) {
+		return walk_fail(walk, line_of(node), key, reason);
+	}
+	option_fill_defaults(scope->pattern, scope->base);
+	for (unsigned i = 0; i < line.count; i++) {
+		const struct startup_field *field = &line.field[i];
+		const struct option *option;
+
+		snprintf(key, sizeof(key), "%s%s", scope->pattern, field->name);
+		option = option_find(key);
+		snprintf(key, sizeof(key), "%s%s", scope->shown, field->name);
+		if (option_parse(option, field->text, scope->base, reason) < 0) {
+			return walk_fail(walk, line_of(node), key, reason);
+		}
+		walk->lines.line[option_place(option)] = line_of(node);
+		note(walk, key, field->text, line_of(node));
+	}
+	return 0;
+}
+
 static int read_sdo(struct walk *walk, const yaml_node_t *node, unsigned slave, unsigned index)
 {
 	struct option_sdo item = { .value_line = 0 };
@@ -171,23 +204,68 @@ static int read_sdo(struct walk *walk, const yaml_node_t *node, unsigned slave, 
 	char reason[OPTION_WHY_BYTES] = "";
 	char shown[48];
 	struct scope scope = { .pattern = "slaves[].sdo[].", .shown = shown, .base = &item };
+	const char *fault;
 	int r;
 
 	snprintf(shown, sizeof(shown), "slaves[%u].sdo[%u].", slave, index);
-	r = read_item(walk, &scope, node);
+	r = node->type == YAML_SCALAR_NODE && !is_null(node) ? read_sdo_line(walk, &scope, node)
+							     : read_item(walk, &scope, node);
 	if (r < 0) {
 		return r;
 	}
+	memset(sdo, 0, sizeof(*sdo));
 	sdo->slave_pos = (uint16_t)slave;
 	sdo->line = line_of(node);
-	if (option_sdo_finish(&item, sdo, reason) < 0) {
-		const struct option *value = option_find("slaves[].sdo[].value");
+	if (option_sdo_finish(&item, walk->cfg, sdo, &fault, reason) < 0) {
 		char key[64];
+		int line;
 
-		snprintf(key, sizeof(key), "%svalue", shown);
-		return walk_fail(walk, walk->lines.line[option_place(value)], key, reason);
+		snprintf(key, sizeof(key), "slaves[].sdo[].%s", fault);
+		line = walk->lines.line[option_place(option_find(key))];
+		snprintf(key, sizeof(key), "%s%s", shown, fault);
+		return walk_fail(walk, line, key, reason);
 	}
 	walk->cfg->sdo_count++;
+	return 0;
+}
+
+/* An item that is nothing but the PDO. */
+static int read_pdo_line(struct walk *walk, const struct scope *scope, const yaml_node_t *node)
+{
+	const struct option *option = option_find("slaves[].pdos[].pdo");
+	char key[OPTION_KEY_BYTES];
+
+	option_fill_defaults(scope->pattern, scope->base);
+	snprintf(key, sizeof(key), "%spdo", scope->shown);
+	return read_scalar(walk, scope, option, key, node);
+}
+
+static int read_pdo(struct walk *walk, const yaml_node_t *node, unsigned slave, unsigned index)
+{
+	struct option_pdo item;
+	struct config_pdo *pdo = &walk->cfg->pdo[walk->cfg->pdo_count];
+	char reason[OPTION_WHY_BYTES] = "";
+	char shown[48];
+	struct scope scope = { .pattern = "slaves[].pdos[].", .shown = shown, .base = &item };
+	const char *fault;
+	int r;
+
+	snprintf(shown, sizeof(shown), "slaves[%u].pdos[%u].", slave, index);
+	r = node->type == YAML_SCALAR_NODE && !is_null(node) ? read_pdo_line(walk, &scope, node)
+							     : read_item(walk, &scope, node);
+	if (r < 0) {
+		return r;
+	}
+	memset(pdo, 0, sizeof(*pdo));
+	pdo->slave_pos = (uint16_t)slave;
+	pdo->line = line_of(node);
+	if (option_pdo_finish(&item, walk->cfg, pdo, &fault, reason) < 0) {
+		char key[64];
+
+		snprintf(key, sizeof(key), "%s%s", shown, fault);
+		return walk_fail(walk, pdo->line, key, reason);
+	}
+	walk->cfg->pdo_count++;
 	return 0;
 }
 
@@ -211,25 +289,30 @@ static int read_channel(struct walk *walk, const yaml_node_t *node, unsigned sla
 	return 0;
 }
 
-static int read_output(struct walk *walk, const yaml_node_t *node, unsigned index)
+/* Of outputs[], or of slaves[].outputs[]: the same options. */
+static int read_output(struct walk *walk, const struct scope *list, const yaml_node_t *node,
+		       unsigned index)
 {
-	struct config_output *output = &walk->cfg->output[index];
-	char shown[32];
+	struct config_output *output = &walk->cfg->output[walk->cfg->output_count++];
+	char shown[64];
 	struct scope scope = { .pattern = "outputs[].", .shown = shown, .base = output };
 
-	snprintf(shown, sizeof(shown), "outputs[%u].", index);
+	snprintf(shown, sizeof(shown), "%soutputs[%u].", list->shown, index);
 	memset(output, 0, sizeof(*output));
+	output->slave_pos = list->base == walk->cfg ? CONFIG_NO_SLAVE : (uint16_t)list->slave;
+	output->item = (uint16_t)index;
 	output->line = line_of(node);
-	walk->cfg->output_count = index + 1;
 	return read_item(walk, &scope, node);
 }
 
-/* Items of list @id so far: those of slaves[] share one bound. */
+/* Items of list @id so far: those inside slaves[] share one bound, and with outputs[], too. */
 static size_t used_of(const struct config *cfg, enum option_list_id id, size_t index)
 {
 	return id == OPTION_LIST_SDOS       ? cfg->sdo_count
+	       : id == OPTION_LIST_PDOS     ? cfg->pdo_count
 	       : id == OPTION_LIST_CHANNELS ? cfg->channel_count
-					    : index;
+	       : id == OPTION_LIST_SLAVES   ? index
+					    : cfg->output_count;
 }
 
 static int read_list(struct walk *walk, const struct scope *scope, enum option_list_id id,
@@ -262,14 +345,18 @@ static int read_list(struct walk *walk, const struct scope *scope, enum option_l
 		case OPTION_LIST_SLAVES:
 			r = read_slave(walk, item, index);
 			break;
+		case OPTION_LIST_PDOS:
+			r = read_pdo(walk, item, scope->slave, index);
+			break;
 		case OPTION_LIST_SDOS:
 			r = read_sdo(walk, item, scope->slave, index);
 			break;
 		case OPTION_LIST_CHANNELS:
 			r = read_channel(walk, item, scope->slave, index);
 			break;
+		case OPTION_LIST_SLAVE_OUTPUTS:
 		case OPTION_LIST_OUTPUTS:
-			r = read_output(walk, item, index);
+			r = read_output(walk, scope, item, index);
 			break;
 		case OPTION_LISTS:
 			break;
@@ -429,6 +516,35 @@ static int add_fault(void *ctx, const char *key, int line, const char *reason)
 	return !goes_on(walk);
 }
 
+/* Outputs beside their slave get the names of their channels. */
+static void name_outputs(struct walk *walk)
+{
+	static const char key[] = "slaves[].outputs[].channel";
+	char reason[OPTION_WHY_BYTES];
+
+	for (size_t i = 0; i < walk->cfg->output_count && (walk->problems == 0 || goes_on(walk));
+	     i++) {
+		struct config_output *output = &walk->cfg->output[i];
+		const char *slave;
+		char name[sizeof(walk->cfg->slave[0].name) + LIMIT_NAME_BYTES];
+
+		if (output->slave_pos == CONFIG_NO_SLAVE || output->channel[0] == '\0') {
+			continue;
+		}
+		slave = walk->cfg->slave[output->slave_pos].name;
+		snprintf(name, sizeof(name), "%s.%s", slave, output->channel);
+		if (slave[0] == '\0') {
+			walk_fail(walk, output->line, key, "requires slaves[].name");
+		} else if (strlen(name) >= LIMIT_NAME_BYTES) {
+			snprintf(reason, sizeof(reason), "%s is longer than %d characters", name,
+				 LIMIT_NAME_BYTES - 1);
+			walk_fail(walk, output->line, key, reason);
+		} else {
+			memcpy(output->channel, name, strlen(name) + 1);
+		}
+	}
+}
+
 int walk_finish(struct walk *walk)
 {
 	for (size_t i = 0; i < walk->set_count && (walk->problems == 0 || goes_on(walk)); i++) {
@@ -438,6 +554,9 @@ int walk_finish(struct walk *walk)
 			forget_line(walk, walk->set[i]);
 			note_set(walk, walk->set[i]);
 		}
+	}
+	if (walk->problems == 0) {
+		name_outputs(walk);
 	}
 	if (walk->problems == 0) {
 		option_cross_check(walk->cfg, &walk->lines,

@@ -9,51 +9,20 @@
 
 /* --- lists --- */
 
-enum { ROWS_FIRST = 8 };
-
-struct limit {
-	size_t rows;
-	const char *what;
-};
-
-/* @array with one more than @count rows of @bytes, which is zeroed; NULL: refused with a line. It
- * has room for the next power of two. */
-static void *grow(struct esi_reader *rd, void *array, size_t *count, size_t bytes,
-		  struct limit limit)
-{
-	if (*count == limit.rows) {
-		xml_fail(rd->xml, "more than %zu %s", limit.rows, limit.what);
-		return NULL;
-	}
-	if (*count == 0 || (*count >= ROWS_FIRST && (*count & (*count - 1)) == 0)) {
-		size_t rows = *count == 0 ? ROWS_FIRST : 2 * *count;
-		void *moved = realloc(array, rows * bytes);
-
-		if (moved == NULL) {
-			xml_fail(rd->xml, "out of memory");
-			return NULL;
-		}
-		array = moved;
-	}
-	memset((uint8_t *)array + *count * bytes, 0, bytes);
-	(*count)++;
-	return array;
-}
-
 /* The new row of a list of the device; it stays as it was where NULL comes. */
 #define GROW(rd, list, max, what)                                                                  \
-	grow((rd), (rd)->device->list, &(rd)->device->list##_count, sizeof(*(rd)->device->list),   \
-	     (struct limit){ (max), (what) })
+	xml_grow((rd)->xml, (rd)->device->list, &(rd)->device->list##_count,                       \
+		 sizeof(*(rd)->device->list), (struct xml_limit){ (max), (what) })
 
 /* --- attributes --- */
 
 /* @ret_value is left alone where there is none. */
 static int number_of(struct esi_reader *rd, const char **attribute, const char *name,
-		     struct esi_range range, int64_t *ret_value)
+		     struct xml_range range, int64_t *ret_value)
 {
 	const char *text = xml_attribute(attribute, name);
 
-	return text == NULL ? 0 : esi_number(rd->xml, name, text, range, ret_value);
+	return text == NULL ? 0 : xml_number(rd->xml, name, text, range, ret_value);
 }
 
 static int is_set(const char **attribute, const char *name)
@@ -90,14 +59,14 @@ static int begin_device(struct esi_reader *rd, enum esi_kind kind, const char **
 	rd->device->id = (struct esi_identity){ .kind = kind, .vendor = rd->vendor };
 	rd->device->line = xml_line(rd->xml);
 	memcpy(rd->device->vendor_name, rd->vendor_name, sizeof(rd->vendor_name));
-	esi_text(physics == NULL ? "" : physics, rd->device->physics, sizeof(rd->device->physics));
+	xml_plain(physics == NULL ? "" : physics, rd->device->physics, sizeof(rd->device->physics));
 	return 0;
 }
 
 /* Here it shows whether the device is wanted: if not, it becomes an element like any other. */
 static int begin_type(struct esi_reader *rd, const char **attribute)
 {
-	static const struct esi_range any = { 0, UINT32_MAX };
+	static const struct xml_range any = { 0, UINT32_MAX };
 	struct esi_identity *id = &rd->device->id;
 	int64_t product = 0;
 	int64_t revision = 0;
@@ -125,8 +94,8 @@ static int begin_type(struct esi_reader *rd, const char **attribute)
 
 static int begin_sm(struct esi_reader *rd, const char **attribute)
 {
-	static const struct esi_range octet = { 0, UINT8_MAX };
-	static const struct esi_range word = { 0, UINT16_MAX };
+	static const struct xml_range octet = { 0, UINT8_MAX };
+	static const struct xml_range word = { 0, UINT16_MAX };
 	struct esi_device *device = rd->device;
 	int64_t start = 0;
 	int64_t bytes = 0;
@@ -152,7 +121,7 @@ static int begin_sm(struct esi_reader *rd, const char **attribute)
 
 static int begin_pdo(struct esi_reader *rd, int is_tx, const char **attribute)
 {
-	static const struct esi_range range = { 0, ESI_LIMIT_SM - 1 };
+	static const struct xml_range range = { 0, ESI_LIMIT_SM - 1 };
 	struct esi_pdo *pdo = GROW(rd, pdo, ESI_LIMIT_PDOS, "PDOs of a device");
 	int64_t sm = ESI_NO_SM;
 	int r;
@@ -219,7 +188,7 @@ static int begin_command(struct esi_reader *rd, const char **attribute)
 
 static int begin_cycle(struct esi_reader *rd, const char **attribute, int16_t *ret_factor)
 {
-	static const struct esi_range range = { INT16_MIN, INT16_MAX };
+	static const struct xml_range range = { INT16_MIN, INT16_MAX };
 	int64_t factor = 0;
 	int r = number_of(rd, attribute, "Factor", range, &factor);
 
@@ -229,7 +198,7 @@ static int begin_cycle(struct esi_reader *rd, const char **attribute, int16_t *r
 
 static int begin_slots(struct esi_reader *rd, const char **attribute)
 {
-	static const struct esi_range word = { 0, UINT16_MAX };
+	static const struct xml_range word = { 0, UINT16_MAX };
 	int64_t pdos = 0;
 	int64_t objects = 0;
 	int r = number_of(rd, attribute, "SlotPdoIncrement", word, &pdos);
@@ -242,10 +211,12 @@ static int begin_slots(struct esi_reader *rd, const char **attribute)
 
 static int begin_slot(struct esi_reader *rd, const char **attribute)
 {
-	static const struct esi_range range = { 0, UINT16_MAX };
+	static const struct xml_range range = { 0, UINT16_MAX };
 	struct esi_slot *slot = GROW(rd, slot, ESI_LIMIT_SLOTS, "slots of a device");
 	int64_t min = 0;
 	int64_t max = 0;
+	int64_t pdos = rd->device->slot_pdo_increment;
+	int64_t objects = rd->device->slot_index_increment;
 	int r;
 
 	if (slot == NULL) {
@@ -255,15 +226,19 @@ static int begin_slot(struct esi_reader *rd, const char **attribute)
 	slot += rd->device->slot_count - 1;
 	r = number_of(rd, attribute, "MinInstances", range, &min);
 	r = r < 0 ? r : number_of(rd, attribute, "MaxInstances", range, &max);
+	r = r < 0 ? r : number_of(rd, attribute, "SlotPdoIncrement", range, &pdos);
+	r = r < 0 ? r : number_of(rd, attribute, "SlotIndexIncrement", range, &objects);
 	slot->min = (uint32_t)min;
 	slot->max = (uint32_t)max;
+	slot->pdo_increment = (uint16_t)pdos;
+	slot->index_increment = (uint16_t)objects;
 	return r;
 }
 
 static int begin_group(struct esi_reader *rd)
 {
-	struct esi_group *group = grow(rd, rd->group, &rd->group_count, sizeof(*group),
-				       (struct limit){ ESI_LIMIT_GROUPS, "groups" });
+	struct esi_group *group = xml_grow(rd->xml, rd->group, &rd->group_count, sizeof(*group),
+					   (struct xml_limit){ ESI_LIMIT_GROUPS, "groups" });
 
 	if (group == NULL) {
 		return -EBADMSG;
@@ -288,6 +263,51 @@ static int begin_info(struct esi_reader *rd)
 	rd->vendor_name[0] = '\0';
 	rd->group_count = 0;
 	return 0;
+}
+
+static int begin_dictionary(struct esi_reader *rd, enum esi_node node)
+{
+	struct esi_dictionary *dict = &rd->dictionary;
+
+	if (node == ESI_NODE_DICTIONARY) {
+		esi_dictionary_free(dict); /* of another profile, or device */
+	}
+	if (node == ESI_NODE_UNIT_TYPE) {
+		return esi_dictionary_unit_type(rd->xml, dict);
+	}
+	if (node == ESI_NODE_DATA_TYPE) {
+		return esi_dictionary_type(rd->xml, dict);
+	}
+	if (node == ESI_NODE_PART) {
+		return esi_dictionary_part(rd->xml, dict);
+	}
+	if (node == ESI_NODE_PART_SUBINDEX) {
+		dict->part[dict->part_count - 1].has_subindex = 1;
+	}
+	if (node == ESI_NODE_OBJECT) {
+		esi_dictionary_object(dict);
+	}
+	return node == ESI_NODE_OBJECT_PART ? esi_dictionary_object_part(rd->xml, dict) : 0;
+}
+
+/* Of a module: the index is that of the first slot, the others have it further up. */
+static void note_slot(struct esi_reader *rd, enum esi_node node, const char **attribute)
+{
+	struct esi_device *device = rd->device;
+	uint8_t depends = (uint8_t)is_set(attribute, "DependOnSlot");
+
+	if (node == ESI_NODE_PDO_INDEX) {
+		device->pdo[device->pdo_count - 1].depends_on_slot = depends;
+	}
+	if (node == ESI_NODE_ENTRY_INDEX) {
+		device->entry[device->entry_count - 1].depends_on_slot = depends;
+	}
+	if (node == ESI_NODE_COMMAND_INDEX) {
+		device->command[device->command_count - 1].depends_on_slot = depends;
+	}
+	if (node == ESI_NODE_OBJECT_INDEX) {
+		rd->dictionary.object.depends_on_slot = depends;
+	}
 }
 
 /* Those with attributes or of which there are several. The names of all others are enough. */
@@ -332,7 +352,7 @@ static int begin_node(struct esi_reader *rd, enum esi_node node, const char **at
 	if (node == ESI_NODE_SLOTS) {
 		return begin_slots(rd, attribute);
 	}
-	return node == ESI_NODE_SLOT ? begin_slot(rd, attribute) : 0;
+	return node == ESI_NODE_SLOT ? begin_slot(rd, attribute) : begin_dictionary(rd, node);
 }
 
 static void note_mailbox(struct esi_reader *rd, enum esi_node node, const char **attribute)
@@ -362,5 +382,6 @@ static void note_mailbox(struct esi_reader *rd, enum esi_node node, const char *
 int esi_begin(struct esi_reader *rd, enum esi_node node, const char **attribute)
 {
 	note_mailbox(rd, node, attribute);
+	note_slot(rd, node, attribute);
 	return begin_node(rd, node, attribute);
 }

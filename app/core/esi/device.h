@@ -6,6 +6,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "wire/coe_unit.h"
+
 enum esi_limits {
 	ESI_NAME_BYTES = 96,
 	ESI_LIMIT_SM = 16,
@@ -17,6 +19,8 @@ enum esi_limits {
 	ESI_LIMIT_COMMANDS = 1024,
 	ESI_LIMIT_COMMAND_BYTES = 1024,
 	ESI_LIMIT_SLOTS = 256,
+	ESI_LIMIT_TYPES = 16384,   /* data types of one dictionary */
+	ESI_LIMIT_OBJECTS = 65536, /* its entries, and all parts of the types */
 	ESI_LIMIT_GROUPS = 512,    /* of one file */
 	ESI_LIMIT_DEVICES = 65536, /* of one file, with the modules */
 	ESI_NO_SM = -1,
@@ -35,6 +39,7 @@ struct esi_identity {
 struct esi_entry {
 	uint16_t index; /* 0: padding */
 	uint8_t subindex;
+	uint8_t depends_on_slot; /* of a module: @index is that of the first slot */
 	uint16_t bits;
 	uint16_t type;      /* ETG.1020; 0: none, or one of the device's own */
 	char type_name[32]; /* as the file has it */
@@ -47,12 +52,23 @@ struct esi_pdo {
 	uint8_t is_tx; /* TxPDO: inputs of the master */
 	uint8_t is_fixed;
 	uint8_t is_mandatory;
+	uint8_t depends_on_slot; /* as of an entry */
 	char name[ESI_NAME_BYTES];
 	uint16_t exclude[ESI_LIMIT_EXCLUDES]; /* PDOs that it cannot be assigned with */
 	size_t exclude_count;
 	size_t first; /* of its entries */
 	size_t count;
 	uint32_t bits;
+};
+
+/* An entry of the object dictionary. */
+struct esi_object {
+	uint16_t index;
+	uint8_t subindex;
+	uint8_t depends_on_slot;   /* as of an entry of a PDO */
+	uint16_t type;             /* as of an entry of a PDO */
+	char unit[COE_UNIT_BYTES]; /* "": none */
+	char name[ESI_NAME_BYTES];
 };
 
 struct esi_sm {
@@ -90,6 +106,7 @@ struct esi_command {
 	uint8_t transitions; /* enum esi_transition */
 	uint8_t is_complete_access;
 	uint8_t is_fixed;
+	uint8_t depends_on_slot; /* as of an entry of a PDO */
 	uint16_t index;
 	uint8_t subindex;
 	uint16_t len;
@@ -97,11 +114,14 @@ struct esi_command {
 	char comment[ESI_NAME_BYTES];
 };
 
+/* One <Slot>: up to @max slots, one after the other. */
 struct esi_slot {
 	char name[ESI_NAME_BYTES];
 	uint32_t min;
 	uint32_t max;
-	uint32_t module; /* first ModuleIdent that fits it; 0: none is named */
+	uint16_t pdo_increment;   /* from a slot to the next one */
+	uint16_t index_increment; /* the same, of other objects */
+	uint32_t module;          /* first ModuleIdent that fits it; 0: none is named */
 	uint32_t module_count;
 };
 
@@ -142,6 +162,8 @@ struct esi_device {
 	size_t pdo_count;
 	struct esi_entry *entry;
 	size_t entry_count;
+	struct esi_object *object;
+	size_t object_count;
 	struct esi_command *command;
 	size_t command_count;
 	uint16_t slot_pdo_increment;
@@ -165,6 +187,29 @@ void esi_device_free(struct esi_device *device);
 
 /** The PDO of that index; NULL. */
 const struct esi_pdo *esi_find_pdo(const struct esi_device *device, uint16_t index);
+/* By how much the indexes of a module are further up in its slot than in the first one; of a
+ * device: 0. */
+struct esi_shift {
+	uint16_t pdos;
+	uint16_t objects;
+};
+
+/* What a description says of a mapped entry; "" and 0: nothing. */
+struct esi_known {
+	const char *pdo_name;
+	const char *name;
+	const char *unit;
+	uint16_t type;
+};
+
+/** Of the entry @index:@subindex in PDO @pdo of the slave: by the PDOs, then by the dictionary. */
+struct esi_known esi_find_known(const struct esi_device *device, struct esi_shift shift,
+				uint16_t pdo, uint16_t index, uint8_t subindex);
+/** What describes slot @number, from 0; NULL: it has fewer. */
+const struct esi_slot *esi_find_slot(const struct esi_device *device, unsigned number);
+/** An entry of the object dictionary; NULL. */
+const struct esi_object *esi_find_object(const struct esi_device *device, uint16_t index,
+					 uint8_t subindex);
 /** An entry of any PDO, of @pdo first (0: of none); NULL. */
 const struct esi_entry *esi_find_entry(const struct esi_device *device, uint16_t pdo,
 				       uint16_t index, uint8_t subindex);

@@ -9,6 +9,7 @@
 static void *base_of(struct esi_reader *rd, enum esi_base base)
 {
 	struct esi_device *device = rd->device;
+	struct esi_dictionary *dict = &rd->dictionary;
 
 	switch (base) {
 	case ESI_BASE_DEVICE:
@@ -23,6 +24,16 @@ static void *base_of(struct esi_reader *rd, enum esi_base base)
 		return &device->command[device->command_count - 1];
 	case ESI_BASE_SLOT:
 		return &device->slot[device->slot_count - 1];
+	case ESI_BASE_UNIT_TYPE:
+		return &dict->unit_type[dict->unit_type_count - 1];
+	case ESI_BASE_DATA_TYPE:
+		return &dict->type[dict->type_count - 1];
+	case ESI_BASE_PART:
+		return &dict->part[dict->part_count - 1];
+	case ESI_BASE_OBJECT:
+		return &dict->object;
+	case ESI_BASE_OBJECT_PART:
+		return &dict->object_part[dict->object_part_count - 1];
 	}
 	return NULL;
 }
@@ -58,10 +69,10 @@ static void end_sm(struct esi_reader *rd, const char *text)
 
 static int end_exclude(struct esi_reader *rd, const char *text)
 {
-	static const struct esi_range word = { 0, UINT16_MAX };
+	static const struct xml_range word = { 0, UINT16_MAX };
 	struct esi_pdo *pdo = &rd->device->pdo[rd->device->pdo_count - 1];
 	int64_t index = 0;
-	int r = esi_number(rd->xml, "Exclude", text, word, &index);
+	int r = xml_number(rd->xml, "Exclude", text, word, &index);
 
 	if (r == 0 && pdo->exclude_count == ESI_LIMIT_EXCLUDES) {
 		return xml_fail(rd->xml, "more than %d PDOs excluded by one", ESI_LIMIT_EXCLUDES);
@@ -92,10 +103,10 @@ static void end_transition(struct esi_reader *rd, const char *text)
 
 static int end_slot_module(struct esi_reader *rd, const char *text)
 {
-	static const struct esi_range any = { 0, UINT32_MAX };
+	static const struct xml_range any = { 0, UINT32_MAX };
 	struct esi_slot *slot = &rd->device->slot[rd->device->slot_count - 1];
 	int64_t ident = 0;
-	int r = esi_number(rd->xml, "ModuleIdent", text, any, &ident);
+	int r = xml_number(rd->xml, "ModuleIdent", text, any, &ident);
 
 	if (r == 0 && slot->module_count++ == 0) {
 		slot->module = (uint32_t)ident;
@@ -106,15 +117,15 @@ static int end_slot_module(struct esi_reader *rd, const char *text)
 static void end_vendor_name(struct esi_reader *rd, const char *text)
 {
 	if (rd->vendor_name[0] == '\0' || rd->is_name_preferred) {
-		esi_text(text, rd->vendor_name, sizeof(rd->vendor_name));
+		xml_plain(text, rd->vendor_name, sizeof(rd->vendor_name));
 	}
 }
 
 static int end_vendor_id(struct esi_reader *rd, const char *text)
 {
-	static const struct esi_range any = { 1, UINT32_MAX };
+	static const struct xml_range any = { 1, UINT32_MAX };
 	int64_t vendor = 0;
-	int r = esi_number(rd->xml, "Id", text, any, &vendor);
+	int r = xml_number(rd->xml, "Id", text, any, &vendor);
 
 	if (r == 0) {
 		rd->vendor = (uint32_t)vendor;
@@ -128,7 +139,7 @@ static void end_group_text(struct esi_reader *rd, enum esi_node node, const char
 	char *name = node == ESI_NODE_GROUP_TYPE ? group->type : group->name;
 
 	if (name[0] == '\0' || rd->is_name_preferred) {
-		esi_text(text, name, ESI_NAME_BYTES);
+		xml_plain(text, name, ESI_NAME_BYTES);
 	}
 }
 
@@ -146,6 +157,18 @@ static int end_device(struct esi_reader *rd)
 }
 
 /* What is more than one number or text. */
+static int end_command_data(struct esi_reader *rd, const char *text)
+{
+	struct esi_command *command = &rd->device->command[rd->device->command_count - 1];
+	size_t len = 0;
+	int r = xml_octets(rd->xml, text, ESI_LIMIT_COMMAND_BYTES, &command->data, &len);
+
+	if (r == 0) {
+		command->len = (uint16_t)len;
+	}
+	return r;
+}
+
 static int end_node(struct esi_reader *rd, enum esi_node node, const char *text)
 {
 	if (node == ESI_NODE_VENDOR_ID) {
@@ -173,8 +196,10 @@ static int end_node(struct esi_reader *rd, enum esi_node node, const char *text)
 		end_transition(rd, text);
 	}
 	if (node == ESI_NODE_COMMAND_DATA) {
-		return esi_octets(rd->xml, text,
-				  &rd->device->command[rd->device->command_count - 1]);
+		return end_command_data(rd, text);
+	}
+	if (node == ESI_NODE_OBJECT) {
+		return esi_dictionary_take(rd->xml, &rd->dictionary, rd->device);
 	}
 	if (node == ESI_NODE_SLOT_MODULE) {
 		return end_slot_module(rd, text);

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "esi/reader.h"
-#include "esi/xml.h"
+#include "xml/xml.h"
 
 static int begin(void *ctx, struct xml *xml, const char *name, const char **attribute)
 {
@@ -40,6 +40,7 @@ static struct xml_handler begin_reading(struct esi_reader *rd, const struct esi_
 static void end_reading(struct esi_reader *rd)
 {
 	esi_forget(rd);
+	esi_dictionary_free(&rd->dictionary);
 	free(rd->group);
 }
 

@@ -1,13 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 #include "esi/field.h"
 
-#include <ctype.h>
-#include <errno.h>
-#include <inttypes.h>
-#include <stdlib.h>
 #include <string.h>
 
-#include "base/utf8.h"
+#include "esi/dictionary.h"
 
 /* clang-format off */
 #define NUMBER(NODE, BASE, type, field, low, high)                                                 \
@@ -48,6 +44,21 @@ static const struct esi_field fields[] = {
 	NUMBER(MODE_SHIFT0, MODE, struct esi_dc_mode, sync0_shift_ns, INT32_MIN, INT32_MAX),
 	NUMBER(MODE_SHIFT1, MODE, struct esi_dc_mode, sync1_shift_ns, INT32_MIN, INT32_MAX),
 	TEXT(SLOT_NAME, SLOT, struct esi_slot, name),
+	NUMBER(UNIT_TYPE_NOTATION, UNIT_TYPE, struct esi_unit_type, notation, 0, UINT8_MAX),
+	TEXT(UNIT_TYPE_SYMBOL, UNIT_TYPE, struct esi_unit_type, symbol),
+	TEXT(DATA_TYPE_NAME, DATA_TYPE, struct esi_type, name),
+	TEXT(DATA_TYPE_BASE, DATA_TYPE, struct esi_type, base),
+	NUMBER(ARRAY_LOW, DATA_TYPE, struct esi_type, low, 0, UINT8_MAX),
+	NUMBER(ARRAY_ELEMENTS, DATA_TYPE, struct esi_type, elements, 0, UINT32_MAX),
+	NUMBER(PART_SUBINDEX, PART, struct esi_part, subindex, 0, UINT8_MAX),
+	TEXT(PART_NAME, PART, struct esi_part, name),
+	TEXT(PART_TYPE, PART, struct esi_part, type),
+	NUMBER(OBJECT_INDEX, OBJECT, struct esi_object_text, index, 0, UINT16_MAX),
+	TEXT(OBJECT_NAME, OBJECT, struct esi_object_text, name),
+	TEXT(OBJECT_TYPE, OBJECT, struct esi_object_text, type),
+	NUMBER(OBJECT_UNIT, OBJECT, struct esi_object_text, unit, 0, UINT32_MAX),
+	TEXT(OBJECT_PART_NAME, OBJECT_PART, struct esi_object_part, name),
+	NUMBER(OBJECT_PART_UNIT, OBJECT_PART, struct esi_object_part, unit, 0, UINT32_MAX),
 };
 
 const struct esi_field *esi_field_of(enum esi_node node)
@@ -58,78 +69,6 @@ const struct esi_field *esi_field_of(enum esi_node node)
 		}
 	}
 	return NULL;
-}
-
-int esi_number(struct xml *xml, const char *what, const char *text, struct esi_range range,
-	       int64_t *ret_value)
-{
-	int is_hex = (text[0] == '#' || text[0] == '0') && (text[1] == 'x' || text[1] == 'X');
-	const char *digits = text + (is_hex ? 2 : text[0] == '-' || text[0] == '+');
-	char *end;
-	long long value;
-
-	errno = 0;
-	value = strtoll(is_hex ? digits : text, &end, is_hex ? 16 : 10);
-	if (!isxdigit((unsigned char)digits[0]) || *end != '\0') {
-		return xml_fail(xml, "%s: \"%.40s\" is no number (#x1F or 31)", what, text);
-	}
-	if (errno != 0 || value < range.min || value > range.max) {
-		return xml_fail(xml, "%s: %.40s is not within %" PRId64 " to %" PRId64, what, text,
-				range.min, range.max);
-	}
-	*ret_value = value;
-	return 0;
-}
-
-void esi_text(const char *text, char *ret_text, size_t text_bytes)
-{
-	size_t len;
-
-	utf8_copy(text, ret_text, text_bytes);
-	for (char *p = ret_text; *p != '\0'; p++) {
-		if ((unsigned char)*p < 0x20 || *p == 0x7f) {
-			*p = ' ';
-		}
-	}
-	/* Cut, it may end in a blank. */
-	len = strlen(ret_text);
-	while (len > 0 && ret_text[len - 1] == ' ') {
-		len--;
-	}
-	ret_text[len] = '\0';
-	memmove(ret_text, ret_text + strspn(ret_text, " "), len + 1 - strspn(ret_text, " "));
-}
-
-static int digit(char c)
-{
-	if (!isxdigit((unsigned char)c)) {
-		return -1;
-	}
-	return isdigit((unsigned char)c) ? c - '0' : tolower((unsigned char)c) - 'a' + 10;
-}
-
-int esi_octets(struct xml *xml, const char *text, struct esi_command *command)
-{
-	size_t len = strlen(text);
-	uint8_t *data;
-
-	if (len % 2 != 0 || strspn(text, "0123456789abcdefABCDEF") != len) {
-		return xml_fail(xml, "Data: \"%.40s\" is no row of hexadecimal octets", text);
-	}
-	if (len / 2 > ESI_LIMIT_COMMAND_BYTES) {
-		return xml_fail(xml, "Data: more than %d octets", ESI_LIMIT_COMMAND_BYTES);
-	}
-	data = malloc(len / 2 + 1);
-	if (data == NULL) {
-		return xml_fail(xml, "out of memory");
-	}
-	for (size_t i = 0; i < len / 2; i++) {
-		data[i] = (uint8_t)(digit(text[2 * i]) << 4 | digit(text[2 * i + 1]));
-	}
-	free(command->data);
-	command->data = data;
-	command->len = (uint16_t)(len / 2);
-	return 0;
 }
 
 /* Of the size of the field; little-endian and big-endian machines alike. */
@@ -155,11 +94,11 @@ int esi_field_set(struct xml *xml, const struct esi_field *field, const char *na
 
 	if (field->is_text) {
 		if (*at == '\0' || policy == ESI_TEXT_REPLACED) {
-			esi_text(text, (char *)at, field->bytes);
+			xml_plain(text, (char *)at, field->bytes);
 		}
 		return 0;
 	}
-	r = esi_number(xml, name, text, field->range, &value);
+	r = xml_number(xml, name, text, field->range, &value);
 	if (r == 0) {
 		store(at, field->bytes, value);
 	}

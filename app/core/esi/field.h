@@ -8,14 +8,11 @@
 
 #include "esi/device.h"
 #include "esi/nodes.h"
-#include "esi/xml.h"
+#include "xml/value.h"
+#include "xml/xml.h"
 
-struct esi_range {
-	int64_t min;
-	int64_t max;
-};
-
-/* The structure that a field is in: the device, or the newest of its lists. */
+/* The structure that a field is in: the device, or the newest of its lists or of those of its
+ * dictionary. */
 enum esi_base {
 	ESI_BASE_DEVICE,
 	ESI_BASE_PDO,
@@ -23,6 +20,11 @@ enum esi_base {
 	ESI_BASE_MODE,
 	ESI_BASE_COMMAND,
 	ESI_BASE_SLOT,
+	ESI_BASE_UNIT_TYPE,
+	ESI_BASE_DATA_TYPE,
+	ESI_BASE_PART,
+	ESI_BASE_OBJECT,
+	ESI_BASE_OBJECT_PART,
 };
 
 struct esi_field {
@@ -31,20 +33,11 @@ struct esi_field {
 	size_t at;
 	size_t bytes;
 	int is_text;
-	struct esi_range range;
+	struct xml_range range;
 };
 
 /* A text that is there in several languages. */
 enum esi_text_policy { ESI_TEXT_FIRST, ESI_TEXT_REPLACED };
-
-/** HexDecValue of ETG.2000: "#x1F" ("0x1f" as well), or decimal. 0; -EBADMSG with a line that names
- * @what. */
-int esi_number(struct xml *xml, const char *what, const char *text, struct esi_range range,
-	       int64_t *ret_value);
-/** @text in one line, cut to fit, without blanks at its ends. */
-void esi_text(const char *text, char *ret_text, size_t text_bytes);
-/** Hexadecimal digits in pairs as the data of @command. */
-int esi_octets(struct xml *xml, const char *text, struct esi_command *command);
 
 /** NULL: the element is no single number or text. */
 const struct esi_field *esi_field_of(enum esi_node node);

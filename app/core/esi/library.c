@@ -35,7 +35,8 @@ static int is_better(uint32_t wanted, uint32_t now, uint32_t other)
 
 static int is_improved(const struct place *place, const struct esi_identity *id)
 {
-	return place->wanted.vendor == id->vendor && place->wanted.product == id->product &&
+	return place->wanted.kind == id->kind && place->wanted.vendor == id->vendor &&
+	       place->wanted.product == id->product &&
 	       (place->device == NULL ||
 		is_better(place->wanted.revision, place->device->id.revision, id->revision));
 }
@@ -44,7 +45,7 @@ static int is_wanted(void *ctx, const struct esi_identity *id)
 {
 	const struct esi_library *library = ctx;
 
-	for (size_t i = 0; i < library->place_count && id->kind == ESI_DEVICE; i++) {
+	for (size_t i = 0; i < library->place_count; i++) {
 		if (is_improved(&library->place[i], id)) {
 			return 1;
 		}
@@ -141,17 +142,17 @@ static int read_one(void *ctx, const char *path)
 
 /* --- public --- */
 
-static int is_listed(const struct esi_library *library, const struct esi_identity *id)
+static const struct place *find(const struct esi_library *library, const struct esi_identity *id)
 {
-	for (size_t i = 0; i < library->place_count; i++) {
+	for (size_t i = 0; library != NULL && i < library->place_count; i++) {
 		const struct esi_identity *other = &library->place[i].wanted;
 
-		if (other->vendor == id->vendor && other->product == id->product &&
-		    other->revision == id->revision) {
-			return 1;
+		if (other->kind == id->kind && other->vendor == id->vendor &&
+		    other->product == id->product && other->revision == id->revision) {
+			return &library->place[i];
 		}
 	}
-	return 0;
+	return NULL;
 }
 
 struct esi_library *esi_library_read(const char *dir, const struct esi_identity *wanted,
@@ -166,7 +167,7 @@ struct esi_library *esi_library_read(const char *dir, const struct esi_identity 
 	}
 	library->report = report;
 	for (size_t i = 0; i < wanted_count; i++) {
-		if (!is_listed(library, &wanted[i])) {
+		if (find(library, &wanted[i]) == NULL) {
 			library->place[library->place_count++].wanted = wanted[i];
 		}
 	}
@@ -193,12 +194,17 @@ void esi_library_free(struct esi_library *library)
 const struct esi_device *esi_library_find(const struct esi_library *library, uint32_t vendor,
 					  uint32_t product, uint32_t revision)
 {
-	for (size_t i = 0; library != NULL && i < library->place_count; i++) {
-		const struct esi_identity *id = &library->place[i].wanted;
+	const struct esi_identity id = { ESI_DEVICE, vendor, product, revision };
+	const struct place *place = find(library, &id);
 
-		if (id->vendor == vendor && id->product == product && id->revision == revision) {
-			return library->place[i].device;
-		}
-	}
-	return NULL;
+	return place == NULL ? NULL : place->device;
+}
+
+const struct esi_device *esi_library_find_module(const struct esi_library *library, uint32_t vendor,
+						 uint32_t ident)
+{
+	const struct esi_identity id = { ESI_MODULE, vendor, ident, 0 };
+	const struct place *place = find(library, &id);
+
+	return place == NULL ? NULL : place->device;
 }

@@ -19,10 +19,10 @@ struct esi_library_report {
 };
 
 /**
- * Read the files *.xml of folder @dir (not of those in it), by name, for the devices @wanted; of
- * each the description of its revision, or of the newest before it, or of the oldest of all. Where
- * several files have it, the first. What cannot be read is reported and passed over. NULL: out of
- * memory. Free with esi_library_free().
+ * Read the files *.xml of folder @dir (not of those in it), by name, for the devices and modules
+ * @wanted; of each the description of its revision, or of the newest before it, or of the oldest of
+ * all. Where several files have it, the first. What cannot be read is reported and passed over.
+ * NULL: out of memory. Free with esi_library_free().
  */
 struct esi_library *esi_library_read(const char *dir, const struct esi_identity *wanted,
 				     size_t wanted_count, const struct esi_library_report *report);
@@ -32,6 +32,9 @@ void esi_library_free(struct esi_library *library);
 /** The description of one of the devices that were wanted; NULL: none. */
 const struct esi_device *esi_library_find(const struct esi_library *library, uint32_t vendor,
 					  uint32_t product, uint32_t revision);
+/** The same of one of the modules. */
+const struct esi_device *esi_library_find_module(const struct esi_library *library, uint32_t vendor,
+						 uint32_t ident);
 
 /**
  * Call @each with the path of each *.xml of folder @dir, by name, until it returns an error. 0; its

@@ -7,8 +7,9 @@
 #include <stdint.h>
 
 #include "esi/device.h"
+#include "esi/dictionary.h"
 #include "esi/nodes.h"
-#include "esi/xml.h"
+#include "xml/xml.h"
 
 struct esi_group {
 	char type[ESI_NAME_BYTES];
@@ -28,6 +29,7 @@ struct esi_reader {
 	size_t group_count;
 	size_t device_count;
 	struct esi_device *device; /* that is being read; NULL */
+	struct esi_dictionary dictionary;
 };
 
 /** An element begins: @node, with what it makes of the device. 0 or -errno with a line. */

@@ -2,38 +2,15 @@
 #include <inttypes.h>
 #include <string.h>
 
+#include "base/xml_text.h"
 #include "esi/esi.h"
 #include "wire/coe_type.h"
 #include "wire/sii.h"
 
-/* What XML cannot hold at all becomes a blank, as esi_text() has it. */
-static void put_text(FILE *out, const char *text)
-{
-	for (; *text != '\0'; text++) {
-		switch (*text) {
-		case '&':
-			fputs("&amp;", out);
-			break;
-		case '<':
-			fputs("&lt;", out);
-			break;
-		case '>':
-			fputs("&gt;", out);
-			break;
-		case '"':
-			fputs("&quot;", out);
-			break;
-		default:
-			fputc((unsigned char)*text < 0x20 || *text == 0x7f ? ' ' : *text, out);
-			break;
-		}
-	}
-}
-
 static void element(FILE *out, const char *indent, const char *name, const char *text)
 {
 	fprintf(out, "%s<%s>", indent, name);
-	put_text(out, text);
+	xml_text_put(out, text);
 	fprintf(out, "</%s>\n", name);
 }
 
@@ -252,15 +229,15 @@ static void put_device(FILE *out, const struct esi_device *d)
 	fputs("      <Device", out);
 	if (d->physics[0] != '\0') {
 		fputs(" Physics=\"", out);
-		put_text(out, d->physics);
+		xml_text_put(out, d->physics);
 		fputc('"', out);
 	}
 	fprintf(out,
 		">\n        <Type ProductCode=\"#x%08" PRIX32 "\" RevisionNo=\"#x%08" PRIX32 "\">",
 		d->id.product, d->id.revision);
-	put_text(out, d->type);
+	xml_text_put(out, d->type);
 	fputs("</Type>\n        <Name LcId=\"1033\">", out);
-	put_text(out, d->name);
+	xml_text_put(out, d->name);
 	fputs("</Name>\n", out);
 	put_timeouts(out, d);
 	element(out, "        ", "GroupType", d->group);

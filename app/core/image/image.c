@@ -10,6 +10,8 @@
 #include <string.h>
 #include <strings.h>
 
+#include "image/field.h"
+
 static uint64_t low_bits(unsigned bit_len)
 {
 	return bit_len >= 64 ? UINT64_MAX : (UINT64_C(1) << bit_len) - 1;
@@ -36,37 +38,12 @@ int image_channel_fits(const struct channel *ch, size_t image_bytes)
 
 uint64_t image_get_raw(const uint8_t *image, const struct channel *ch)
 {
-	const uint8_t *p = image + ch->bit_offset / 8;
-	unsigned shift = ch->bit_offset % 8;
-	unsigned got = 8 - shift;
-	uint64_t raw = (uint64_t)(*p++ >> shift);
-
-	assert(ch->bit_len <= 64);
-	while (got < ch->bit_len) {
-		raw |= (uint64_t)*p++ << got;
-		got += 8;
-	}
-	return raw & low_bits(ch->bit_len);
+	return image_field_get(image, image_field_of(ch));
 }
 
 void image_set_raw(uint8_t *image, const struct channel *ch, uint64_t raw)
 {
-	uint8_t *p = image + ch->bit_offset / 8;
-	unsigned shift = ch->bit_offset % 8;
-	unsigned left = ch->bit_len;
-
-	assert(left >= 1 && left <= 64);
-	raw &= low_bits(ch->bit_len);
-	while (left > 0) {
-		unsigned n = 8 - shift < left ? 8 - shift : left;
-		uint8_t mask = (uint8_t)((0xffu >> (8 - n)) << shift);
-
-		*p = (uint8_t)((*p & ~mask) | ((raw << shift) & mask));
-		raw >>= n;
-		left -= n;
-		shift = 0;
-		p++;
-	}
+	image_field_set(image, image_field_of(ch), raw);
 }
 
 static int64_t sign_extended(const struct channel *ch, uint64_t raw)
@@ -111,6 +88,11 @@ double image_get_physical(const uint8_t *image, const struct channel *ch)
 int image_is_outside(const struct channel *ch, double physical)
 {
 	return image_has_range(ch) && !(physical >= ch->min && physical <= ch->max);
+}
+
+int image_is_scaled(const struct channel *ch)
+{
+	return ch->scale != 1 || ch->offset != 0;
 }
 
 int image_has_range(const struct channel *ch)

@@ -22,6 +22,8 @@ void image_set_raw(uint8_t *image, const struct channel *ch, uint64_t raw);
 /** Raw bits as a number of the channel's type, times scale plus offset. */
 double image_raw_to_physical(const struct channel *ch, uint64_t raw);
 double image_get_physical(const uint8_t *image, const struct channel *ch);
+/** 1 if physical and raw numbers differ: there is a scale or an offset. */
+int image_is_scaled(const struct channel *ch);
 
 /** 1 if the channel has a plausible range and @physical is not within it. */
 int image_is_outside(const struct channel *ch, double physical);

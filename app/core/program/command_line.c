@@ -74,7 +74,7 @@ enum command_line_result command_line_read(struct command_line *line, int argc, 
 			     .option_count = line->option_count,
 			     .shared = standard,
 			     .shared_count = STANDARD_OPTIONS };
-	char overrides[COMMAND_LINE_OVERRIDES + 1][ASSIGNMENT_BYTES];
+	static char overrides[COMMAND_LINE_OVERRIDES + 1][ASSIGNMENT_BYTES]; /* as long as @s */
 	char error[ERROR_BYTES] = "";
 
 	s = (struct standard){ .config_path = NULL };
@@ -101,6 +101,9 @@ enum command_line_result command_line_read(struct command_line *line, int argc, 
 	}
 	line->config_path = s.config_path;
 	line->is_check = s.is_check;
+	line->source = (struct config_source){ .path = s.config_path,
+					       .set = s.set.item,
+					       .set_count = s.set.count };
 	if (config_assemble(s.config_path, s.set.item, s.set.count, ret_cfg, error, sizeof(error)) <
 	    0) {
 		error_print(line->program, "%s", error);

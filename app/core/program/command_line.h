@@ -34,6 +34,8 @@ struct command_line {
 	uint32_t exit_codes;     /* EXIT_CODE_BIT()s, for --help */
 	const char *config_path; /* out: NULL: the built-in defaults */
 	int is_check;            /* out: --check: report and exit */
+	/* out: where the configuration comes from, to read it again; valid until the end */
+	struct config_source source;
 };
 
 enum command_line_result { COMMAND_LINE_RUN, COMMAND_LINE_EXIT };

@@ -16,7 +16,7 @@ enum exit_code {
 	EXIT_CODE_CONFIG = 3,     /* the configuration */
 	EXIT_CODE_PERMISSION = 4, /* access was denied */
 	EXIT_CODE_INTERFACE = 5,  /* no such NIC, or it is down */
-	EXIT_CODE_BUSY = 6,       /* run directory, NIC, recordings or GPIO line in use */
+	EXIT_CODE_BUSY = 6,       /* run directory, NIC, recordings, GPIO line, port in use */
 	EXIT_CODE_RESOURCES = 7,  /* memory, or the tmpfs of the ring */
 	EXIT_CODE_NO_SLAVE = 8,   /* no slave answers */
 	EXIT_CODE_SLAVES = 9,     /* a slave too few, too many, or the wrong one */

@@ -16,15 +16,14 @@ int progress_is_on(void);
 
 /** @what (copied) has @total_bytes. */
 void progress_begin(const char *what, uint64_t total_bytes);
-void progress_at(uint64_t bytes);
-/** The line is cleared. */
-void progress_end(void);
+/** The same, counted in @unit, "words"; NULL: bytes. @total 0: not known. */
+void progress_begin_of(const char *what, uint64_t total, const char *unit);
+void progress_at(uint64_t done);
+/** The line is cleared. 1: there was one. */
+int progress_end(void);
 
-/** A line about work that is done, where progress is shown; ns since @start_mono_ns are put behind
- * it. */
+/** A line about work that is done, where progress is shown; ns since @start_mono_ns (of
+ * CLOCK_MONOTONIC) are put behind it. */
 void progress_done(int64_t start_mono_ns, const char *format, ...)
 	__attribute__((format(printf, 2, 3)));
-/** CLOCK_MONOTONIC. */
-int64_t progress_now_ns(void);
-
 #endif

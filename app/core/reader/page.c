@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "reader/page.h"
 
+#include <errno.h>
+#include <signal.h>
 #include <stddef.h>
 
 #define TERMINATE(text) ((text)[sizeof(text) - 1] = '\0')
@@ -56,6 +58,20 @@ int page_read_dds(const char *path, struct dds_status *ret_page)
 	return r;
 }
 
+int page_read_stream(const char *path, struct stream_status *ret_page)
+{
+	int r = status_read(path, STREAM_STATUS_MAGIC, sizeof(*ret_page),
+			    offsetof(struct stream_status, text_sequence), ret_page);
+
+	if (r == 0) {
+		TERMINATE(ret_page->stream);
+		TERMINATE(ret_page->appliance);
+		TERMINATE(ret_page->server);
+		TERMINATE(ret_page->message);
+	}
+	return r;
+}
+
 int page_read_sync0(const char *path, struct sync0_status *ret_page)
 {
 	int r = status_read(path, SYNC0_STATUS_MAGIC, sizeof(*ret_page),
@@ -72,4 +88,9 @@ int page_read_sync0(const char *path, struct sync0_status *ret_page)
 		TERMINATE(ret_page->line[i].line);
 	}
 	return 0;
+}
+
+int page_is_alive(int64_t pid)
+{
+	return pid > 0 && (kill((pid_t)pid, 0) == 0 || errno == EPERM);
 }

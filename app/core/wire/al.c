@@ -2,6 +2,7 @@
 #include "wire/al.h"
 
 #include <stddef.h>
+#include <stdio.h>
 
 static const struct {
 	uint16_t code;
@@ -86,6 +87,16 @@ const char *al_state_to_str(uint16_t al_status)
 	}
 }
 
+void al_status_format(uint32_t al_status, char *buf, size_t buf_len)
+{
+	if ((al_status & AL_STATE_MASK) == 0) {
+		snprintf(buf, buf_len, "unknown");
+		return;
+	}
+	snprintf(buf, buf_len, "%s%s", al_state_to_str((uint16_t)(al_status & AL_STATE_MASK)),
+		 (al_status & AL_ERROR) != 0 ? "+ERROR" : "");
+}
+
 const char *al_status_code_to_str(uint16_t code)
 {
 	for (size_t i = 0; i < sizeof(codes) / sizeof(codes[0]); i++) {
@@ -94,4 +105,58 @@ const char *al_status_code_to_str(uint16_t code)
 		}
 	}
 	return "unknown";
+}
+
+static const char mapping[] =
+	"the PDOs that are assigned (0x1C12, 0x1C13) are not what the slave expects; look: ecdaq "
+	"pdo SLAVE; change: slaves[].pdos, start-up SDOs in slaves[].sdo, or the slave's setting";
+static const char watchdog[] =
+	"no outputs reached the slave for as long as bus.watchdog: frames are lost or late; look: "
+	"ecdaq status (frames lost, wake), ecdaq crc, ecdaq doctor; change: cable, machine, or a "
+	"longer bus.watchdog; then ecdaq clear";
+static const char clocks[] =
+	"SYNC0 is off, or not as the slave needs it; look: ecdaq slaves -v SLAVE (SYNC0 cycle, "
+	"DC); change: dc.enable, slaves[].assign_activate, cycle.period";
+static const char sync_type[] =
+	"the synchronisation type (0x1C32:01, 0x1C33:01) is not one of the slave's; look: ecdaq "
+	"sdo "
+	"read SLAVE 0x1c32:4; change: slaves[].sync_type: write, slaves[].assign_activate";
+static const char mailboxes[] = "the mailboxes of the slave's EEPROM are not what its firmware "
+				"expects; look: ecdaq sii read "
+				"SLAVE; change: the EEPROM, or the firmware";
+static const char eeprom[] =
+	"look: ecdaq sii read SLAVE; change: the EEPROM's content, or the device";
+
+static const struct {
+	uint16_t first;
+	uint16_t last;
+	const char *text;
+} hints[] = {
+	{ 0x0015, 0x0016, mailboxes },
+	{ 0x0017, 0x0017, mapping },
+	{ 0x001a, 0x001a, clocks },
+	{ 0x001b, 0x001b, watchdog },
+	{ 0x001c, 0x001e, mapping },
+	{ 0x001f, 0x001f,
+	  "the slave does not take this watchdog; change: bus.watchdog (0s: the slave's own)" },
+	{ 0x0020, 0x0020, "switch the slave off and on" },
+	{ 0x0024, 0x0025, mapping },
+	{ 0x0026, 0x0026, "look: ecdaq sdo list SLAVE; change: start-up SDOs in slaves[].sdo" },
+	{ 0x0027, 0x0029, sync_type },
+	{ 0x002c, 0x002d, clocks },
+	{ 0x0030, 0x0037, clocks },
+	{ 0x0050, 0x0051, eeprom },
+	{ 0x0070, 0x0070,
+	  "the modules that are plugged in are not those configured; look: ecdaq sdo list SLAVE "
+	  "(0xF030, 0xF050), ecdaq config diff; change: the modules, or start-up SDOs" },
+};
+
+const char *al_status_code_hint(uint16_t code)
+{
+	for (size_t i = 0; i < sizeof(hints) / sizeof(hints[0]); i++) {
+		if (code >= hints[i].first && code <= hints[i].last) {
+			return hints[i].text;
+		}
+	}
+	return "";
 }

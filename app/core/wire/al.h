@@ -3,6 +3,7 @@
 #ifndef WIRE_AL_H
 #define WIRE_AL_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 /* Never OR states of several slaves together to compare them: INIT | PREOP looks like BOOT. */
@@ -36,6 +37,8 @@ enum al_status_code {
 	AL_CODE_INVALID_OUTPUT_CONFIG = 0x001d,
 	AL_CODE_INVALID_INPUT_CONFIG = 0x001e,
 	AL_CODE_INVALID_WATCHDOG_CONFIG = 0x001f,
+	AL_CODE_INVALID_INPUT_MAPPING = 0x0024,
+	AL_CODE_INVALID_OUTPUT_MAPPING = 0x0025,
 	AL_CODE_FATAL_SYNC_ERROR = 0x002c,
 	AL_CODE_NO_SYNC_ERROR = 0x002d,
 	AL_CODE_INVALID_DC_SYNC_CONFIG = 0x0030,
@@ -50,7 +53,13 @@ enum al_status_code {
 
 /** "INIT", "PRE-OP", "BOOT", "SAFE-OP", "OP", "none"; the error bit is ignored. */
 const char *al_state_to_str(uint16_t al_status);
+/** The same with "+ERROR" behind it where the error bit is set; "unknown" for no state: no frame
+ * comes back. */
+void al_status_format(uint32_t al_status, char *buf, size_t buf_len);
 /** ETG.1020's text of an AL status code; "unknown" for one it does not list. */
 const char *al_status_code_to_str(uint16_t code);
+/** What mostly causes @code, where to look, and what to change: commands of ecdaq with SLAVE in the
+ * slave's place, and options. "": nothing is known beyond the text. */
+const char *al_status_code_hint(uint16_t code);
 
 #endif

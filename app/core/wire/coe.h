@@ -59,6 +59,17 @@ enum sdo_information_opcode {
 	SDO_INFORMATION_OPCODE_MASK = 0x7f, /* the bit above: not the last fragment */
 };
 
+/* Optional values of an entry: asked for, and in the answer those that are sent. */
+enum sdo_value_info {
+	SDO_VALUE_ACCESS = 0x01,
+	SDO_VALUE_CATEGORY = 0x02,
+	SDO_VALUE_MAPPING = 0x04,
+	SDO_VALUE_UNIT = 0x08,
+	SDO_VALUE_DEFAULT = 0x10,
+	SDO_VALUE_MIN = 0x20,
+	SDO_VALUE_MAX = 0x40,
+};
+
 enum sdo_information_layout {
 	SDO_INFORMATION_OPCODE_AT = 2,
 	SDO_INFORMATION_FRAGMENTS_AT = 4, /* fragments left */
@@ -68,6 +79,7 @@ enum sdo_information_layout {
 	SDO_GET_ENTRY_BYTES = 4,
 	SDO_OBJECT_BYTES = 6,
 	SDO_ENTRY_BYTES = 10,
+	SDO_ENTRY_UNIT_BYTES = 4, /* between them, where it is sent */
 };
 
 #endif

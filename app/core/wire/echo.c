@@ -21,18 +21,24 @@ static int is_position_counted(uint8_t cmd)
 	       (cmd >= ECAT_CMD_BRD && cmd <= ECAT_CMD_BRW) || cmd == ECAT_CMD_ARMW;
 }
 
+/* Of the first eight octets of a datagram: command, index, address, length of the data. */
+#define INDEX_BITS UINT64_C(0xff00)
+#define POSITION_BITS UINT64_C(0xffff0000)
+
+/* The bits of those that slaves leave alone. */
+static uint64_t kept_bits(uint8_t cmd, enum echo_index index)
+{
+	uint64_t kept = UINT64_MAX >> 16 | (uint64_t)(LENGTH_MASK | MORE_FOLLOWS) << 48;
+
+	if (index == ECHO_INDEX_ANY) {
+		kept &= ~INDEX_BITS;
+	}
+	return is_position_counted(cmd) ? kept & ~POSITION_BITS : kept;
+}
+
 static int is_same_datagram(const uint8_t *sent, const uint8_t *got, enum echo_index index)
 {
-	if (sent[0] != got[0] || get_le16(sent + 4) != get_le16(got + 4)) {
-		return 0;
-	}
-	if (index == ECHO_INDEX_SAME && sent[1] != got[1]) {
-		return 0;
-	}
-	if (!is_position_counted(sent[0]) && get_le16(sent + 2) != get_le16(got + 2)) {
-		return 0;
-	}
-	return ((get_le16(sent + 6) ^ get_le16(got + 6)) & (LENGTH_MASK | MORE_FOLLOWS)) == 0;
+	return ((get_le64(sent) ^ get_le64(got)) & kept_bits(sent[0], index)) == 0;
 }
 
 int echo_matches(const uint8_t *sent, const uint8_t *frame, size_t frame_len, enum echo_index index)

@@ -373,7 +373,7 @@ static void report_sdo(const struct admin_target *t, struct admin_pending *pendi
 static int is_command(enum admin_verb verb)
 {
 	return verb != ADMIN_REGISTER_READ && verb != ADMIN_SII_READ && verb != ADMIN_DIAGNOSIS &&
-	       verb != ADMIN_DATAGRAMS && verb != ADMIN_COMPARE;
+	       verb != ADMIN_DATAGRAMS && verb != ADMIN_COMPARE && verb != ADMIN_STARTUP;
 }
 
 int admin_command_takes_frame(enum admin_verb verb)
@@ -383,14 +383,48 @@ int admin_command_takes_frame(enum admin_verb verb)
 	       verb == ADMIN_DIAGNOSIS || verb == ADMIN_ERRORS_RESET;
 }
 
+static void run_on_bus(const struct admin_target *t, struct admin_pending *pending);
+
+static const char brought_up[] = "the bus is being brought up";
+
+static void run_when_up(struct admin_pending *pending, const struct admin_target *target)
+{
+	if (target->bus_request != NULL) {
+		pending->poll = NULL;
+		pending->cancel = NULL;
+		pending->outlives_bus = 0;
+		pending->waits_for = NULL;
+		run_on_bus(target, pending);
+	}
+}
+
+static void leave(struct admin_pending *pending)
+{
+	admin_pending_complete(pending, -ECANCELED);
+}
+
+/* The bus is being brought up: what only looks waits for the end of that. */
+static void run_later(struct admin_pending *pending)
+{
+	if (is_command((enum admin_verb)pending->request.verb)) {
+		admin_pending_refuse(pending, -EBUSY, "%s", brought_up);
+		return;
+	}
+	pending->waits_for = brought_up;
+	pending->poll = run_when_up;
+	pending->cancel = leave;
+	pending->outlives_bus = 1; /* a bring-up begins without one */
+}
+
 static void run_on_bus(const struct admin_target *t, struct admin_pending *pending)
 {
 	const struct admin_request *rq = &pending->request;
 	int is_all = rq->verb == ADMIN_RESCAN || rq->verb == ADMIN_DATAGRAMS ||
-		     rq->verb == ADMIN_COMPARE || rq->slave_pos == ADMIN_ALL_SLAVES;
+		     rq->verb == ADMIN_COMPARE || rq->verb == ADMIN_CONFIG_RELOAD ||
+		     rq->slave_pos == ADMIN_ALL_SLAVES;
 
 	if (t->bus_request == NULL) {
-		admin_pending_refuse(pending, -EBUSY, "the bus is being brought up");
+		run_later(pending);
 		return;
 	}
 	if (!is_all && !has_slave(t, pending)) {
@@ -473,6 +507,8 @@ void admin_command_run(const struct admin_target *target, struct admin_pending *
 	case ADMIN_ERRORS_RESET:
 	case ADMIN_DATAGRAMS:
 	case ADMIN_COMPARE:
+	case ADMIN_CONFIG_RELOAD:
+	case ADMIN_STARTUP:
 		run_on_bus(target, pending);
 		return;
 	case ADMIN_CAPTURE:

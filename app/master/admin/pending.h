@@ -43,6 +43,8 @@ struct admin_pending {
 	void (*poll)(struct admin_pending *pending, const struct admin_target *target);
 	/** Nobody waits any more: end it soon, and complete it. NULL: it is left to complete. */
 	void (*cancel)(struct admin_pending *pending);
+	/** Why it is not answered yet, for a client whose time is over; NULL: nothing to say. */
+	const char *waits_for;
 	void *work;        /* the executor's own */
 	uint64_t sequence; /* the executor's own */
 	/* --- the server's --- */

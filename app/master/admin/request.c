@@ -152,6 +152,7 @@ static int check_verb(const struct admin_request *rq, char *why)
 	case ADMIN_RESCAN:
 	case ADMIN_DATAGRAMS:
 	case ADMIN_COMPARE:
+	case ADMIN_CONFIG_RELOAD:
 	case ADMIN_CAPTURE:
 		return 0;
 	case ADMIN_STATE:
@@ -172,6 +173,7 @@ static int check_verb(const struct admin_request *rq, char *why)
 	case ADMIN_SII_WRITE:
 	case ADMIN_DIAGNOSIS:
 	case ADMIN_ERRORS_RESET:
+	case ADMIN_STARTUP:
 		return check_slave(rq, why);
 	case ADMIN_SDO_READ:
 	case ADMIN_SDO_WRITE:

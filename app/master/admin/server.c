@@ -38,6 +38,7 @@ struct admin_server {
 	struct admin_pending pending[ADMIN_PENDING];
 	size_t first;       /* of pending[], in the next pass */
 	int is_frame_taken; /* in this pass */
+	int is_silent;      /* no socket has anything for the next pass */
 };
 
 /* One pass. */
@@ -479,6 +480,9 @@ static const char *late_text(const struct admin_pending *pending)
 	if (pending->state == ADMIN_PENDING_COLLECTING) {
 		return "the rest of its data did not come in time";
 	}
+	if (pending->waits_for != NULL) {
+		return pending->waits_for;
+	}
 	return pending->request.verb == ADMIN_SET || pending->request.verb == ADMIN_ONESHOT
 		       ? "withdrawn: no frame came back with the values in time, or the outputs "
 			 "are at fail-safe"
@@ -518,6 +522,28 @@ static int attend(const struct pass *pass, struct admin_pending *pending)
 	return is_open(pending) || pending->state == ADMIN_PENDING_COMPLETE;
 }
 
+static void ask_sockets(const struct pass *pass)
+{
+	struct admin_server *server = pass->server;
+
+	serve_offer(server);
+	accept_clients(pass);
+	for (size_t i = 0; i < CLIENT_SLOTS; i++) {
+		struct client *client = &server->client[i];
+
+		for (int n = 0; n < READS_PER_PASS && client->fd >= 0; n++) {
+			if (!read_client(pass, client)) {
+				break;
+			}
+		}
+	}
+}
+
+void admin_server_note_silence(struct admin_server *server)
+{
+	server->is_silent = 1;
+}
+
 unsigned admin_server_service(struct admin_server *server, const struct admin_target *target,
 			      mono_t now)
 {
@@ -526,17 +552,10 @@ unsigned admin_server_service(struct admin_server *server, const struct admin_ta
 	unsigned waiting = 0;
 
 	server->is_frame_taken = 0;
-	serve_offer(server);
-	accept_clients(&pass);
-	for (size_t i = 0; i < CLIENT_SLOTS; i++) {
-		struct client *client = &server->client[i];
-
-		for (int n = 0; n < READS_PER_PASS && client->fd >= 0; n++) {
-			if (!read_client(&pass, client)) {
-				break;
-			}
-		}
+	if (!server->is_silent) {
+		ask_sockets(&pass);
 	}
+	server->is_silent = 0;
 	for (size_t i = 0; i < ADMIN_PENDING; i++) {
 		waiting += (unsigned)attend(&pass, &server->pending[(first + i) % ADMIN_PENDING]);
 	}

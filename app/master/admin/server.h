@@ -37,6 +37,9 @@ void admin_server_destroy(struct admin_server *server);
 /** A descriptor that polls readable when admin_server_service() has something to do. */
 int admin_server_fd(const struct admin_server *server);
 
+/** Nobody has polled readable since the last pass: the next one asks no socket. */
+void admin_server_note_silence(struct admin_server *server);
+
 /**
  * One pass: new clients, requests, answers that have become due at @now. Returns how many requests
  * are open. Context: service thread.

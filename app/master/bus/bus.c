@@ -141,6 +141,9 @@ void bus_destroy(struct bus *bus)
 		mailbox_destroy(bus->mailbox);
 		bus_sii_free(bus);
 		free(bus->pdo);
+		free(bus->startup);
+		free(bus->assign);
+		free(bus->module);
 		free(bus->channel);
 		free(bus);
 	}

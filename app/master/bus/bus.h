@@ -64,10 +64,23 @@ int bus_scan(struct bus *bus, char *error);
  * SDOs and outputs. After bus_scan(); the one given to bus_create() before, or if it does not fit.
  */
 const struct config *bus_config(const struct bus *bus);
+/** The configuration it was created with has changed in what takes effect at once. */
+void bus_config_follow(struct bus *bus);
 /** Found against configured slaves: order, identity, count. */
 int bus_compare(const struct bus *bus, char *error);
-/** Start-up SDOs, SM and FMMU, PDO mapping (CoE or SII) into the channel table, watchdog (T08),
- * exchange plan. */
+/**
+ * Start-up SDOs of @transition, IP in PRE-OP or SO in SAFE-OP, of all slaves; bus_map() does those
+ * of PS itself. 0; -errno, the first one that failed.
+ */
+int bus_startup(struct bus *bus, enum config_transition transition, char *error);
+/** 1 if there is a start-up SDO of @transition. */
+int bus_has_startup(const struct bus *bus, enum config_transition transition);
+/** Those of OS of the slaves that are in OP, before bus_stop_outputs(); at most
+ * BUS_STARTUP_DOWN_NS. Goes on with the other slaves after a failure, and keeps the first one. */
+int bus_startup_down(struct bus *bus, char *error);
+#define BUS_STARTUP_DOWN_NS (250 * NS_PER_MS)
+/** Start-up SDOs of PS, SM and FMMU, PDO mapping (CoE or SII) into the channel table, watchdog
+ * (T08), exchange plan. */
 int bus_map(struct bus *bus, char *error);
 /** Filters, latch, delays, the schedule check (-EINVAL: cycle.period is too short), offsets, burst,
  * check of 0x092C. Without DC slaves only the schedule check. */
@@ -84,9 +97,13 @@ int bus_sync0_start(struct bus *bus, int64_t dc_now_ns, char *error);
 /** All slaves to @state (SAFE-OP, OP, PRE-OP, INIT), with AL errors named by slave, code and text.
  */
 int bus_request_state(struct bus *bus, enum al_state state, span_t timeout, char *error);
-/** Ask one slave for @state, an enum al_state, and acknowledge its error; one frame. The bus must
- * not be in operation: its supervision would lead the slave back. */
-int bus_slave_al_request(struct bus *bus, size_t pos, uint16_t state, char *error);
+/**
+ * Ask one slave for @request, an enum al_state, with AL_ERROR to acknowledge its error in that
+ * state; one frame. Without an error the bit must not be there: a device emulation (0x0141 bit 0)
+ * shows it as an error of its own. The bus must not be in operation: its supervision would lead the
+ * slave back.
+ */
+int bus_slave_al_request(struct bus *bus, size_t pos, uint16_t request, char *error);
 /** AL status and code of one slave, 0x0130 to 0x0135; one frame. */
 int bus_slave_al_read(struct bus *bus, size_t pos, uint8_t ret_al[6], char *error);
 /**
@@ -96,6 +113,12 @@ int bus_slave_al_read(struct bus *bus, size_t pos, uint8_t ret_al[6], char *erro
 int bus_slave_mailbox_program(struct bus *bus, size_t pos, uint16_t state, char *error);
 /** 1 if its SII gives mailboxes for BOOT: it has that state. */
 int bus_slave_has_boot(const struct bus *bus, size_t pos);
+/**
+ * Before a slave of a bus that is not in operation is asked for @state, AL_SAFEOP or AL_OP: its
+ * start-up SDOs, and for SAFE-OP its SyncManagers and FMMUs. To be called until it is not 1, while
+ * mailboxes are served: 1 SDOs are being written; 0; -errno with a line in @error.
+ */
+int bus_slave_set_up(struct bus *bus, size_t pos, uint16_t state, char *error);
 /** The slave is in @state, an enum al_state: requests to its mailbox are possible, or, in INIT, no
  * more. */
 void bus_slave_mailbox_follow(struct bus *bus, size_t pos, uint16_t state);
@@ -167,6 +190,11 @@ void bus_show_places(const struct bus *bus, struct status_page *page);
 /** The SII of the slave at @pos as bus_scan() read it: the categories that matter, the rest zero.
  */
 const uint8_t *bus_slave_sii(const struct bus *bus, size_t pos, size_t *ret_bytes);
+/**
+ * The start-up SDOs of the slave at @pos (base/startup_record.h) to @buf, as many as fit whole.
+ * Returns the bytes of all. Nothing before bus_scan().
+ */
+size_t bus_startup_list(const struct bus *bus, size_t pos, uint8_t *buf, size_t buf_len);
 const struct channel *bus_channels(const struct bus *bus, size_t *ret_count);
 const struct exchange_plan *bus_plan(const struct bus *bus);
 /** What the cyclic frames need of the period; valid after bus_dc_setup(). */

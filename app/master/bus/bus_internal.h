@@ -15,11 +15,13 @@
 #include "ethercatconfig.h"
 #include "ethercatmain.h"
 
+#include "base/startup_record.h"
 #include "bus/bus.h"
 #include "bus/dc_topology.h"
 #include "bus/eeprom.h"
 #include "bus/error_counters.h"
 #include "bus/pdo.h"
+#include "esi/device.h"
 #include "mailbox/mailbox.h"
 #include "wire/sii.h"
 
@@ -42,6 +44,7 @@ enum recovery_step {
 	RECOVERY_SETTLE, /* wait for 0x092C */
 	RECOVERY_SYNC0,
 	RECOVERY_SAFEOP,
+	RECOVERY_SAFEOP_SETUP, /* start-up SDOs of SO */
 	RECOVERY_OP,
 };
 
@@ -60,13 +63,55 @@ struct sync_limits {
 
 enum startup_state { STARTUP_IDLE, STARTUP_RUNNING, STARTUP_DONE, STARTUP_FAILED };
 
-/* The start-up SDOs of a slave, one after the other. */
+/* A start-up SDO, by position, in the order in which they are written (bus/startup_plan.c). */
+struct startup_command {
+	uint16_t slave_pos;
+	enum config_transition transition;
+	enum startup_origin origin;
+	uint16_t index;
+	uint8_t subindex;
+	uint8_t is_complete;
+	uint8_t type; /* as config_sdo.type */
+	uint16_t len;
+	uint64_t value;
+	const uint8_t *octets;  /* NULL: value */
+	const uint8_t *untyped; /* CONFIG_SDO_AUTO, or was it: the text of the configuration */
+	const char *pdo;        /* STARTUP_OF_PDOS: as the configuration calls it; "" */
+	int line;               /* of the configuration; 0: none */
+};
+
+enum { STARTUP_DESCRIPTION_BYTES = 192 };
+
+/* The start-up SDOs of a slave in one transition, one after the other (bus/startup.c). */
 struct bus_startup {
 	enum startup_state state;
+	enum config_transition transition;
 	struct mailbox_request request;
 	uint8_t data[8];
-	size_t next;           /* 0: the mode, then bus->cfg->sdo[next - 1] */
-	struct config_sdo sdo; /* that runs */
+	uint8_t description[STARTUP_DESCRIPTION_BYTES];
+	int is_asking;                   /* for the description, before it writes */
+	size_t next;                     /* in bus->startup */
+	struct startup_command *command; /* that runs, or failed */
+	uint16_t found_type;             /* of the dictionary, where it does not fit */
+	uint16_t found_bits;
+	char untyped[96]; /* why there is no type for a value without one; "": there is */
+	char trouble[BUS_ERROR_BYTES]; /* why it failed on the way back; "": it did not */
+};
+
+/* Time-outs of an ESI description; 0: it has none. */
+struct esi_timeouts {
+	int64_t preop_ns;
+	int64_t op_ns; /* PRE-OP to SAFE-OP, and to OP */
+	int64_t back_to_init_ns;
+	int64_t request_ns; /* until its mailbox takes a mail */
+	int64_t response_ns;
+};
+
+/* A module of a modular device. */
+struct bus_module {
+	uint16_t slave_pos;
+	uint16_t slot; /* from 0 */
+	uint32_t ident;
 };
 
 struct bus_slave {
@@ -84,6 +129,7 @@ struct bus_slave {
 	int is_mapped_by_coe; /* 0: by its SII */
 	int mailbox_bit;      /* of the mailbox states in the cyclic frames; -1: it has none */
 	enum config_mode mode;
+	struct esi_timeouts esi;
 	struct sync_limits output_sync;
 	struct sync_limits input_sync;
 	uint8_t *sii; /* its own, on the heap: bus/sii_read.c */
@@ -171,6 +217,8 @@ struct bus {
 	struct bus_emit listener;              /* of mailbox events */
 	struct bus_esi esi;                    /* load NULL: none */
 	const struct esi_library *library;     /* since the scan; NULL: none */
+	struct bus_module *module;             /* that ESI describes, since PRE-OP */
+	size_t module_count;
 	struct line *line;
 	struct mailbox_engine *mailbox;
 	struct read_ahead *ahead; /* bus/read_ahead.c; NULL: not now */
@@ -186,6 +234,10 @@ struct bus {
 	size_t pdo_count;
 	struct channel *channel; /* since the mapping */
 	size_t channel_count;
+	struct startup_command *startup; /* since the scan */
+	size_t startup_count;
+	struct startup_command *assign; /* of slaves[].pdos[], since the mapping */
+	size_t assign_count;
 	struct exchange_plan plan;
 	struct schedule schedule;
 	int reference; /* position of the reference clock; -1: none */
@@ -261,6 +313,9 @@ int bus_sii_load(struct bus *bus);
 
 /** Mapped entries of a slave by its SII, outputs first; how many, or -errno with a line. */
 int bus_sii_entries(struct bus *bus, size_t pos, struct pdo_entry *ret, size_t capacity);
+/** Name of the PDO of @e, and name and type of @e where it has no name, by bus->parsed, which is of
+ * the slave at @pos: also of PDOs that are not assigned by default. */
+void bus_sii_complete(const struct bus *bus, size_t pos, struct pdo_entry *e);
 
 /* --- esi.c --- */
 
@@ -270,8 +325,21 @@ int bus_esi_load(struct bus *bus);
 const char *bus_esi_device_name(const struct bus *bus, size_t pos);
 /** DC modes to bus->parsed, where the SII has none. */
 void bus_esi_modes(struct bus *bus, size_t pos);
-/** Names and types of entries that have none. */
+/** Time-outs to its slave. */
+void bus_esi_timeouts(struct bus *bus, size_t pos);
+/** The vendor's description of the slave; NULL: none. */
+const struct esi_device *bus_esi_device(const struct bus *bus, size_t pos);
+/** The description of a module, and its slot in that of its slave; NULL: none. */
+const struct esi_device *bus_esi_module(const struct bus *bus, const struct bus_module *module,
+					const struct esi_slot **ret_slot);
+/** Names, types and units of entries that have none. */
 void bus_esi_names(const struct bus *bus, size_t pos, struct pdo_entry *entry, size_t count);
+
+/* --- modules.c --- */
+
+/** Ask modular slaves in PRE-OP for their modules; those that the configuration says stay. The
+ * modules' descriptions are loaded, and bus->startup has their commands. 0; -errno with a line. */
+int bus_modules_load(struct bus *bus);
 
 /* --- soem_slave.c --- */
 
@@ -310,7 +378,7 @@ void bus_read_ahead_forget(struct bus *bus, size_t pos);
 /** Read SM types, PDO assignment and mapping by CoE. Entries found, 0 if there are no such objects,
  * -EAGAIN (bus_read_ahead()), other -errno with a line. */
 int bus_coe_entries(struct bus *bus, size_t pos, struct pdo_entry *ret, size_t capacity);
-/** Complete entries without name or type from the object dictionary (SDO information).
+/** Complete entries without name, type or unit from the object dictionary (SDO information).
  * 0; -EAGAIN (bus_read_ahead()). */
 int bus_coe_names(struct bus *bus, size_t pos, struct pdo_entry *entry, size_t count);
 
@@ -327,16 +395,43 @@ int bus_sdo_entry(struct bus *bus, size_t pos, uint16_t index, uint8_t subindex,
 /** The slave's mailbox SyncManagers were programmed, as SOEM has them. */
 void bus_mailbox_set(struct bus *bus, size_t pos);
 
+/** The event of an SDO that the slave aborted. */
+void bus_tell_abort(struct bus *bus, size_t pos, uint16_t index, uint8_t subindex, uint32_t abort);
+
+/* --- startup_plan.c --- */
+
+/** bus->startup from the configuration by position. 0, or -errno with a line. */
+int bus_startup_plan(struct bus *bus);
+
+/* --- pdos.c --- */
+
+/** slaves[].pdos[] of the slaves from position @from to before @end: check them against the slaves
+ * in PRE-OP, and what has to be written for them into bus->startup. 0, or -errno with a line. */
+int bus_pdos_plan(struct bus *bus, size_t from, size_t end);
+
+/* --- startup_type.c --- */
+
+/** Does the dictionary's entry take what @command writes? */
+int startup_fits(const struct startup_command *command, const struct coe_entry *entry);
 /**
- * Mode and configured start-up SDOs of one slave, in PRE-OP: begun, and polled until they are
- * done, while the engine is stepped. poll() begins them if begin() was not called. 1 they run; 0;
- * -errno with a line.
+ * Give @command of CONFIG_SDO_AUTO the type of @entry, and its text the value. 0, or -errno with
+ * @why.
  */
-void bus_startup_begin(struct bus *bus, size_t pos);
-int bus_startup_poll(struct bus *bus, size_t pos);
+int startup_resolve(struct startup_command *command, const struct coe_entry *entry, char *why,
+		    size_t why_bytes);
+
+/* --- startup.c --- */
+
+/**
+ * Start-up SDOs of one slave in @transition: begun, and polled until they are done, while the
+ * engine is stepped. poll() begins them if begin() was not called. 1 they run; 0; -errno with a
+ * line.
+ */
+void bus_startup_begin(struct bus *bus, size_t pos, enum config_transition transition);
+int bus_startup_poll(struct bus *bus, size_t pos, enum config_transition transition);
 void bus_startup_cancel(struct bus *bus, size_t pos);
 /** Those of all slaves at the same time; blocking. */
-int bus_startup_all(struct bus *bus);
+int bus_startup_all(struct bus *bus, enum config_transition transition);
 
 /* --- mailbox_state.c --- */
 
@@ -370,6 +465,9 @@ int bus_sync_limits(struct bus *bus, size_t pos);
 
 /** SM, FMMU and watchdog of one slave, again, as bus_map() left them. */
 int bus_restore_mapping(struct bus *bus, size_t pos);
+/** The SyncManagers of one slave in PRE-OP, of a bus that bus_map() has not mapped. Blocking. 0, or
+ * -errno with a line. */
+int bus_map_one(struct bus *bus, size_t pos);
 
 /* --- dc_restore.c, dc.c --- */
 

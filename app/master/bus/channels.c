@@ -73,6 +73,9 @@ static void fill(struct channel *ch, const struct slave_info *slave, const struc
 	};
 	snprintf(ch->name, sizeof(ch->name), "%s.%.*s", slave->name,
 		 (int)entry_name_bytes(slave) - 1, name);
+	if (e->bit_len <= PIECE_BITS) {
+		memcpy(ch->unit, e->unit, sizeof(ch->unit));
+	}
 }
 
 /* An entry of more than 64 bits becomes several channels, name_0 first. Returns how many. */

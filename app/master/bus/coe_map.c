@@ -4,11 +4,13 @@
  * (0x1C1n), their entries. An object that is not there means no mapping by CoE; a transfer that
  * fails is an error, never an empty mapping.
  */
+#include <assert.h>
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "bus/bus_internal.h"
+#include "wire/coe_unit.h"
 
 enum {
 	OBJECT_SM_TYPE = 0x1c00,
@@ -150,8 +152,30 @@ int bus_coe_entries(struct bus *bus, size_t pos, struct pdo_entry *ret, size_t c
 	return (int)w.count;
 }
 
+static_assert((int)COE_UNIT_BYTES == (int)LIMIT_UNIT_BYTES, "a unit fits");
+
+enum { UNIT_BITS_MIN = 8 };
+
+/* Bits have no unit: status bits of a terminal are not asked for one by one. */
+static int may_have_unit(const struct pdo_entry *e)
+{
+	return e->bit_len >= UNIT_BITS_MIN;
+}
+
+static void complete(struct pdo_entry *e, const struct coe_entry *found)
+{
+	if (e->data_type == 0) {
+		e->data_type = found->data_type;
+	}
+	if (e->name[0] == '\0') {
+		snprintf(e->name, sizeof(e->name), "%.*s", PDO_NAME_BYTES - 1, found->name);
+	}
+	coe_unit_format(found->unit, e->unit);
+}
+
 int bus_coe_names(struct bus *bus, size_t pos, struct pdo_entry *entry, size_t count)
 {
+	int has_answered = 0;
 	int result = 0;
 
 	if ((bus->soem_slave[soem_index(pos)].CoEdetails & ECT_COEDET_SDOINFO) == 0) {
@@ -162,19 +186,22 @@ int bus_coe_names(struct bus *bus, size_t pos, struct pdo_entry *entry, size_t c
 		struct coe_entry found;
 		int r;
 
-		if (e->index == 0 || (e->name[0] != '\0' && e->data_type != 0)) {
+		if (e->index == 0 ||
+		    (e->name[0] != '\0' && e->data_type != 0 && !may_have_unit(e))) {
 			continue;
 		}
 		r = bus_sdo_entry(bus, pos, e->index, e->subindex, &found);
-		if (r < 0) {
-			result = r == -EAGAIN ? r : result;
-			continue;
+		if (r == -EAGAIN && !has_answered) {
+			return r; /* the others when it is known to answer */
 		}
-		if (e->data_type == 0) {
-			e->data_type = found.data_type;
+		if (r < 0 && r != -EAGAIN && r != -EREMOTEIO) {
+			return result;
 		}
-		if (e->name[0] == '\0') {
-			snprintf(e->name, sizeof(e->name), "%.*s", PDO_NAME_BYTES - 1, found.name);
+		has_answered = 1;
+		if (r == -EAGAIN) {
+			result = r;
+		} else if (r == 0) {
+			complete(e, &found);
 		}
 	}
 	return result;

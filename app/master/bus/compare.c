@@ -214,6 +214,7 @@ void compare_apply(const struct config *cfg, const int *config, size_t found_cou
 	*bound = *cfg;
 	bound->slave_count = 0;
 	bound->sdo_count = 0;
+	bound->pdo_count = 0;
 	bound->channel_count = 0;
 	bound->output_count = 0;
 	for (size_t j = 0; j < found_count && config[j] >= 0; j++) {
@@ -225,6 +226,14 @@ void compare_apply(const struct config *cfg, const int *config, size_t found_cou
 		if (pos >= 0) {
 			bound->sdo[bound->sdo_count] = cfg->sdo[i];
 			bound->sdo[bound->sdo_count++].slave_pos = (uint16_t)pos;
+		}
+	}
+	for (size_t i = 0; i < cfg->pdo_count; i++) {
+		int pos = find_position(config, found_count, cfg->pdo[i].slave_pos);
+
+		if (pos >= 0) {
+			bound->pdo[bound->pdo_count] = cfg->pdo[i];
+			bound->pdo[bound->pdo_count++].slave_pos = (uint16_t)pos;
 		}
 	}
 	for (size_t i = 0; i < cfg->channel_count; i++) {
@@ -327,7 +336,8 @@ static void append_wrong(struct text *text, struct matching *m, size_t i, size_t
 	if (other >= 0) {
 		append_missing(text, m);
 	}
-	append(text, "slave %zu: wrong identity: expected ", i);
+	append_name(text, m->cfg, i);
+	append(text, ": wrong identity: expected ");
 	append_wanted(text, want);
 	append(text, ", found ");
 	append_found(text, want, found, id);

@@ -19,6 +19,8 @@ enum {
 	DIFF_MAGNITUDE = 0x7fffffff,
 	SETTLE_FRAMES = 500, /* between two reads of 0x092C */
 	GOOD_LOOKS = 2,
+	NEAR_FRAMES = 500,     /* in a row, all clocks near: the burst has done its work */
+	NEAR_SHARE = 16,       /* of dc.diff_limit is near: rates that still differ are not */
 	SILENT_FRAMES_MAX = 8, /* of the burst in a row, each tried as often as any access */
 };
 
@@ -205,20 +207,44 @@ static int64_t silence_ms(const struct bus *bus)
 	return SILENT_FRAMES_MAX * ns / NS_PER_MS;
 }
 
+/* Where a burst may end before its last frame. */
+struct burst_end {
+	int64_t near_ns; /* -1: nowhere */
+	unsigned near;   /* frames in a row until now */
+};
+
+/* 0x092C of all slaves ORed is an upper estimate of each. No answer: nothing is known. */
+static int has_come_near(struct burst_end *end, const struct access *diff)
+{
+	int64_t most_ns = (int64_t)(get_le32(diff->data) & DIFF_MAGNITUDE);
+
+	end->near = diff->wkc > 0 && most_ns <= end->near_ns ? end->near + 1 : 0;
+	return end->near >= NEAR_FRAMES;
+}
+
 /*
  * One FRMW a frame: several in one frame measure the same moment and count as one. A single lost
- * frame does no harm; only a wire that stays silent ends the burst.
+ * frame does no harm; only a wire that stays silent ends the burst. Each frame also reads the
+ * differences that the one before has left.
  */
-static int burst(struct bus *bus, uint32_t frames)
+static int burst(struct bus *bus, uint32_t frames, struct burst_end end)
 {
-	struct access access = { .cmd = ECAT_CMD_FRMW,
-				 .adp = bus->slave[bus->reference].info.station_addr,
-				 .reg = ESC_REG_DC_SYSTEM_TIME,
-				 .len = 8 };
+	uint8_t diff[4] = { 0 };
+	struct access access[] = {
+		{ .cmd = ECAT_CMD_FRMW,
+		  .adp = bus->slave[bus->reference].info.station_addr,
+		  .reg = ESC_REG_DC_SYSTEM_TIME,
+		  .len = 8 },
+		{ .cmd = ECAT_CMD_BRD,
+		  .reg = ESC_REG_DC_SYSTEM_TIME_DIFF,
+		  .len = sizeof(diff),
+		  .data = diff },
+	};
 	unsigned silent = 0;
 
 	for (uint32_t i = 0; i < frames; i++) {
-		if (registers_run(bus, &access, 1) < 0) {
+		memset(diff, 0, sizeof(diff)); /* a BRD is ORed into what is sent */
+		if (registers_run(bus, access, sizeof(access) / sizeof(access[0])) < 0) {
 			if (++silent < SILENT_FRAMES_MAX) {
 				continue;
 			}
@@ -229,9 +255,12 @@ static int burst(struct bus *bus, uint32_t frames)
 					silence_ms(bus), line_timeout(bus->line, 0).ns / NS_PER_US);
 		}
 		silent = 0;
-		if (access.wkc == 0) {
+		if (access[0].wkc == 0) {
 			return bus_fail_slave(bus, (size_t)bus->reference, -EIO,
 					      "the reference clock no longer answers");
+		}
+		if (has_come_near(&end, &access[1])) {
+			return 0;
 		}
 	}
 	return 0;
@@ -245,31 +274,51 @@ int64_t bus_clock_diff(struct bus *bus, size_t pos)
 	return r < 0 ? r : (int64_t)(get_le32(raw) & DIFF_MAGNITUDE);
 }
 
-/* The slave that is furthest off, -1 when all are inside the limit. */
+/* The slave that is furthest off, -1 when all are inside the limit; with a negative @ret_diff_ns
+ * one that cannot be read. */
 static int find_straggler(struct bus *bus, int64_t *ret_diff_ns)
 {
+	struct access access[LIMIT_SLAVES];
+	uint8_t raw[LIMIT_SLAVES][4] = { { 0 } };
+	size_t pos[LIMIT_SLAVES];
+	size_t count = 0;
 	int straggler = -1;
+	int r;
 
-	*ret_diff_ns = bus->cfg->dc_diff_limit_ns;
 	for (size_t i = 0; i < bus->slave_count; i++) {
-		int64_t diff_ns = is_follower(bus, i) ? bus_clock_diff(bus, i) : 0;
+		if (is_follower(bus, i)) {
+			access[count] = (struct access){ .cmd = ECAT_CMD_FPRD,
+							 .adp = bus->slave[i].info.station_addr,
+							 .reg = ESC_REG_DC_SYSTEM_TIME_DIFF,
+							 .len = sizeof(raw[0]),
+							 .data = raw[count] };
+			pos[count++] = i;
+		}
+	}
+	r = registers_run(bus, access, count);
+	*ret_diff_ns = bus->cfg->dc_diff_limit_ns;
+	for (size_t i = 0; i < count; i++) {
+		int64_t diff_ns = (int64_t)(get_le32(raw[i]) & DIFF_MAGNITUDE);
 
-		if (diff_ns < 0) {
-			*ret_diff_ns = diff_ns;
-			return (int)i;
+		if (r < 0 || access[i].wkc != 1) {
+			*ret_diff_ns = -EIO;
+			return (int)pos[i];
 		}
 		if (diff_ns > *ret_diff_ns) {
 			*ret_diff_ns = diff_ns;
-			straggler = (int)i;
+			straggler = (int)pos[i];
 		}
 	}
 	return straggler;
 }
 
-/* Rates have settled when the clocks stay together, not when they cross: two good reads in a row.
+/*
+ * Rates have settled when the clocks stay together, not when they cross: near in many frames of the
+ * burst, or at its end, and two good reads in a row.
  */
 static int settle(struct bus *bus)
 {
+	struct burst_end end = { .near_ns = bus->cfg->dc_diff_limit_ns / NEAR_SHARE };
 	mono_t give_up = mono_add(bus_now(bus), (span_t){ bus->cfg->dc_lock_timeout_ns });
 	uint32_t frames = bus->cfg->dc_burst_frames;
 	unsigned good = 0;
@@ -277,7 +326,7 @@ static int settle(struct bus *bus)
 	while (good < GOOD_LOOKS) {
 		int64_t diff_ns = 0;
 		int straggler;
-		int r = burst(bus, frames);
+		int r = burst(bus, frames, end);
 
 		if (r < 0) {
 			return r;
@@ -295,6 +344,7 @@ static int settle(struct bus *bus)
 		}
 		good = straggler < 0 ? good + 1 : 0;
 		frames = SETTLE_FRAMES;
+		end.near_ns = -1;
 	}
 	return 0;
 }

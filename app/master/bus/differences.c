@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/grow.h"
 #include "bus/bus_internal.h"
 #include "bus/channel_rules.h"
 #include "bus/channels.h"
@@ -21,23 +22,15 @@ void differences_free(struct differences *list)
 	*list = (struct differences){ .at = NULL };
 }
 
-/* The next one, empty; NULL: no memory. */
-static struct difference *add(struct differences *list, enum difference_kind kind)
+struct difference *differences_add(struct differences *list, enum difference_kind kind)
 {
-	struct difference *diff;
+	struct difference *diff = array_grow(list->at, &list->count, sizeof(*diff));
 
-	if (list->count == list->room) {
-		size_t room = list->room == 0 ? 16 : 2 * list->room;
-		struct difference *at = realloc(list->at, room * sizeof(*at));
-
-		if (at == NULL) {
-			return NULL;
-		}
-		list->at = at;
-		list->room = room;
+	if (diff == NULL) {
+		return NULL;
 	}
-	diff = &list->at[list->count++];
-	memset(diff, 0, sizeof(*diff));
+	list->at = diff;
+	diff += list->count - 1;
 	diff->kind = (uint16_t)kind;
 	diff->item = DIFFERENCE_NOWHERE;
 	diff->position = DIFFERENCE_NOWHERE;
@@ -186,7 +179,7 @@ static struct difference *add_slave(const struct pairing *p, struct differences 
 				    enum difference_kind kind, size_t i)
 {
 	const struct config_slave *want = &p->cfg->slave[i];
-	struct difference *diff = add(list, kind);
+	struct difference *diff = differences_add(list, kind);
 
 	if (diff == NULL) {
 		return NULL;
@@ -194,6 +187,7 @@ static struct difference *add_slave(const struct pairing *p, struct differences 
 	diff->item = (uint16_t)i;
 	diff->line = (uint32_t)want->line;
 	snprintf(diff->name, sizeof(diff->name), "%s", want->name);
+	snprintf(diff->group, sizeof(diff->group), "%s", want->group);
 	compare_wanted_format(want, diff->expected, sizeof(diff->expected));
 	return diff;
 }
@@ -282,7 +276,7 @@ static int add_of_device(const struct pairing *p, struct differences *list, size
 	if (p->slave[j] != NONE) {
 		return 0;
 	}
-	diff = add(list, DIFFERENCE_UNEXPECTED);
+	diff = differences_add(list, DIFFERENCE_UNEXPECTED);
 	if (diff == NULL) {
 		return -ENOMEM;
 	}
@@ -375,13 +369,15 @@ int differences_of_channels(const struct config *cfg, const struct slave_info *s
 		if (item->slave_pos != slave->slave_pos || meets_a_channel(&of, item)) {
 			continue;
 		}
-		diff = add(list, DIFFERENCE_NO_CHANNEL);
+		diff = differences_add(list, DIFFERENCE_NO_CHANNEL);
 		if (diff == NULL) {
 			return -ENOMEM;
 		}
 		diff->position = slave->slave_pos;
 		diff->line = (uint32_t)item->line;
 		snprintf(diff->name, sizeof(diff->name), "%s", slave->name);
+		snprintf(diff->group, sizeof(diff->group), "%s",
+			 cfg->slave[slave->slave_pos].group);
 		snprintf(diff->property, sizeof(diff->property), "channels");
 		snprintf(diff->expected, sizeof(diff->expected), "%s", item->match);
 		channel_rules_list(&of, diff->found, sizeof(diff->found));
@@ -394,7 +390,7 @@ int differences_of_channels(const struct config *cfg, const struct slave_info *s
 static struct difference *add_output(const struct config *cfg, struct differences *list,
 				     enum difference_kind kind, size_t i)
 {
-	struct difference *diff = add(list, kind);
+	struct difference *diff = differences_add(list, kind);
 
 	if (diff != NULL) {
 		diff->item = (uint16_t)i;
@@ -444,6 +440,22 @@ static int is_slave_named(const struct config *cfg, const struct bus *bus, const
 	return 0;
 }
 
+/* One line for what only the mapping shows; none for 0. */
+static int add_unchecked(struct differences *list, const char *what, size_t count)
+{
+	struct difference *diff = count == 0 ? NULL : differences_add(list, DIFFERENCE_UNCHECKED);
+
+	if (diff == NULL) {
+		return count == 0 ? 0 : -ENOMEM;
+	}
+	snprintf(diff->name, sizeof(diff->name), "%s", what);
+	snprintf(diff->found, sizeof(diff->found),
+		 "%zu cannot be compared: process data are mapped on the way from PRE-OP to "
+		 "SAFE-OP",
+		 count);
+	return 0;
+}
+
 /* Without a channel table: a slave's name that nobody has is wrong in any case. */
 static int add_unmapped(const struct bus *bus, const struct config *cfg, struct differences *list)
 {
@@ -462,18 +474,18 @@ static int add_unmapped(const struct bus *bus, const struct config *cfg, struct 
 		snprintf(diff->expected, sizeof(diff->expected), "an output channel");
 		snprintf(diff->found, sizeof(diff->found), "no slave of this name");
 	}
-	if (unchecked > 0) {
-		diff = add(list, DIFFERENCE_UNCHECKED);
-		if (diff == NULL) {
-			return -ENOMEM;
-		}
-		snprintf(diff->name, sizeof(diff->name), "outputs");
-		snprintf(diff->found, sizeof(diff->found),
-			 "%zu cannot be compared: process data are mapped on the way from PRE-OP "
-			 "to SAFE-OP",
-			 unchecked);
+	return add_unchecked(list, "outputs", unchecked);
+}
+
+/* The same of slaves[].pdos[]: of how many slaves. */
+static int add_unmapped_pdos(const struct config *cfg, struct differences *list)
+{
+	size_t slaves = 0;
+
+	for (size_t i = 0; i < cfg->pdo_count; i++) {
+		slaves += i == 0 || cfg->pdo[i].slave_pos != cfg->pdo[i - 1].slave_pos;
 	}
-	return 0;
+	return add_unchecked(list, "slaves[].pdos", slaves);
 }
 
 /* --- all --- */
@@ -487,7 +499,7 @@ static int add_lost(const struct bus *bus, const struct config *cfg, struct diff
 		if (!bus->slave[j].is_lost) {
 			continue;
 		}
-		diff = add(list, DIFFERENCE_LOST);
+		diff = differences_add(list, DIFFERENCE_LOST);
 		if (diff == NULL) {
 			return -ENOMEM;
 		}
@@ -495,6 +507,8 @@ static int add_lost(const struct bus *bus, const struct config *cfg, struct diff
 		if (item > 0 && item <= cfg->slave_count) {
 			diff->item = (uint16_t)(item - 1);
 			diff->line = (uint32_t)cfg->slave[item - 1].line;
+			snprintf(diff->group, sizeof(diff->group), "%s",
+				 cfg->slave[item - 1].group);
 		}
 		snprintf(diff->name, sizeof(diff->name), "%.*s", (int)sizeof(diff->name) - 1,
 			 bus->info[j].name);
@@ -510,7 +524,7 @@ static int add_guests(const struct bus *bus, struct differences *list)
 	if (bus_guests_known(bus) == 0) {
 		return 0;
 	}
-	diff = add(list, DIFFERENCE_UNEXPECTED);
+	diff = differences_add(list, DIFFERENCE_UNEXPECTED);
 	if (diff == NULL) {
 		return -ENOMEM;
 	}
@@ -524,6 +538,7 @@ int differences_of_bus(const struct bus *bus, const struct config *cfg, struct d
 
 	if (bus == NULL) {
 		r = differences_of_slaves(cfg, NULL, NULL, 0, list);
+		r = r < 0 ? r : add_unmapped_pdos(cfg, list);
 		return r < 0 ? r : add_unmapped(bus, cfg, list);
 	}
 	r = differences_of_slaves(cfg, bus->info, bus->identification, bus->slave_count, list);
@@ -540,6 +555,17 @@ int differences_of_bus(const struct bus *bus, const struct config *cfg, struct d
 		if (r < 0) {
 			return r;
 		}
+	}
+	for (size_t i = 0;
+	     i < bus->slave_count && bus->plan.slave_count > 0 && bus->pdo != NULL && r == 0; i++) {
+		r = differences_of_pdos(bus->cfg, &bus->info[i], &bus->pdo[bus->slave[i].pdo_first],
+					bus->slave[i].pdo_count, list);
+	}
+	if (r == 0 && (bus->plan.slave_count == 0 || bus->pdo == NULL)) {
+		r = add_unmapped_pdos(cfg, list);
+	}
+	if (r < 0) {
+		return r;
 	}
 	/* With a channel table, the slaves fit: the outputs of those that are absent are left out.
 	 */

@@ -14,15 +14,17 @@
 #include "config/config.h"
 
 struct bus;
+struct pdo_entry;
 
 /* Zero at first. */
 struct differences {
 	struct difference *at;
 	size_t count;
-	size_t room;
 };
 
 void differences_free(struct differences *list);
+/** The next one, empty; NULL: no memory. */
+struct difference *differences_add(struct differences *list, enum difference_kind kind);
 
 /** Those of the slaves: none if compare_bind() binds them, but optional ones that are absent. @id
  * as for compare_bind(). 0 or -ENOMEM. */
@@ -35,13 +37,18 @@ int differences_of_channels(const struct config *cfg, const struct slave_info *s
 			    struct channel *channel, size_t channel_count,
 			    struct differences *list);
 
+/** slaves[].pdos[] of @slave that are not what it has assigned, with entries in the order of their
+ * PDOs, a difference a direction. @cfg by position. 0 or -ENOMEM. */
+int differences_of_pdos(const struct config *cfg, const struct slave_info *slave,
+			const struct pdo_entry *entry, size_t count, struct differences *list);
+
 /** outputs[] that are no output channels. @slave_count of @slaves: those of the channels. */
 int differences_of_outputs(const struct config *cfg, const struct channel *channels,
 			   size_t channel_count, struct differences *list);
 
 /**
  * All of @bus against @cfg as it was configured: slaves, those that were lost since, new devices,
- * channels, outputs. @bus NULL: no slave was found. 0 or -ENOMEM.
+ * channels, PDOs, outputs. @bus NULL: no slave was found. 0 or -ENOMEM.
  */
 int differences_of_bus(const struct bus *bus, const struct config *cfg, struct differences *list);
 

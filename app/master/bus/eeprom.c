@@ -165,6 +165,12 @@ int eeprom_take(struct eeprom_command *cmd, const struct access *access, mono_t 
 	return r;
 }
 
+int eeprom_lost(struct eeprom_command *cmd, mono_t now)
+{
+	again(cmd, -ETIMEDOUT);
+	return now.ns >= cmd->give_up.ns ? cmd->problem : 1;
+}
+
 const char *eeprom_error_text(int result)
 {
 	switch (-result) {

@@ -63,7 +63,10 @@ size_t eeprom_prepare(struct eeprom_command *cmd, struct access *ret);
  * refuses to be written: all until the time was over; -EBADMSG two slaves answered.
  */
 int eeprom_take(struct eeprom_command *cmd, const struct access *access, mono_t now);
-/** What a result of eeprom_take() means, for an error line. */
+/** No frame came back instead: 1 go on, as any access of a command may be repeated; -ETIMEDOUT the
+ * time was over. */
+int eeprom_lost(struct eeprom_command *cmd, mono_t now);
+/** What a result of either means, for an error line. */
 const char *eeprom_error_text(int result);
 
 #endif

@@ -51,6 +51,7 @@ struct esc_port_diagnosis {
 	uint8_t is_link;          /* physical link, DL status bit 4 + port */
 	uint8_t is_loop_closed;   /* bit 8 + 2 * port */
 	uint8_t is_communicating; /* bit 9 + 2 * port */
+	uint8_t is_ebus;          /* 0x0007, bit 2 * port: 2, not MII */
 	uint8_t invalid_frames;   /* 0x0300 + 2 * port; counters stop at 255 */
 	uint8_t rx_errors;        /* 0x0301 + 2 * port */
 	uint8_t forwarded_errors; /* 0x0308 + port */

@@ -13,6 +13,7 @@ enum {
 	PORT_LINK = 4, /* DL status: bit of port 0 */
 	LOOP_CLOSED = 8,
 	COMMUNICATION = 9,
+	PORT_EBUS = 2, /* of a port's two bits in the descriptor */
 };
 
 /* As they are read, in one frame. */
@@ -39,6 +40,7 @@ static void take_ports(const struct raw *raw, struct esc_diagnosis *ret)
 			.is_link = ret->dl_status >> (PORT_LINK + i) & 1,
 			.is_loop_closed = ret->dl_status >> (LOOP_CLOSED + 2 * i) & 1,
 			.is_communicating = ret->dl_status >> (COMMUNICATION + 2 * i) & 1,
+			.is_ebus = (raw->chip[ESC_REG_PORT_DESCRIPTOR] >> 2 * i & 3) == PORT_EBUS,
 			.invalid_frames = raw->errors[(size_t)2 * i],
 			.rx_errors = raw->errors[(size_t)2 * i + 1],
 			.forwarded_errors = raw->errors[2 * ESC_PORTS + i],

@@ -371,7 +371,11 @@ static int sort_frame(struct exchange *ex, unsigned number, uint16_t sequence, m
 /* 1 if the frame was expected, 0 if not. */
 static int take_frame(struct exchange *ex, size_t len, mono_t at)
 {
-	for (unsigned i = 0; i < ex->frame_count; i++) {
+	/* They come back in order: the first that is missing is the most likely one. */
+	unsigned first = ex->missing != 0 ? (unsigned)__builtin_ctzll(ex->missing) : 0;
+
+	for (unsigned n = 0; n < ex->frame_count; n++) {
+		unsigned i = first + n < ex->frame_count ? first + n : first + n - ex->frame_count;
 		uint16_t sequence;
 
 		if (exchange_frame_matches(&ex->frame[i], ex->received, len, &sequence)) {

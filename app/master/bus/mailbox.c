@@ -1,17 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The bus's mailboxes: blocking SDO transfers for bring-up, others that are begun, and start-up
- * SDOs, of all slaves at the same time.
+ * The bus's mailboxes: blocking SDO transfers for bring-up, and others that are begun.
  */
 #include <errno.h>
-#include <inttypes.h>
 #include <string.h>
 
 #include "base/bytes.h"
 #include "bus/bus_internal.h"
 #include "bus/guests.h"
-#include "image/entry.h"
-#include "wire/sdo_abort.h"
 
 /* Boxes that no frame can carry: a slave without a mailbox. */
 static void open_mailbox(struct bus *bus, size_t pos, const struct mailbox_slave_spec *spec)
@@ -91,30 +87,34 @@ int bus_has_coe(const struct bus *bus, size_t pos)
 
 /* --- one transfer; blocking --- */
 
-static void tell_abort(struct bus *bus, size_t pos, int32_t object, uint32_t abort)
+/* NOLINTNEXTLINE(readability-function-size): as bus_sdo_read() */
+void bus_tell_abort(struct bus *bus, size_t pos, uint16_t index, uint8_t subindex, uint32_t abort)
 {
 	bus_emit_event(bus, &bus->listener,
 		       (struct event){ .id = EVENT_SDO_ABORT,
 				       .slave_pos = (uint16_t)pos,
 				       .value = abort,
-				       .arg = { object, 0 } });
+				       .arg = { (int32_t)((uint32_t)index << 8 | subindex), 0 } });
 }
 
-static int32_t object_of(uint16_t index, uint8_t subindex)
+static span_t longer(int64_t configured_ns, int64_t esi_ns)
 {
-	return (int32_t)((uint32_t)index << 8 | subindex);
+	return (span_t){ esi_ns > configured_ns ? esi_ns : configured_ns };
 }
 
 int bus_mailbox_submit(struct bus *bus, struct mailbox_request *rq)
 {
-	rq->timeout = (span_t){ bus->cfg->bus_mailbox_timeout_ns };
+	const struct bus_slave *sl = &bus->slave[rq->slave_pos];
+
 	if (rq->slave_pos >= bus->slave_count) {
 		return -ENODEV;
 	}
+	rq->timeout = longer(bus->cfg->bus_mailbox_timeout_ns, sl->esi.response_ns);
+	rq->send_timeout = longer(bus->cfg->bus_mailbox_timeout_ns, sl->esi.request_ns);
 	if (!mailbox_slave_has(bus->mailbox, rq->slave_pos, rq->protocol->sii_bit)) {
 		return -ENOTSUP;
 	}
-	return bus->slave[rq->slave_pos].is_lost ? -EIO : mailbox_submit(bus->mailbox, rq);
+	return sl->is_lost ? -EIO : mailbox_submit(bus->mailbox, rq);
 }
 
 void bus_mailbox_cancel(struct bus *bus, struct mailbox_request *rq)
@@ -163,7 +163,7 @@ int bus_sdo_read(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t su
 	int r = read_sdo(bus, slave_pos, index, subindex, ret_data, len, ret_abort);
 
 	if (r == -EREMOTEIO) {
-		tell_abort(bus, slave_pos, object_of(index, subindex), *ret_abort);
+		bus_tell_abort(bus, slave_pos, index, subindex, *ret_abort);
 	}
 	return r;
 }
@@ -189,7 +189,7 @@ int bus_sdo_write(struct bus *bus, uint16_t slave_pos, uint16_t index, uint8_t s
 	r = run(bus, &rq);
 	*ret_abort = rq.is_mailbox_error ? 0 : rq.detail;
 	if (r == -EREMOTEIO) {
-		tell_abort(bus, slave_pos, object_of(index, subindex), *ret_abort);
+		bus_tell_abort(bus, slave_pos, index, subindex, *ret_abort);
 	}
 	return r;
 }
@@ -225,178 +225,4 @@ int bus_sdo_entry(struct bus *bus, size_t pos, uint16_t index, uint8_t subindex,
 	int r = run(bus, &rq);
 
 	return r < 0 ? r : coe_entry_get(description, rq.len, ret_entry);
-}
-
-/* --- start-up SDOs --- */
-
-static int line_of(const struct bus *bus, size_t pos)
-{
-	return pos < bus->cfg->slave_count ? bus->cfg->slave[pos].line : 0;
-}
-
-static struct config_sdo mode_sdo(const struct bus *bus, size_t pos)
-{
-	return (struct config_sdo){
-		.slave_pos = (uint16_t)pos,
-		.index = PICCOLO_OBJECT_MODE,
-		.subindex = PICCOLO_SUBINDEX_MODE,
-		.bytes = 1,
-		.value = bus->slave[pos].mode == CONFIG_MODE_ONESHOT ? 1 : 0,
-		.line = line_of(bus, pos),
-	};
-}
-
-/* The slave's next one, the mode first: 1 and @ret; 0: there is none. */
-static int next_sdo(const struct bus *bus, size_t pos, size_t *next, struct config_sdo *ret)
-{
-	if (*next == 0) {
-		*next = 1;
-		if (bus->slave[pos].mode != CONFIG_MODE_UNSET) {
-			*ret = mode_sdo(bus, pos);
-			return 1;
-		}
-	}
-	while (*next <= bus->cfg->sdo_count) {
-		const struct config_sdo *sdo = &bus->cfg->sdo[*next - 1];
-
-		(*next)++;
-		if (sdo->slave_pos == pos) {
-			*ret = *sdo;
-			return 1;
-		}
-	}
-	return 0;
-}
-
-static void go_on(struct bus *bus, size_t pos)
-{
-	struct bus_startup *su = &bus->slave[pos].startup;
-	int r;
-
-	if (!next_sdo(bus, pos, &su->next, &su->sdo)) {
-		su->state = STARTUP_DONE;
-		return;
-	}
-	put_le64(su->data, su->sdo.value);
-	su->request.buffer = su->data;
-	su->request.capacity = su->sdo.bytes;
-	su->request.with.coe = (struct coe_parameters){ .operation = COE_DOWNLOAD,
-							.index = su->sdo.index,
-							.subindex = su->sdo.subindex };
-	r = bus_mailbox_submit(bus, &su->request);
-	if (r < 0) {
-		su->request.result = r;
-		su->state = STARTUP_FAILED;
-	}
-}
-
-static void startup_sdo_done(void *ctx, struct mailbox_request *rq)
-{
-	struct bus *bus = ctx;
-	struct bus_startup *su = &bus->slave[rq->slave_pos].startup;
-
-	if (rq->result < 0) {
-		su->state = STARTUP_FAILED;
-	} else {
-		go_on(bus, rq->slave_pos);
-	}
-}
-
-void bus_startup_begin(struct bus *bus, size_t pos)
-{
-	struct bus_startup *su = &bus->slave[pos].startup;
-
-	bus_startup_cancel(bus, pos);
-	*su = (struct bus_startup){
-		.state = STARTUP_RUNNING,
-		.request = { .protocol = &coe_protocol,
-			     .slave_pos = (uint16_t)pos,
-			     .done = startup_sdo_done,
-			     .ctx = bus },
-	};
-	if (bus->slave[pos].mode != CONFIG_MODE_UNSET && !slave_is_piccolo(&bus->slave[pos].info)) {
-		su->state = STARTUP_FAILED;
-		su->request.result = -ENOTSUP;
-		return;
-	}
-	go_on(bus, pos);
-}
-
-void bus_startup_cancel(struct bus *bus, size_t pos)
-{
-	struct bus_startup *su = &bus->slave[pos].startup;
-
-	if (mailbox_is_running(&su->request)) {
-		mailbox_cancel(bus->mailbox, &su->request);
-	}
-	su->state = STARTUP_IDLE;
-}
-
-static int fail_startup(struct bus *bus, size_t pos)
-{
-	const struct bus_slave *sl = &bus->slave[pos];
-	const struct config_sdo *sdo = &sl->startup.sdo;
-	const struct mailbox_request *rq = &sl->startup.request;
-
-	if (sl->mode != CONFIG_MODE_UNSET && !slave_is_piccolo(&sl->info)) {
-		return bus_fail_slave(
-			bus, pos, -ENOTSUP,
-			"mode is an option of the FB1111-Piccolo; this is vendor 0x%08x "
-			"product 0x%08x",
-			sl->info.vendor, sl->info.product);
-	}
-	if (rq->result == -EREMOTEIO && !rq->is_mailbox_error) {
-		tell_abort(bus, pos, object_of(sdo->index, sdo->subindex), rq->detail);
-		return bus_fail_slave(bus, pos, -EPROTO,
-				      "start-up SDO 0x%04x:%02x = 0x%" PRIx64
-				      " (%s:%d) rejected: abort "
-				      "0x%08x, %s",
-				      sdo->index, sdo->subindex, sdo->value, bus->cfg->path,
-				      sdo->line, rq->detail, sdo_abort_to_str(rq->detail));
-	}
-	return bus_fail_slave(bus, pos, rq->result, "start-up SDO 0x%04x:%02x (%s:%d): %s",
-			      sdo->index, sdo->subindex, bus->cfg->path, sdo->line,
-			      rq->is_mailbox_error       ? mailbox_error_to_str(rq->detail)
-			      : rq->result == -ENOTSUP   ? "the slave has no CoE mailbox"
-			      : rq->result == -ETIMEDOUT ? "no answer from its mailbox"
-							 : strerror(-rq->result));
-}
-
-int bus_startup_poll(struct bus *bus, size_t pos)
-{
-	struct bus_startup *su = &bus->slave[pos].startup;
-
-	if (su->state == STARTUP_IDLE) {
-		bus_startup_begin(bus, pos);
-	}
-	if (su->state == STARTUP_RUNNING) {
-		return 1;
-	}
-	if (su->state == STARTUP_FAILED) {
-		su->state = STARTUP_IDLE;
-		return fail_startup(bus, pos);
-	}
-	su->state = STARTUP_IDLE;
-	return 0;
-}
-
-int bus_startup_all(struct bus *bus)
-{
-	int r;
-
-	for (size_t i = 0; i < bus->slave_count; i++) {
-		bus_startup_begin(bus, i);
-	}
-	r = mailbox_wait_all(bus->mailbox);
-	for (size_t i = 0; i < bus->slave_count; i++) {
-		int one = r < 0 ? r : bus_startup_poll(bus, i);
-
-		if (one < 0) {
-			for (size_t k = 0; k < bus->slave_count; k++) {
-				bus_startup_cancel(bus, k);
-			}
-			return one;
-		}
-	}
-	return 0;
 }

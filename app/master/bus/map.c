@@ -34,19 +34,22 @@ static uint32_t bytes_of(uint32_t bits)
 /* --- what the slave maps --- */
 
 /* CoE gives index and length; the SII often has the name and type. */
-static void borrow_names(struct pdo_entry *entry, size_t count, const struct pdo_entry *sii,
+static void borrow_names(const struct bus *bus, size_t pos, struct pdo_entry *entry, size_t count,
 			 size_t sii_count)
 {
+	const struct pdo_entry *sii = entry + count;
+
 	for (size_t i = 0; i < count; i++) {
 		for (size_t k = 0; k < sii_count && entry[i].index != 0; k++) {
 			if (sii[k].index == entry[i].index &&
 			    sii[k].subindex == entry[i].subindex) {
 				memcpy(entry[i].name, sii[k].name, sizeof(entry[i].name));
-				memcpy(entry[i].pdo_name, sii[k].pdo_name,
-				       sizeof(entry[i].pdo_name));
 				entry[i].data_type = sii[k].data_type;
 				break;
 			}
+		}
+		if (entry[i].index != 0) {
+			bus_sii_complete(bus, pos, &entry[i]);
 		}
 	}
 }
@@ -70,7 +73,7 @@ static int read_entries(struct bus *bus, size_t pos)
 		return sii;
 	}
 	if (coe > 0) {
-		borrow_names(entry, (size_t)coe, entry + coe, sii > 0 ? (size_t)sii : 0);
+		borrow_names(bus, pos, entry, (size_t)coe, sii > 0 ? (size_t)sii : 0);
 		if (bus_coe_names(bus, pos, entry, (size_t)coe) < 0) {
 			return -EAGAIN;
 		}
@@ -337,11 +340,9 @@ static int read_limits(struct bus *bus)
 
 static int read_all(struct bus *bus)
 {
-	int r;
+	int r = bus_pdos_plan(bus, 0, bus->slave_count);
 
-	bus->pdo_count = 0;
-	bus->channel_count = 0;
-	r = bus_startup_all(bus);
+	r = r < 0 ? r : bus_startup_all(bus, CONFIG_TRANSITION_PS);
 	r = r < 0 ? r : read_mapping(bus);
 	return r < 0 ? r : read_limits(bus);
 }
@@ -351,6 +352,8 @@ static int make_tables(struct bus *bus)
 {
 	free(bus->pdo);
 	free(bus->channel);
+	bus->pdo_count = 0;
+	bus->channel_count = 0;
 	bus->pdo = calloc(PDO_LIMIT, sizeof(bus->pdo[0]));
 	bus->channel = calloc(LIMIT_CHANNELS, sizeof(bus->channel[0]));
 	return bus->pdo != NULL && bus->channel != NULL
@@ -366,6 +369,21 @@ static void shrink_tables(struct bus *bus)
 
 	bus->pdo = pdo != NULL ? pdo : bus->pdo;
 	bus->channel = channel != NULL ? channel : bus->channel;
+}
+
+/* Its entries are not kept: they have no place in an image. */
+int bus_map_one(struct bus *bus, size_t pos)
+{
+	struct bus_slave *sl = &bus->slave[pos];
+	uint32_t bytes = 0;
+	int r = make_tables(bus);
+
+	r = r < 0 ? r : read_entries(bus, pos);
+	r = r < 0 ? r : bus_map_sm(bus, pos, &bytes);
+	sl->pdo_count = 0;
+	bus->pdo_count = 0;
+	shrink_tables(bus);
+	return r < 0 ? r : bus_restore_mapping(bus, pos);
 }
 
 int bus_map(struct bus *bus, char *error)

@@ -112,6 +112,7 @@ static int set_sm(struct bus *bus, size_t pos, unsigned n, const struct sm_bits 
 		if (r < 0) {
 			return r;
 		}
+		soem->SM[n].SMflags = htoel(etohl(soem->SM[n].SMflags) | ~EC_SMENABLEMASK);
 	} else {
 		soem->SM[n].SMflags = htoel(etohl(soem->SM[n].SMflags) & EC_SMENABLEMASK);
 	}

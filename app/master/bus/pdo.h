@@ -15,8 +15,9 @@ struct pdo_entry {
 	uint8_t subindex;
 	uint8_t sm; /* SyncManager */
 	uint8_t bit_len;
-	uint8_t is_output;  /* from the master's side */
-	uint16_t data_type; /* CoE number, 0: not given */
+	uint8_t is_output;           /* from the master's side */
+	uint16_t data_type;          /* CoE number, 0: not given */
+	char unit[LIMIT_UNIT_BYTES]; /* "": not given */
 	char name[PDO_NAME_BYTES];
 	char pdo_name[PDO_NAME_BYTES];
 };

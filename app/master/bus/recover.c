@@ -25,6 +25,7 @@ enum { GOOD_LOOKS = 4, PAUSE_MAX_S = 30 };
 
 enum step_timeout {
 	TIMEOUT_NONE,
+	TIMEOUT_INIT,
 	TIMEOUT_PREOP,
 	TIMEOUT_OP,
 	TIMEOUT_SETUP,
@@ -38,6 +39,7 @@ enum progress { WAIT, DONE, FAILED };
 static enum progress to_init(struct bus *bus, size_t pos);
 static enum progress to_state(struct bus *bus, size_t pos);
 static enum progress set_up(struct bus *bus, size_t pos);
+static enum progress set_up_safeop(struct bus *bus, size_t pos);
 static enum progress set_clock(struct bus *bus, size_t pos);
 static enum progress settle(struct bus *bus, size_t pos);
 static enum progress wait_sync0(struct bus *bus, size_t pos);
@@ -48,26 +50,38 @@ static const struct {
 	enum step_timeout timeout;
 	enum recovery_step next; /* when it is done */
 } steps[] = {
-	[RECOVERY_INIT] = { to_init, AL_INIT, TIMEOUT_PREOP, RECOVERY_PREOP },
+	[RECOVERY_INIT] = { to_init, AL_INIT, TIMEOUT_INIT, RECOVERY_PREOP },
 	[RECOVERY_PREOP] = { to_state, AL_PREOP, TIMEOUT_PREOP, RECOVERY_SETUP },
 	[RECOVERY_SETUP] = { set_up, AL_PREOP, TIMEOUT_SETUP, RECOVERY_CLOCK },
 	[RECOVERY_CLOCK] = { set_clock, AL_NONE, TIMEOUT_LOCK, RECOVERY_SETTLE },
 	[RECOVERY_SETTLE] = { settle, AL_NONE, TIMEOUT_LOCK, RECOVERY_SYNC0 },
 	[RECOVERY_SYNC0] = { wait_sync0, AL_NONE, TIMEOUT_SYNC0, RECOVERY_SAFEOP },
-	[RECOVERY_SAFEOP] = { to_state, AL_SAFEOP, TIMEOUT_OP, RECOVERY_OP },
+	[RECOVERY_SAFEOP] = { to_state, AL_SAFEOP, TIMEOUT_OP, RECOVERY_SAFEOP_SETUP },
+	[RECOVERY_SAFEOP_SETUP] = { set_up_safeop, AL_SAFEOP, TIMEOUT_SETUP, RECOVERY_OP },
 	[RECOVERY_OP] = { to_state, AL_OP, TIMEOUT_OP, RECOVERY_NONE },
 };
+
+/* The configuration goes before the vendor's description. */
+static int64_t first_set(int64_t configured_ns, int64_t esi_ns, int64_t default_ns)
+{
+	return configured_ns != 0 ? configured_ns : esi_ns != 0 ? esi_ns : default_ns;
+}
 
 static int64_t timeout_ns(const struct bus *bus, size_t pos, enum step_timeout timeout)
 {
 	const struct config_slave *want = bus_config_slave(bus, pos);
+	const struct bus_slave *sl = &bus->slave[pos];
 
 	switch (timeout) {
+	case TIMEOUT_INIT:
+		return first_set(want != NULL ? want->preop_timeout_ns : 0, sl->esi.back_to_init_ns,
+				 CONFIG_PREOP_TIMEOUT_NS);
 	case TIMEOUT_PREOP:
-		return want != NULL ? want->preop_timeout_ns : CONFIG_PREOP_TIMEOUT_NS;
+		return first_set(want != NULL ? want->preop_timeout_ns : 0, sl->esi.preop_ns,
+				 CONFIG_PREOP_TIMEOUT_NS);
 	case TIMEOUT_OP:
-		return want != NULL && want->op_timeout_ns != 0 ? want->op_timeout_ns
-								: bus->cfg->bus_op_timeout_ns;
+		return first_set(want != NULL ? want->op_timeout_ns : 0, sl->esi.op_ns,
+				 bus->cfg->bus_op_timeout_ns);
 	case TIMEOUT_SETUP:
 		return SETUP_NS;
 	case TIMEOUT_LOCK:
@@ -89,7 +103,9 @@ static void enter_at(struct bus *bus, size_t pos, enum recovery_step step, mono_
 	sl->accepted = AL_NONE;
 	sl->step_deadline = mono_add(at, (span_t){ span_ns });
 	if (step == RECOVERY_SETUP) {
-		bus_startup_begin(bus, pos);
+		bus_startup_begin(bus, pos, CONFIG_TRANSITION_IP);
+	} else if (step == RECOVERY_SAFEOP_SETUP) {
+		bus_startup_begin(bus, pos, CONFIG_TRANSITION_SO);
 	}
 }
 
@@ -209,10 +225,31 @@ static int needs_clock(const struct bus *bus, size_t pos)
 	return has_clock(bus, pos) && !bus->slave[pos].is_clock_set;
 }
 
+/* Start-up SDOs, with their failure kept in words. 1 they run; 0; -errno. */
+static int poll_startup(struct bus *bus, size_t pos, enum config_transition transition)
+{
+	char *error = bus->error;
+	int r;
+
+	bus->error = bus->slave[pos].startup.trouble;
+	r = bus_startup_poll(bus, pos, transition);
+	bus->error = error;
+	return r;
+}
+
+/* What it was given in PRE-OP before is gone: both transitions. */
 static enum progress set_up(struct bus *bus, size_t pos)
 {
-	int r = bus_startup_poll(bus, pos);
+	int r;
 
+	if (bus->slave[pos].startup.transition == CONFIG_TRANSITION_IP) {
+		r = poll_startup(bus, pos, CONFIG_TRANSITION_IP);
+		if (r == 0) {
+			bus_startup_begin(bus, pos, CONFIG_TRANSITION_PS);
+		}
+		return r < 0 ? FAILED : WAIT;
+	}
+	r = poll_startup(bus, pos, CONFIG_TRANSITION_PS);
 	if (r == 0) {
 		r = bus_restore_mapping(bus, pos);
 	}
@@ -220,6 +257,13 @@ static enum progress set_up(struct bus *bus, size_t pos)
 		return FAILED;
 	}
 	return r > 0 ? WAIT : DONE;
+}
+
+static enum progress set_up_safeop(struct bus *bus, size_t pos)
+{
+	int r = poll_startup(bus, pos, CONFIG_TRANSITION_SO);
+
+	return r < 0 ? FAILED : r > 0 ? WAIT : DONE;
 }
 
 /* --- clock --- */
@@ -288,7 +332,8 @@ static void choose_with_clock(struct bus *bus, size_t pos)
 	} else if (bus_sync0_is_wanted(bus, pos) && bus_sync0_is_running(bus, pos) == 0) {
 		enter(bus, pos, RECOVERY_SETTLE);
 	} else {
-		enter(bus, pos, state_of(&bus->slave[pos]) == AL_OP ? RECOVERY_NONE : RECOVERY_OP);
+		enter(bus, pos,
+		      state_of(&bus->slave[pos]) == AL_OP ? RECOVERY_NONE : RECOVERY_SAFEOP_SETUP);
 	}
 }
 
@@ -368,6 +413,7 @@ void bus_recover_forget(struct bus_slave *sl)
 	sl->is_unstable = 0;
 	sl->is_latched = 0;
 	sl->trouble_code = 0;
+	sl->startup.trouble[0] = '\0';
 	sl->retry_at = (mono_t){ 0 };
 }
 
@@ -470,6 +516,11 @@ void bus_recover_describe(const struct bus *bus, size_t pos, char *ret_text, siz
 	if (sl->is_lost || sl->misses > 0) {
 		snprintf(ret_text, text_bytes, "slave %zu (%s): does not answer", pos,
 			 sl->info.name);
+		return;
+	}
+	if (sl->startup.trouble[0] != '\0') {
+		describe_attempts(bus, sl, attempts, sizeof(attempts));
+		snprintf(ret_text, text_bytes, "%s%s", sl->startup.trouble, attempts);
 		return;
 	}
 	if (sl->trouble_code != 0) {

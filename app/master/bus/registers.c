@@ -75,6 +75,9 @@ int registers_run(struct bus *bus, struct access *access, size_t count)
 		int r = -EMSGSIZE;
 
 		for (unsigned i = 0; i < tries && r < 0 && r != -ECANCELED; i++) {
+			if (line_pause(bus->line, i) < 0) {
+				return -ECANCELED;
+			}
 			packed = pack(&fb, frame, line_frame_limit(bus->line), access, count,
 				      bus->sequence++);
 			if (packed == 0) {

@@ -16,6 +16,7 @@
 #include "bus/identity.h"
 #include "bus/names.h"
 #include "bus/registers.h"
+#include "config/version.h"
 #include "image/entry.h"
 
 /* SYNC pulses of a master that was killed; a slave whose SYNC unit its PDI owns is freed in
@@ -302,6 +303,7 @@ static int describe_all(struct bus *bus)
 			take_identity(bus, i);
 		}
 	}
+	bus->module_count = 0;
 	r = r < 0 ? r : bus_esi_load(bus);
 	if (r < 0) {
 		return r;
@@ -309,9 +311,13 @@ static int describe_all(struct bus *bus)
 	bind_slaves(bus);
 	for (size_t i = 0; i < bus->slave_count && r >= 0; i++) {
 		take_settings(bus, i);
+		bus_esi_timeouts(bus, i);
 		r = describe(bus, i);
 	}
-	return r < 0 ? r : check_names(bus);
+	r = r < 0 ? r : check_names(bus);
+	bus->assign_count = 0;
+	bus->startup_count = 0;
+	return r < 0 ? r : bus_startup_plan(bus);
 }
 
 int bus_scan(struct bus *bus, char *error)
@@ -340,7 +346,7 @@ int bus_scan(struct bus *bus, char *error)
 	for (size_t i = 0; i < bus->slave_count && r >= 0; i++) {
 		bus_mailbox_set(bus, i);
 	}
-	return r;
+	return r < 0 ? r : bus_modules_load(bus);
 }
 
 int bus_compare(const struct bus *bus, char *error)
@@ -352,4 +358,11 @@ int bus_compare(const struct bus *bus, char *error)
 const struct config *bus_config(const struct bus *bus)
 {
 	return bus->cfg;
+}
+
+void bus_config_follow(struct bus *bus)
+{
+	if (bus->cfg == &bus->bound) {
+		config_follow(&bus->bound, bus->wanted);
+	}
 }

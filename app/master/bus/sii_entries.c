@@ -48,6 +48,25 @@ static int add_direction(const struct bus *bus, size_t pos, int is_output, struc
 	return (int)count;
 }
 
+void bus_sii_complete(const struct bus *bus, size_t pos, struct pdo_entry *e)
+{
+	const struct bus_slave *sl = &bus->slave[pos];
+	const struct sii *sii = &bus->parsed;
+
+	for (size_t i = 0; i < sii->pdo_count; i++) {
+		if (sii->pdo[i].index == e->pdo) {
+			copy_string(sl, sii->pdo[i].name, e->pdo_name);
+			break;
+		}
+	}
+	for (size_t i = 0; i < sii->entry_count && e->name[0] == '\0'; i++) {
+		if (sii->entry[i].index == e->index && sii->entry[i].subindex == e->subindex) {
+			copy_string(sl, sii->entry[i].name, e->name);
+			e->data_type = sii->entry[i].data_type;
+		}
+	}
+}
+
 int bus_sii_entries(struct bus *bus, size_t pos, struct pdo_entry *ret, size_t capacity)
 {
 	const struct bus_slave *sl = &bus->slave[pos];

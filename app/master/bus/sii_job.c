@@ -313,6 +313,8 @@ int sii_job_step(struct sii_job *job)
 	r = registers_run(job->bus, access, count);
 	if (r == 0) {
 		r = eeprom_take(&job->command, access, bus_now(job->bus));
+	} else if (r == -ETIMEDOUT) {
+		r = eeprom_lost(&job->command, bus_now(job->bus));
 	}
 	if (r < 0) {
 		return fail(job, r, eeprom_error_text(r));

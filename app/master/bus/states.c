@@ -248,22 +248,37 @@ static int lead_to(struct bus *bus, enum al_state state, enum lead lead, span_t 
 	return wait_for(bus, state, lead, mono_add(start, timeout));
 }
 
+/* A slave whose vendor gives it longer is waited for as long. */
+static span_t longest(const struct bus *bus, enum al_state state, span_t timeout)
+{
+	for (size_t i = 0; i < bus->slave_count; i++) {
+		const struct esi_timeouts *esi = &bus->slave[i].esi;
+		int64_t esi_ns = state == AL_INIT                       ? esi->back_to_init_ns
+				 : state == AL_PREOP                    ? esi->preop_ns
+				 : state == AL_SAFEOP || state == AL_OP ? esi->op_ns
+									: 0;
+
+		timeout.ns = esi_ns > timeout.ns ? esi_ns : timeout.ns;
+	}
+	return timeout;
+}
+
 int bus_request_state(struct bus *bus, enum al_state state, span_t timeout, char *error)
 {
 	bus->error = error;
-	return lead_to(bus, state, LEAD_ALL, timeout);
+	return lead_to(bus, state, LEAD_ALL, longest(bus, state, timeout));
 }
 
-int bus_slave_al_request(struct bus *bus, size_t pos, uint16_t state, char *error)
+int bus_slave_al_request(struct bus *bus, size_t pos, uint16_t request, char *error)
 {
 	uint8_t word[2];
 	int r;
 
 	bus->error = error;
-	put_le16(word, state | AL_ERROR);
+	put_le16(word, request);
 	r = register_write(bus, pos, ESC_REG_AL_CONTROL, word, sizeof(word));
 	return r < 0 ? bus_fail_slave(bus, pos, r, "does not take a request for %s",
-				      bus_al_name(state))
+				      bus_al_name(request))
 		     : 0;
 }
 

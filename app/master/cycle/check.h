@@ -14,18 +14,26 @@
 #include "base/sample.h"
 #include "base/slave_set.h"
 #include "config/config.h"
+#include "image/field.h"
 
+/*
+ * Of a counter that goes on by one with each edge, counter minus cycle number stays the same: in a
+ * good cycle nothing is written. A one-shot counter goes on when a shot was armed; of it, base is
+ * what it was last.
+ */
 struct check_slave {
-	const struct channel *counter; /* NULL: it has none */
-	int is_oneshot;                /* the counter advances only when a shot was armed */
-	int has_last;
-	uint64_t last;
-	uint64_t last_cycle;
+	struct image_field counter;
+	uint64_t mask; /* its bits */
+	uint64_t base; /* if the slave is in check.known */
 };
 
 struct check {
 	struct check_slave slave[LIMIT_SLAVES];
-	size_t slave_count;
+	struct slave_set counted; /* have a counter */
+	struct slave_set oneshot; /* of those: one-shot */
+	struct slave_set known;   /* have been fresh since a restart */
+	unsigned words;           /* of these sets that are in use */
+	int are_words;            /* all counters are whole words of 16 bits */
 };
 
 /* What was wrong with one slave's counter. */
@@ -39,10 +47,13 @@ void check_init(struct check *check, const struct config *cfg, const struct slav
 		size_t slave_count, const struct channel *channels);
 /** The next fresh sample has nothing to be compared with: entering OP, or a new numbering. */
 void check_restart(struct check *check);
-/** The same for some slaves. */
-void check_restart_some(struct check *check, const struct slave_set *slaves);
+/** The same for the slaves in @word, the @w-th of a set. */
+void check_restart_word(struct check *check, unsigned w, uint64_t word);
 
+/* The sets have the words that check.words says. */
 struct check_result {
+	int has_wrong; /* @wrong is not empty; the same of @unknown */
+	int has_unknown;
 	struct slave_set wrong;   /* the counter is not as expected */
 	struct slave_set unknown; /* the first fresh sample since a restart: it may be a stale one
 				   */
@@ -51,7 +62,7 @@ struct check_result {
 
 /** Judge a fresh image of @cycle, but for the slaves of @stale, whose part of it is not. Slaves
  * without a counter are in neither set. */
-struct check_result check_image(struct check *check, const uint8_t *image, uint64_t cycle,
-				const struct slave_set *stale);
+void check_image(struct check *check, const uint8_t *image, uint64_t cycle,
+		 const struct slave_set *stale, struct check_result *ret);
 
 #endif

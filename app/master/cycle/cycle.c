@@ -31,6 +31,9 @@ int cycle_create(const struct cycle_spec *spec, struct cycle **ret_cycle, char *
 	cy->period = (span_t){ cfg->cycle_period_ns };
 	cy->set_point_ns =
 		(int64_t)((double)cfg->cycle_period_ns * cfg->cycle_phase_percent / 100.0);
+	cy->receive_ns =
+		(int64_t)((double)cfg->cycle_period_ns * cfg->cycle_receive_percent / 100.0);
+	cy->diff_proof_ns = cycle_diff_proof_ns(cfg->dc_diff_limit_ns);
 	dc_servo_init(&cy->servo, &(struct dc_servo_spec){
 					  .period_ns = cfg->cycle_period_ns,
 					  .set_point_ns = cy->set_point_ns,
@@ -53,6 +56,8 @@ int cycle_create(const struct cycle_spec *spec, struct cycle **ret_cycle, char *
 	}
 	outputs_choose(&cy->outputs, cy->image, &(struct slave_set){ 0 }, 0);
 	cy->was_fail_safe = 1;
+	cy->all = slave_set_all(spec->slave_count);
+	cy->set_words = slave_set_words(spec->slave_count);
 	cycle_slaves_init(cy);
 	cy->slaves_found = spec->plan->slave_count;
 	*ret_cycle = cy;
@@ -131,9 +136,7 @@ static mono_t wake(struct cycle *cy)
 
 static mono_t receive_deadline(const struct cycle *cy, mono_t now)
 {
-	int64_t share_ns =
-		(int64_t)((double)cy->period.ns * cy->spec.cfg->cycle_receive_percent / 100.0);
-	mono_t wanted = mono_add(now, (span_t){ share_ns });
+	mono_t wanted = mono_add(now, (span_t){ cy->receive_ns });
 	mono_t last = mono_add(cy->deadline, (span_t){ cy->period.ns * 9 / 10 });
 	mono_t least = mono_add(now, (span_t){ cy->period.ns / 10 });
 
@@ -145,9 +148,9 @@ static mono_t receive_deadline(const struct cycle *cy, mono_t now)
 
 static void choose_outputs(struct cycle *cy, uint8_t *image)
 {
-	struct slave_set live = cycle_outputs_live(cy);
-	int is_live = !slave_set_is_empty(&live);
-	unsigned timed_out = outputs_choose(&cy->outputs, image, &live, cy->sample.cycle);
+	const struct slave_set *live = cycle_outputs_live(cy);
+	unsigned timed_out = outputs_choose(&cy->outputs, image, live, cy->sample.cycle);
+	int is_live = live == &cy->live && cy->has_live;
 	int is_fail_safe = !is_live || timed_out > 0 || cycle_is_control_safe(cy);
 
 	if (is_fail_safe && !cy->was_fail_safe) {
@@ -160,12 +163,13 @@ static void choose_outputs(struct cycle *cy, uint8_t *image)
 /* A set is answered as effective when a frame came back with it, from slaves that use it. */
 static void answer_boards(struct cycle *cy, const struct exchange_result *res)
 {
-	struct slave_set arrived = slave_set_empty();
+	struct slave_set arrived;
 
-	if (cycle_has_inputs(cy, res)) {
-		arrived = cy->live;
-		slave_set_and_not(&arrived, &res->slaves_low);
+	if (!outputs_are_due(&cy->outputs) || !cycle_has_inputs(cy, res)) {
+		return;
 	}
+	arrived = cy->live;
+	slave_set_and_not(&arrived, &res->slaves_low);
 	outputs_arrived(&cy->outputs, &arrived, cy->sample.cycle);
 }
 
@@ -240,8 +244,14 @@ void cycle_step(struct cycle *cy)
 	histogram_add(&st->work, mono_sub(done, now).ns);
 	give_ride(cy);
 	move_deadline(cy, 1, correction_ns);
+	SET(cy->next_wake_ns, cy->deadline.ns);
 	cy->steps++;
 	cycle_count_down(cy);
+}
+
+mono_t cycle_next_wake(const struct cycle *cycle)
+{
+	return (mono_t){ atomic_load_explicit(&cycle->next_wake_ns, memory_order_relaxed) };
 }
 
 /* A stack page first touched in the cycle would be a page fault there. */

@@ -27,6 +27,8 @@ void cycle_step(struct cycle *cycle);
 int cycle_run(struct cycle *cycle);
 /** 1 and cycle_run()'s result in @ret_result if it is to return, or has. Context: any. */
 int cycle_has_stopped(const struct cycle *cycle, int *ret_result);
+/** When cycle_run() wakes next; in the past while it is at work. Context: any. */
+mono_t cycle_next_wake(const struct cycle *cycle);
 /** Request cycle_run() to return after the current step. Context: any, also a signal handler. */
 void cycle_stop(struct cycle *cycle);
 
@@ -54,6 +56,14 @@ uint64_t cycle_alerts(const struct cycle *cycle);
  * Context: service thread; takes effect at the next cycle boundary.
  */
 void cycle_slaves_set(struct cycle *cycle, const struct slave_set *slaves, uint64_t alerts);
+
+/**
+ * Fail-safe values, limits and timeouts of outputs as @cfg has them; their owners stay. 0, or
+ * -EINVAL with one line in @error: nothing has changed. Context: service thread; takes effect at
+ * the next cycle boundary.
+ */
+int cycle_outputs_set(struct cycle *cycle, const struct config *cfg, char *error,
+		      size_t error_bytes);
 
 /** The newest frame's DC time and the host time at which it was sent. 0 or -EAGAIN. Context: any.
  */

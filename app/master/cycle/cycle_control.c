@@ -42,12 +42,10 @@ static void run(struct cycle *cy)
 
 void cycle_control(struct cycle *cy)
 {
-	struct slave_set live = cycle_outputs_live(cy);
-
 	if (cy->spec.control == NULL) {
 		return;
 	}
-	if (slave_set_is_empty(&live)) {
+	if (slave_set_is_empty(cycle_outputs_live(cy))) {
 		control_pause(cy->spec.control);
 	} else {
 		run(cy);

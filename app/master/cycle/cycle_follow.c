@@ -115,15 +115,21 @@ int cycle_is_unlocked_safe(const struct cycle *cy)
 	       (cy->servo.state == DC_ACQUIRING || cy->servo.state == DC_LOST);
 }
 
-/*
- * The difference is that of all slaves ORed: only a bit above all those of the limit proves that
- * one slave is above it.
- */
+/* A bit above all those of the limit. */
+int64_t cycle_diff_proof_ns(int64_t limit_ns)
+{
+	int64_t proof_ns = 1;
+
+	while (proof_ns <= limit_ns) {
+		proof_ns *= 2;
+	}
+	return proof_ns;
+}
+
 static void watch_difference(struct cycle *cy, const struct exchange_result *res)
 {
 	struct cycle_stats *st = cy->spec.stats;
 	int64_t limit_ns = cy->spec.cfg->dc_diff_limit_ns;
-	int64_t proof_ns = 1;
 	int was_high = cy->is_diff_high;
 
 	if (cy->phase != CYCLE_OP || res->dc_diff_ns < 0) {
@@ -132,10 +138,7 @@ static void watch_difference(struct cycle *cy, const struct exchange_result *res
 	if (cy->servo.state == DC_LOCKED && res->dc_diff_ns > st->dc_diff_max_ns) {
 		SET(st->dc_diff_max_ns, res->dc_diff_ns);
 	}
-	while (proof_ns <= limit_ns) {
-		proof_ns *= 2;
-	}
-	cy->is_diff_high = res->dc_diff_ns >= proof_ns;
+	cy->is_diff_high = res->dc_diff_ns >= cy->diff_proof_ns;
 	if (cy->is_diff_high) {
 		ADD(st->cycles_dc_diff_high, 1);
 	}

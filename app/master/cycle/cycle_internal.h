@@ -47,7 +47,11 @@ struct cycle {
 	struct cycle_spec spec;
 	span_t period;
 	int64_t set_point_ns;
+	int64_t receive_ns;    /* cycle.receive */
+	int64_t diff_proof_ns; /* a difference from this on proves that one slave is above the limit
+				*/
 	mono_t deadline;
+	_Atomic int64_t next_wake_ns; /* [cycle] the deadline, for others, while it sleeps */
 	mono_t start;
 	struct dc_servo servo;
 	struct numbering numbering;
@@ -56,7 +60,11 @@ struct cycle {
 	struct sample_header sample; /* of the cycle being made */
 	uint8_t image[LIMIT_IMAGE_BYTES];
 	enum cycle_phase phase;
+	struct slave_set all;  /* of the bus */
+	unsigned set_words;    /* of a set that are in use */
+	int has_live;          /* live is not empty */
 	struct slave_set live; /* in OP: real outputs, judged samples; none unless in CYCLE_OP */
+	int has_gone;
 	struct slave_set gone; /* as frames have shown since the service thread named the live */
 	uint16_t al_status;    /* of all slaves ORed, newest frame */
 	uint64_t al_step;      /* in which it was read */
@@ -95,7 +103,7 @@ const struct cycle_named *cycle_named_take(struct cycle *cy);
 void cycle_update_live(struct cycle *cy);
 /** The slaves whose next outputs are real: the live ones, unless something keeps all at fail-safe.
  */
-struct slave_set cycle_outputs_live(const struct cycle *cy);
+const struct slave_set *cycle_outputs_live(const struct cycle *cy);
 /** After the exchange: what the frame shows of the slaves' states and number. */
 void cycle_watch_slaves(struct cycle *cy, const struct exchange_result *res);
 
@@ -112,6 +120,8 @@ void cycle_note(struct cycle *cy, enum event_id id, int64_t value, int64_t arg0,
 void cycle_count_frames(struct cycle *cy, const struct exchange_result *res);
 /** Correction of the next deadline from the frame's DC time, ns. */
 int64_t cycle_follow(struct cycle *cy, const struct exchange_result *res);
+/** The smallest difference of all slaves ORed that proves that one of them is above @limit_ns. */
+int64_t cycle_diff_proof_ns(int64_t limit_ns);
 /** 1 if outputs are at fail-safe because lock is lost (dc.unlock_policy). */
 int cycle_is_unlocked_safe(const struct cycle *cy);
 

@@ -5,11 +5,6 @@
 
 #include "base/slave_set.h"
 
-static struct slave_set all_slaves(const struct cycle *cy)
-{
-	return slave_set_all(cy->spec.slave_count);
-}
-
 void cycle_push_sample(struct cycle *cy)
 {
 	ring_push(cy->spec.samples, &cy->sample, sample_head_bytes((uint32_t)cy->spec.slave_count),
@@ -85,21 +80,40 @@ struct cycle_place cycle_place(struct cycle *cy, const struct exchange_result *r
 	return ret;
 }
 
+static unsigned bits(uint64_t word)
+{
+	return (unsigned)__builtin_popcountll(word);
+}
+
+/* One more sample of each slave in @word, the @w-th of a set. */
+static void count_slaves(_Atomic uint64_t *counts, unsigned w, uint64_t word)
+{
+	struct slave_run run;
+
+	while (slave_set_take_run(&word, w, &run)) {
+		for (unsigned pos = run.first; pos < run.end; pos++) {
+			ADD(counts[pos], 1);
+		}
+	}
+}
+
 /* A slave that is not live is not counted. Only a wrong counter in a fresh frame is unexplained. */
-static void count_samples(struct cycle *cy, const struct slave_set *wrong)
+static void count_samples(struct cycle *cy, const struct check_result *checked)
 {
 	struct cycle_stats *st = cy->spec.stats;
 
-	for (unsigned i = slave_set_next(&cy->live, 0); i < LIMIT_SLAVES;
-	     i = slave_set_next(&cy->live, i + 1)) {
-		if (slave_set_has(&cy->sample.slaves_bad, i)) {
-			ADD(st->samples_bad, 1);
-			ADD(st->slave_bad[i], 1);
-		} else {
-			ADD(st->samples_good, 1);
-			ADD(st->slave_good[i], 1);
+	for (unsigned w = 0; w < cy->set_words; w++) {
+		uint64_t live = cy->live.word[w];
+		uint64_t bad = live & cy->sample.slaves_bad.word[w];
+
+		count_slaves(st->slave_good, w, live & ~bad);
+		ADD(st->samples_good, bits(live & ~bad));
+		if (bad != 0) {
+			count_slaves(st->slave_bad, w, bad);
+			ADD(st->samples_bad, bits(bad));
+			ADD(st->samples_bad_unexplained,
+			    checked->has_wrong ? bits(live & checked->wrong.word[w]) : 0);
 		}
-		ADD(st->samples_bad_unexplained, slave_set_has(wrong, i) ? 1u : 0u);
 	}
 }
 
@@ -120,30 +134,40 @@ static void report_wrong(struct cycle *cy, const struct check_fault *fault)
 	cycle_emit(cy, &ev);
 }
 
+/* The slaves whose part of a fresh image is good: what check_image() finds comes on top. */
+static void judge_image(struct cycle *cy, const struct exchange_result *res,
+			struct check_result *checked)
+{
+	struct slave_set stale = cy->all;
+
+	for (unsigned w = 0; w < cy->set_words; w++) {
+		stale.word[w] &= ~cy->live.word[w];
+		stale.word[w] |= res->slaves_low.word[w];
+	}
+	check_image(&cy->check, cy->image, cy->sample.cycle, &stale, checked);
+	for (unsigned w = 0; w < cy->set_words; w++) {
+		cy->sample.slaves_bad.word[w] =
+			stale.word[w] | checked->wrong.word[w] | checked->unknown.word[w];
+	}
+}
+
 void cycle_judge(struct cycle *cy, const struct exchange_result *res, int is_in_window)
 {
-	int is_fresh = cycle_has_inputs(cy, res);
-	struct check_result checked = { .wrong = slave_set_empty() };
-	struct slave_set stale = all_slaves(cy);
+	struct check_result checked = { .has_wrong = 0 };
 
-	cy->sample.slaves_bad = stale;
-	if (slave_set_is_empty(&cy->live)) {
+	cy->sample.slaves_bad = cy->all;
+	if (!cy->has_live) {
 		cy->sample.flags |= SAMPLE_NOT_OP;
 		return;
 	}
-	if (is_fresh && is_in_window) {
-		slave_set_and_not(&stale, &cy->live);
-		slave_set_or(&stale, &res->slaves_low);
-		checked = check_image(&cy->check, cy->image, cy->sample.cycle, &stale);
-		cy->sample.slaves_bad = stale;
-		slave_set_or(&cy->sample.slaves_bad, &checked.wrong);
-		slave_set_or(&cy->sample.slaves_bad, &checked.unknown);
+	if (cycle_has_inputs(cy, res) && is_in_window) {
+		judge_image(cy, res, &checked);
 	}
-	if (!slave_set_is_empty(&checked.unknown)) {
+	if (checked.has_unknown) {
 		cy->sample.flags |= SAMPLE_UNCHECKED;
 	}
-	if (!slave_set_is_empty(&checked.wrong)) {
+	if (checked.has_wrong) {
 		report_wrong(cy, &checked.first);
 	}
-	count_samples(cy, &checked.wrong);
+	count_samples(cy, &checked);
 }

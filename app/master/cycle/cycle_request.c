@@ -51,3 +51,9 @@ void cycle_phase_set(struct cycle *cycle, enum cycle_phase phase)
 {
 	atomic_store_explicit(&cycle->wanted_phase, (int)phase, memory_order_release);
 }
+
+int cycle_outputs_set(struct cycle *cycle, const struct config *cfg, char *error,
+		      size_t error_bytes)
+{
+	return outputs_rules_set(&cycle->outputs, cfg, error, error_bytes);
+}

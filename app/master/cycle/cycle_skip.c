@@ -27,7 +27,7 @@ static void push_skipped(struct cycle *cy, uint64_t first, uint64_t count)
 		.dc_diff_ns = -1,
 		.wkc_expected = kept.wkc_expected,
 		.flags = SAMPLE_SKIPPED | (kept.flags & (SAMPLE_FAIL_SAFE | SAMPLE_DC_UNLOCKED)),
-		.slaves_bad = slave_set_all(cy->spec.slave_count),
+		.slaves_bad = cy->all,
 	};
 	for (uint64_t i = 0; i < count; i++) {
 		cy->sample.cycle = first + i;

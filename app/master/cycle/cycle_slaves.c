@@ -40,30 +40,29 @@ uint64_t cycle_alerts(const struct cycle *cycle)
 void cycle_update_live(struct cycle *cy)
 {
 	const struct cycle_named *named = cycle_named_take(cy);
-	struct slave_set live = slave_set_empty();
-	struct slave_set returned;
+	uint64_t in_op = cy->phase == CYCLE_OP ? UINT64_MAX : 0;
 
-	if (cy->phase != CYCLE_OP) {
+	/* A look that began before the newest alert does not know of it. */
+	if (cy->has_gone && (!in_op || named->alerts == cy->alerts)) {
 		cy->gone = slave_set_empty();
-	} else {
-		/* A look that began before the newest alert does not know of it. */
-		if (named->alerts == cy->alerts && !slave_set_is_empty(&cy->gone)) {
-			cy->gone = slave_set_empty();
-			cy->strangers_al = cy->al_status;
-		}
-		live = slave_set_all(cy->spec.slave_count);
-		slave_set_and(&live, &named->slaves);
-		slave_set_and_not(&live, &cy->gone);
+		cy->has_gone = 0;
+		cy->strangers_al = in_op ? cy->al_status : cy->strangers_al;
 	}
-	returned = live;
-	slave_set_and_not(&returned, &cy->live);
-	check_restart_some(&cy->check, &returned);
-	cy->live = live;
+	cy->has_live = 0;
+	for (unsigned w = 0; w < cy->set_words; w++) {
+		uint64_t live = in_op & cy->all.word[w] & named->slaves.word[w] & ~cy->gone.word[w];
+
+		check_restart_word(&cy->check, w, live & ~cy->live.word[w]);
+		cy->live.word[w] = live;
+		cy->has_live |= live != 0;
+	}
 }
 
-struct slave_set cycle_outputs_live(const struct cycle *cy)
+const struct slave_set *cycle_outputs_live(const struct cycle *cy)
 {
-	return cy->is_latched_safe || cycle_is_unlocked_safe(cy) ? slave_set_empty() : cy->live;
+	static const struct slave_set none;
+
+	return cy->is_latched_safe || cycle_is_unlocked_safe(cy) ? &none : &cy->live;
 }
 
 static int is_as_expected(const struct cycle *cy, const struct exchange_result *res)
@@ -103,17 +102,15 @@ static struct slave_set who_left(const struct cycle *cy, const struct exchange_r
 	    !is_reference_in(cy, &res->slaves_low)) {
 		return res->slaves_low;
 	}
-	return slave_set_all(cy->spec.slave_count);
+	return cy->all;
 }
 
 /* State bits of those that have just joined: in the cycle before, all of ours were as expected. */
 static uint16_t newcomers_al(const struct cycle *cy, const struct exchange_result *res)
 {
-	struct slave_set all = slave_set_all(cy->spec.slave_count);
-
 	if (res->status != EXCHANGE_OK || res->al_wkc <= cy->slaves_found ||
 	    cy->steps != cy->al_step + 1 || cy->slaves_found < cy->spec.plan->slave_count ||
-	    !slave_set_is_equal(&cy->live, &all)) {
+	    !slave_set_is_equal(&cy->live, &cy->all)) {
 		return 0;
 	}
 	return cy->al_status;
@@ -149,13 +146,14 @@ void cycle_watch_slaves(struct cycle *cy, const struct exchange_result *res)
 	SET(cy->spec.stats->al_status, cy->al_status);
 	note_count(cy, res);
 	cy->al_step = cy->steps;
-	left = slave_set_all(cy->spec.slave_count);
-	if (!slave_set_is_equal(&cy->live, &left) || is_as_expected(cy, res)) {
+	if (is_as_expected(cy, res) || !slave_set_is_equal(&cy->live, &cy->all)) {
 		return;
 	}
 	left = who_left(cy, res);
 	slave_set_or(&cy->gone, &left);
+	cy->has_gone |= !slave_set_is_empty(&left);
 	slave_set_and_not(&cy->live, &left);
+	cy->has_live = !slave_set_is_empty(&cy->live);
 	ADD(cy->spec.stats->op_lost, 1);
 	alert(cy);
 	cycle_note(cy, EVENT_OP_LOST, (int64_t)cy->sample.cycle, cy->al_status, res->al_wkc);

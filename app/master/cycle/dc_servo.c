@@ -26,7 +26,7 @@ void dc_servo_init(struct dc_servo *servo, const struct dc_servo_spec *spec)
 
 static double clamp(double v, double limit)
 {
-	return fmax(-limit, fmin(limit, v));
+	return v > limit ? limit : v < -limit ? -limit : v;
 }
 
 /* Leaky: one cycle in the right place counts one up, one in the wrong place LEAK_CYCLES down. */

@@ -121,6 +121,17 @@ static int open_line(struct session *s, struct failure *failure)
 	return 0;
 }
 
+static void show_group(struct session *s, size_t pos)
+{
+	const struct config *cfg = bus_config(s->bus);
+	char *group = s->run.page->slave[pos].group;
+
+	memset(group, 0, sizeof(s->run.page->slave[pos].group));
+	if (pos < cfg->slave_count) {
+		memcpy(group, cfg->slave[pos].group, sizeof(cfg->slave[pos].group));
+	}
+}
+
 static void show_slaves(struct session *s)
 {
 	size_t count;
@@ -128,6 +139,7 @@ static void show_slaves(struct session *s)
 
 	for (size_t i = 0; i < count && i < LIMIT_SLAVES; i++) {
 		s->run.page->slave[i].info = slaves[i];
+		show_group(s, i);
 	}
 	bus_show_places(s->bus, s->run.page);
 	atomic_store_explicit(&s->run.page->slave_count, (uint32_t)count, memory_order_release);
@@ -146,6 +158,11 @@ static int prepare_slaves(struct session *s, struct failure *failure)
 	}
 	session_judge_doubled(s, line_answered(s->line), line_discarded(s->line));
 	r = session_step(s, bus_compare(s->bus, error), EXIT_CODE_SLAVES, error, failure);
+	if (r < 0) {
+		return r;
+	}
+	r = session_step(s, bus_startup(s->bus, CONFIG_TRANSITION_IP, error), EXIT_CODE_STATE,
+			 error, failure);
 	if (r < 0) {
 		return r;
 	}
@@ -412,6 +429,7 @@ int session_bring_up(struct session *session, struct failure *failure)
 		session_stop(s, &ignored);
 	}
 	session_release(s);
+	session_take_reloaded(s);
 	s->run.page->session = (uint64_t)s->spec.platform.tai_ns(s->spec.platform.ctx);
 	s->is_climbing = 1;
 	r = climb(s, failure);

@@ -77,7 +77,8 @@ void session_restart_done(struct session *s, const struct failure *failure)
 
 /*
  * BOOT is entered from INIT and left to INIT only, and has mailboxes of its own: they are
- * programmed in INIT, as those of PRE-OP are on the way back.
+ * programmed in INIT, as those of PRE-OP are on the way back. SyncManagers of process data and
+ * start-up SDOs come before SAFE-OP, and SDOs before OP.
  */
 enum change_step {
 	CHANGE_LOOK,        /* where it is */
@@ -86,6 +87,7 @@ enum change_step {
 	CHANGE_ASK_INIT,
 	CHANGE_WAIT_INIT,
 	CHANGE_PROGRAM, /* its mailboxes */
+	CHANGE_SET_UP,  /* start-up SDOs, SyncManagers */
 	CHANGE_ASK,
 	CHANGE_WAIT,
 };
@@ -102,6 +104,9 @@ static enum change_step next_from(uint16_t from, uint16_t wanted)
 {
 	if (from == AL_INIT) {
 		return wanted == AL_BOOT || wanted == AL_PREOP ? CHANGE_PROGRAM : CHANGE_ASK;
+	}
+	if ((from == AL_PREOP && wanted == AL_SAFEOP) || (from == AL_SAFEOP && wanted == AL_OP)) {
+		return CHANGE_SET_UP;
 	}
 	return (from == AL_BOOT) != (wanted == AL_BOOT) && wanted != AL_INIT ? CHANGE_ASK_INIT
 									     : CHANGE_ASK;
@@ -172,14 +177,17 @@ static int change(const struct session *s, struct admin_pending *pending, char *
 
 	switch (step) {
 	case CHANGE_ACKNOWLEDGE: /* look() has put it there */
-		r = bus_slave_al_request(s->bus, pending->request.slave_pos,
-					 pending->reply.data[0] & AL_STATE_MASK, error);
+		r = bus_slave_al_request(s->bus, pending->request.slave_pos, pending->reply.data[0],
+					 error);
 		return r < 0 ? r : CHANGE_WAIT_CLEAR;
 	case CHANGE_ASK_INIT:
 		return ask_for(s, pending, AL_INIT, error);
 	case CHANGE_PROGRAM:
 		r = bus_slave_mailbox_program(s->bus, pending->request.slave_pos, wanted, error);
 		return r < 0 ? r : CHANGE_ASK;
+	case CHANGE_SET_UP:
+		r = bus_slave_set_up(s->bus, pending->request.slave_pos, wanted, error);
+		return r < 0 ? r : r > 0 ? CHANGE_SET_UP : CHANGE_ASK;
 	case CHANGE_ASK:
 		return ask_for(s, pending, wanted, error);
 	case CHANGE_LOOK:
@@ -246,11 +254,17 @@ void session_bus_request(void *ctx, struct admin_pending *pending)
 	struct session *s = ctx;
 	int is_forced = pending->request.argument[1] != 0;
 
+	if (pending->request.verb == ADMIN_CONFIG_RELOAD) {
+		session_reload_request(s, pending); /* nobody's hands are on the bus */
+		return;
+	}
 	s->operator_at = session_now(s);
 	if (pending->request.verb == ADMIN_DATAGRAMS) {
 		session_list_datagrams(s, pending);
 	} else if (pending->request.verb == ADMIN_COMPARE) {
 		session_compare_request(s, pending);
+	} else if (pending->request.verb == ADMIN_STARTUP) {
+		session_startup_request(s, pending);
 	} else if (pending->request.verb == ADMIN_RESCAN) {
 		if (!is_forced && !s->is_held && s->bus != NULL) {
 			admin_pending_refuse(pending, -EPERM,

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The request of the admin socket that compares what is configured with what is found. */
+/* Requests of the admin socket about what is configured: compared with what is found, and as the
+ * start-up SDOs that follow from it. */
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
@@ -35,4 +36,27 @@ void session_compare_request(const struct session *s, struct admin_pending *pend
 		snprintf(pending->reply.text, sizeof(pending->reply.text), "%s", s->spec.cfg->path);
 	}
 	admin_pending_complete(pending, r);
+}
+
+void session_startup_request(const struct session *s, struct admin_pending *pending)
+{
+	size_t pos = pending->request.slave_pos;
+	size_t bytes = s->bus == NULL ? 0 : bus_startup_list(s->bus, pos, NULL, 0);
+	uint8_t *room;
+
+	if (s->bus == NULL) {
+		admin_pending_refuse(pending, -EAGAIN, "the bus is down");
+		return;
+	}
+	snprintf(pending->reply.text, sizeof(pending->reply.text), "%s", s->spec.cfg->path);
+	if (bytes > 0) {
+		room = admin_pending_reserve(pending, bytes);
+		if (room == NULL) {
+			admin_pending_complete(pending, -ENOMEM);
+			return;
+		}
+		bus_startup_list(s->bus, pos, room, bytes);
+		admin_pending_answer_len(pending, bytes);
+	}
+	admin_pending_complete(pending, 0);
 }

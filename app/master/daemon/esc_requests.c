@@ -80,6 +80,7 @@ static void diagnose(struct session *s, struct admin_pending *pending)
 		answer.port[i] = (struct admin_port){
 			.is_link = found.port[i].is_link,
 			.is_communicating = found.port[i].is_communicating,
+			.is_ebus = found.port[i].is_ebus,
 			.invalid_frames = found.port[i].invalid_frames,
 			.rx_errors = found.port[i].rx_errors,
 			.forwarded_errors = found.port[i].forwarded_errors,

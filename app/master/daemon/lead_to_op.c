@@ -35,33 +35,6 @@ static uint64_t load(const _Atomic uint64_t *counter)
 	return atomic_load_explicit(counter, memory_order_relaxed);
 }
 
-static int wait_for_lock(struct session *s, struct failure *failure)
-{
-	const struct cycle_stats *st = &s->run.page->cycle;
-	int64_t timeout_ns = s->spec.cfg->dc_lock_timeout_ns;
-	mono_t give_up = mono_add(session_now(s), (span_t){ timeout_ns });
-
-	while (atomic_load_explicit(&st->dc_state, memory_order_relaxed) != DC_LOCKED) {
-		int r = look_again(s, give_up, failure);
-
-		if (r == -ETIMEDOUT) {
-			return failure_set(
-				failure, EXIT_CODE_CLOCKS, -ETIME,
-				"dc: no lock to the reference clock within %" PRId64
-				" ms (dc.lock_timeout): correction %" PRId64 " ppb, %" PRIu64
-				" of %" PRIu64 " frames lost, wake latency up to %" PRId64 " us",
-				timeout_ns / NS_PER_MS,
-				atomic_load_explicit(&st->correction_ppb, memory_order_relaxed),
-				load(&st->frames_lost), load(&st->frames_sent),
-				histogram_max_magnitude(&st->wake_latency) / NS_PER_US);
-		}
-		if (r < 0) {
-			return r;
-		}
-	}
-	return 0;
-}
-
 /* The newest |0x092C| of all slaves as the cycle reads it, an upper estimate; -1: not known. */
 static int64_t newest_diff_ns(struct ring_reader *reader)
 {
@@ -72,30 +45,66 @@ static int64_t newest_diff_ns(struct ring_reader *reader)
 									    : -1;
 }
 
-static int wait_for_agreement(struct session *s, struct ring_reader *reader,
-			      struct failure *failure)
+static int is_locked(const struct session *s)
 {
-	int64_t limit_ns = s->spec.cfg->dc_diff_limit_ns;
-	mono_t give_up = mono_add(session_now(s), (span_t){ s->spec.cfg->dc_lock_timeout_ns });
+	return atomic_load_explicit(&s->run.page->cycle.dc_state, memory_order_relaxed) ==
+	       DC_LOCKED;
+}
 
-	for (int looks = 0; looks < AGREEING_LOOKS;) {
-		int64_t diff_ns = newest_diff_ns(reader);
+static int fail_unlocked(struct session *s, struct failure *failure)
+{
+	const struct cycle_stats *st = &s->run.page->cycle;
+
+	return failure_set(failure, EXIT_CODE_CLOCKS, -ETIME,
+			   "dc: no lock to the reference clock within %" PRId64
+			   " ms (dc.lock_timeout): correction %" PRId64 " ppb, %" PRIu64
+			   " of %" PRIu64 " frames lost, wake latency up to %" PRId64 " us",
+			   s->spec.cfg->dc_lock_timeout_ns / NS_PER_MS,
+			   atomic_load_explicit(&st->correction_ppb, memory_order_relaxed),
+			   load(&st->frames_lost), load(&st->frames_sent),
+			   histogram_max_magnitude(&st->wake_latency) / NS_PER_US);
+}
+
+static int fail_apart(const struct session *s, int64_t diff_ns, struct failure *failure)
+{
+	return failure_set(failure, EXIT_CODE_CLOCKS, -ETIME,
+			   "dc: the slaves' clocks are up to %" PRId64
+			   " ns off the reference (0x092C; dc.diff_limit is %" PRId64 " ns)",
+			   diff_ns, s->spec.cfg->dc_diff_limit_ns);
+}
+
+/*
+ * Until the servo is locked and the slaves' clocks have agreed in the newest AGREEING_LOOKS looks;
+ * they do so meanwhile. Without @reader only the servo is waited for. dc.lock_timeout is for each.
+ */
+static int wait_for_both(struct session *s, struct ring_reader *reader, struct failure *failure)
+{
+	span_t timeout = { s->spec.cfg->dc_lock_timeout_ns };
+	mono_t give_up = mono_add(session_now(s), timeout);
+	int has_locked = 0;
+	int looks = 0;
+
+	for (;;) {
+		int64_t diff_ns = reader != NULL ? newest_diff_ns(reader) : 0;
 		int r;
 
-		looks = diff_ns >= 0 && diff_ns <= limit_ns ? looks + 1 : 0;
+		if (is_locked(s) && !has_locked) {
+			has_locked = 1;
+			give_up = mono_add(session_now(s), timeout);
+		}
+		looks = diff_ns >= 0 && diff_ns <= s->spec.cfg->dc_diff_limit_ns ? looks + 1 : 0;
+		if (is_locked(s) && (reader == NULL || looks >= AGREEING_LOOKS)) {
+			return 0;
+		}
 		r = look_again(s, give_up, failure);
 		if (r == -ETIMEDOUT) {
-			return failure_set(
-				failure, EXIT_CODE_CLOCKS, -ETIME,
-				"dc: the slaves' clocks are up to %" PRId64
-				" ns off the reference (0x092C; dc.diff_limit is %" PRId64 " ns)",
-				diff_ns, limit_ns);
+			return is_locked(s) ? fail_apart(s, diff_ns, failure)
+					    : fail_unlocked(s, failure);
 		}
 		if (r < 0) {
 			return r;
 		}
 	}
-	return 0;
 }
 
 /*
@@ -109,7 +118,7 @@ static int wait_for_clocks(struct session *s, struct failure *failure)
 	int r;
 
 	if (!bus_plan(s->bus)->monitor) {
-		return 0;
+		return wait_for_both(s, NULL, failure);
 	}
 	r = run_dir_path(&s->run, CONFIG_RUN_SAMPLES, path, sizeof(path));
 	if (r == 0) {
@@ -118,7 +127,7 @@ static int wait_for_clocks(struct session *s, struct failure *failure)
 	if (r < 0) {
 		return failure_set(failure, EXIT_CODE_RESOURCES, r, "%s: %s", path, strerror(-r));
 	}
-	r = wait_for_agreement(s, reader, failure);
+	r = wait_for_both(s, reader, failure);
 	ring_reader_destroy(reader);
 	return r;
 }
@@ -160,10 +169,6 @@ static int start_clocks(struct session *s, struct failure *failure)
 	if (bus_plan(s->bus)->dc_reference == 0) {
 		return 0;
 	}
-	r = wait_for_lock(s, failure);
-	if (r < 0) {
-		return r;
-	}
 	r = wait_for_clocks(s, failure);
 	if (r < 0) {
 		return r;
@@ -198,6 +203,11 @@ int session_lead_to_op(struct session *s, struct failure *failure)
 	session_state_set(s, BUS_SAFEOP);
 	if (s->target == CONFIG_TARGET_SAFEOP) {
 		return 0;
+	}
+	r = session_step(s, bus_startup(s->bus, CONFIG_TRANSITION_SO, error), EXIT_CODE_STATE,
+			 error, failure);
+	if (r < 0) {
+		return r;
 	}
 	r = wait_for_flow(s, failure);
 	if (r < 0) {

@@ -13,6 +13,8 @@
 
 /* How long it sleeps while the cycle works for it: a frame of its own rides once a cycle. */
 #define WAIT_NS (150 * NS_PER_US)
+/* While the cycle sleeps: a stop request is looked at as often. */
+#define WAIT_LONGEST_NS (10 * NS_PER_MS)
 
 mono_t machine_now(void)
 {
@@ -158,10 +160,17 @@ static int has_cycle_ended(void *ctx)
 
 static void wait_shortly(void *ctx, mono_t until)
 {
+	const struct program *pg = ctx;
 	struct platform pf = platform_posix();
 	mono_t soon = mono_add(pf.now(pf.ctx), (span_t){ WAIT_NS });
+	mono_t longest = mono_add(pf.now(pf.ctx), (span_t){ WAIT_LONGEST_NS });
+	mono_t next = session_next_cycle(pg->session);
 
-	(void)ctx;
+	/* While the cycle sleeps nothing comes, nor does it right behind its wake. */
+	if (next.ns > soon.ns) {
+		soon = mono_add(next, (span_t){ WAIT_NS });
+		soon = soon.ns < longest.ns ? soon : longest;
+	}
 	pf.sleep_until(pf.ctx, soon.ns < until.ns ? soon : until);
 }
 
@@ -196,6 +205,13 @@ static void warn(void *ctx, const char *text)
 	fprintf(stderr, "ecdaqd: warning: %s\n", text);
 }
 
+static void note(void *ctx, const char *text)
+{
+	(void)ctx;
+	printf("ecdaqd: %s\n", text);
+	fflush(stdout);
+}
+
 static void degraded(void *ctx, enum event_rt which, int err, const char *text)
 {
 	struct program *pg = ctx;
@@ -216,6 +232,7 @@ int machine_session_create(struct program *pg, struct failure *failure)
 {
 	struct session_spec spec = {
 		.cfg = &pg->cfg,
+		.reload = &pg->reload,
 		.platform = platform_posix(),
 		.hooks = {
 			.transport_open = open_transport,
@@ -226,6 +243,7 @@ int machine_session_create(struct program *pg, struct failure *failure)
 			.link_mbps = link_mbps,
 			.alive = alive,
 			.warn = warn,
+			.note = note,
 			.ctx = pg,
 		},
 		.segment = pg->options.is_simulated ? RUN_DIR_SIMULATED : RUN_DIR_REAL,

@@ -8,6 +8,7 @@
 #include "daemon/control_watchdog.h"
 #include "daemon/notify.h"
 #include "daemon/realtime.h"
+#include "daemon/reload.h"
 #include "daemon/session.h"
 #include "link/packet_socket.h"
 
@@ -23,6 +24,7 @@ struct options {
 struct program {
 	struct options options;
 	struct config cfg;
+	struct reload reload; /* of cfg */
 	struct notify notify;
 	struct realtime realtime;
 	struct control_watchdog control_watchdog;

@@ -2,7 +2,6 @@
 /* ecdaqd: one session on this machine's clock, threads and NIC, until a stop signal. */
 #include <errno.h>
 #include <inttypes.h>
-#include <poll.h>
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
@@ -14,7 +13,7 @@
 #include "program/error.h"
 
 /* How long the service loop sleeps when nothing presses. */
-#define SERVICE_PERIOD_MS 20
+#define SERVICE_PERIOD_NS (20 * NS_PER_MS)
 #define BACK_OFF_MIN_NS (250 * NS_PER_MS)
 #define BACK_OFF_MAX_NS (5 * NS_PER_S)
 /* No retry while a client has worked with the bus for so long. */
@@ -34,15 +33,27 @@ static void stop_session(void)
 	}
 }
 
+/* SIGHUP */
+static void reload_session(int number)
+{
+	struct session *session = atomic_load(&signalled);
+
+	(void)number;
+	if (session != NULL) {
+		session_reload_ask(session);
+	}
+}
+
 /* --- start --- */
 
 static void catch_signals(void)
 {
 	struct sigaction ignore = { .sa_handler = SIG_IGN };
+	struct sigaction reload = { .sa_handler = reload_session, .sa_flags = SA_RESTART };
 
 	stop_catch(STOP_GRACE_NS, stop_session);
 	sigaction(SIGPIPE, &ignore, NULL);
-	sigaction(SIGHUP, &ignore, NULL);
+	sigaction(SIGHUP, &reload, NULL);
 }
 
 /* --- the bus, again and again --- */
@@ -110,17 +121,6 @@ static int is_time_over(const struct program *pg)
 						     NS_PER_S) >= pg->options.seconds;
 }
 
-static void sleep_a_pass(const struct program *pg)
-{
-	struct pollfd fd = { .fd = session_fd(pg->session), .events = POLLIN };
-
-	if (session_is_pressed(pg->session)) {
-		poll(NULL, 0, 1);
-	} else {
-		poll(&fd, 1, SERVICE_PERIOD_MS);
-	}
-}
-
 /* A bus that somebody works with is not scanned under his hands. */
 static int is_retry_due(const struct program *pg)
 {
@@ -136,7 +136,7 @@ static int serve(struct program *pg, struct failure *failure)
 	int r;
 
 	do {
-		sleep_a_pass(pg);
+		session_sleep(pg->session, (span_t){ SERVICE_PERIOD_NS });
 		r = session_service(pg->session, failure);
 		if (r == SESSION_GOES_ON && pg->has_been_up && is_time_over(pg)) {
 			r = SESSION_STOP_ASKED;
@@ -242,7 +242,7 @@ static int run_session(struct program *pg, struct failure *failure)
 	return r;
 }
 
-static int run(struct program *pg)
+static int run(struct program *pg, const struct config_source *source)
 {
 	struct failure failure = { .code = EXIT_CODE_OK };
 	int r;
@@ -255,8 +255,10 @@ static int run(struct program *pg)
 	}
 	notify_open(&pg->notify);
 	catch_signals();
-	r = machine_session_create(pg, &failure);
+	r = reload_init(&pg->reload, source, &pg->cfg, &failure);
+	r = r < 0 ? r : machine_session_create(pg, &failure);
 	if (r < 0) {
+		reload_done(&pg->reload);
 		return fail(&failure);
 	}
 	atomic_store(&signalled, pg->session);
@@ -269,6 +271,7 @@ static int run(struct program *pg)
 	summarize(pg);
 	atomic_store(&signalled, NULL);
 	session_destroy(pg->session);
+	reload_done(&pg->reload);
 	if (pg->interface_claim >= 0) {
 		close(pg->interface_claim);
 	}
@@ -277,6 +280,7 @@ static int run(struct program *pg)
 }
 
 static const char notes[] =
+	"SIGHUP: the configuration is read again, as by ecdaq config reload.\n"
 	"SIGTERM or SIGINT: outputs to fail-safe, slaves to INIT, within 1 s; a summary. Should "
 	"that\n"
 	"hang, another one 2 s later ends ecdaqd; then the slaves' watchdogs make the outputs "
@@ -323,5 +327,5 @@ int main(int argc, char **argv)
 	if (command_line_read(&line, argc, argv, &program.cfg, &code) == COMMAND_LINE_EXIT) {
 		return (int)code;
 	}
-	return line.is_check ? (int)command_line_valid(&line) : run(&program);
+	return line.is_check ? (int)command_line_valid(&line) : run(&program, &line.source);
 }

@@ -2,6 +2,7 @@
 #include "daemon/session.h"
 
 #include <errno.h>
+#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -262,15 +263,26 @@ span_t session_unattended(const struct session *session)
 					    : mono_sub(session_now(session), session->operator_at);
 }
 
-int session_fd(const struct session *session)
+static int is_pressed(const struct session *s)
 {
-	return session->poller;
+	return s->replies_waiting > 0 || networks_are_busy(s->networks) ||
+	       (s->is_riding && bus_is_busy(s->bus));
 }
 
-int session_is_pressed(const struct session *session)
+void session_sleep(struct session *session, span_t idle)
 {
-	return session->replies_waiting > 0 || networks_are_busy(session->networks) ||
-	       (session->is_riding && bus_is_busy(session->bus));
+	struct pollfd fd = { .fd = session->poller, .events = POLLIN };
+
+	if (is_pressed(session)) {
+		poll(NULL, 0, 1);
+	} else if (poll(&fd, 1, (int)(idle.ns / NS_PER_MS)) == 0) {
+		admin_server_note_silence(session->admin);
+	}
+}
+
+mono_t session_next_cycle(const struct session *session)
+{
+	return session->is_riding ? cycle_next_wake(session->cycle) : (mono_t){ 0 };
 }
 
 /* --- life --- */

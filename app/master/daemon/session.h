@@ -22,6 +22,7 @@
 #include "daemon/failure.h"
 #include "daemon/run_dir.h"
 
+struct reload;
 struct session;
 
 struct session_hooks {
@@ -41,11 +42,14 @@ struct session_hooks {
 	void (*alive)(void *ctx);
 	/** A warning for whoever started the program; the session continues. May be NULL. */
 	void (*warn)(void *ctx, const char *text);
+	/** The same for what is no warning. May be NULL. */
+	void (*note)(void *ctx, const char *text);
 	void *ctx;
 };
 
 struct session_spec {
 	const struct config *cfg; /* outlives the session */
+	struct reload *reload;    /* the same, with this cfg; NULL: it is never read again */
 	struct platform platform;
 	struct session_hooks hooks;
 	enum run_dir_segment segment;
@@ -84,10 +88,13 @@ enum session_result {
  */
 int session_service(struct session *session, struct failure *failure);
 
-/** A descriptor that polls readable when the admin socket has something to do. */
-int session_fd(const struct session *session);
-/** 1 if session_service() should be called again within a period or so. */
-int session_is_pressed(const struct session *session);
+/** Sleep until session_service() should be called again: when a socket has something to do, at once
+ * if the session is pressed, else after @idle. */
+void session_sleep(struct session *session, span_t idle);
+
+/** When the cycle, which sleeps, does something next; in the past: it is at work, or there is none.
+ * Context: service thread. */
+mono_t session_next_cycle(const struct session *session);
 
 /** Outputs safe, SAFE-OP, SYNC0 off, INIT, ring closed. Continues after errors: 0, or the first one
  * with @failure. */
@@ -110,6 +117,9 @@ void session_destroy(struct session *session);
 /** Context: any, also a signal handler. */
 void session_stop_ask(struct session *session);
 int session_is_stop_asked(const struct session *session);
+/** Read the configuration again, in the next session_service(). Context: any, also a signal
+ * handler. */
+void session_reload_ask(struct session *session);
 
 /** A real-time setting could not be had: one bit and one event. Context: service thread. */
 void session_degraded(struct session *session, enum event_rt which, int err);

@@ -27,7 +27,8 @@ struct session {
 	int poller;             /* of both */
 	_Atomic int stop_asked; /* [any] */
 	mono_t stop_by; /* 0: not stopping; else nothing on the wire is waited for any longer */
-	_Atomic int clear_asked; /* [service] set; [cycle] reset */
+	_Atomic int clear_asked;  /* [service] set; [cycle] reset */
+	_Atomic int reload_asked; /* [any] */
 	struct event_queue events;
 	struct capture *capture; /* of the frames; always there */
 	struct ring *frames;     /* where to; NULL: nobody has asked for it yet */
@@ -53,6 +54,8 @@ struct session {
 	struct admin_pending *sii;     /* that works on an EEPROM; NULL: none */
 	int is_riding;                 /* the cycle owns the transport and the event ring */
 	int is_link_up;
+	uint64_t link_cycles; /* with link_lost: at the last look at the link */
+	uint64_t link_lost;
 	enum bus_state state;
 	int is_partial; /* RECOVERING, and the cycle continues with the slaves that are in OP */
 	mono_t next_watch;
@@ -130,10 +133,18 @@ void session_bus_request(void *ctx, struct admin_pending *pending);
 void session_esc_request(struct session *s, struct admin_pending *pending);
 /** ADMIN_CAPTURE; @ctx is the session. */
 void session_capture(void *ctx, struct admin_pending *pending);
+/** ADMIN_STARTUP. */
+void session_startup_request(const struct session *s, struct admin_pending *pending);
 /** ADMIN_DATAGRAMS. */
 void session_list_datagrams(struct session *s, struct admin_pending *pending);
 /** ADMIN_COMPARE. */
 void session_compare_request(const struct session *s, struct admin_pending *pending);
+/** ADMIN_CONFIG_RELOAD. */
+void session_reload_request(struct session *s, struct admin_pending *pending);
+/** What session_reload_ask() asked for. */
+void session_reload_if_asked(struct session *s);
+/** Before a bring-up, while nothing is up: the newest configuration that was read. */
+void session_take_reloaded(struct session *s);
 /** The bus goes: end the request that works on an EEPROM. */
 void session_sii_end(struct session *s);
 /** Answer whoever asked for the bring-up that has ended; @failure NULL: it succeeded. */

@@ -40,6 +40,21 @@ static void make_outputs_safe(struct session *s)
 	}
 }
 
+/* Start-up SDOs of the way down. A failure is reported; the bus is stopped all the same.
+ */
+static void leave_op(struct session *s)
+{
+	char error[BUS_ERROR_BYTES] = "";
+
+	if (!bus_has_startup(s->bus, CONFIG_TRANSITION_OS)) {
+		return;
+	}
+	s->stop_by = mono_add(s->stop_by, (span_t){ BUS_STARTUP_DOWN_NS });
+	if (bus_startup_down(s->bus, error) < 0 && s->spec.hooks.warn != NULL) {
+		s->spec.hooks.warn(s->spec.hooks.ctx, error);
+	}
+}
+
 int session_stop(struct session *session, struct failure *failure)
 {
 	struct session *s = session;
@@ -56,6 +71,7 @@ int session_stop(struct session *session, struct failure *failure)
 	networks_detach(s->networks);
 	if (s->is_riding) {
 		make_outputs_safe(s);
+		leave_op(s);
 		r = bus_stop_outputs(s->bus, error);
 		if (r < 0) {
 			first = failure_set(failure, failure_code_of_bus(r, EXIT_CODE_STATE), r,

@@ -86,11 +86,25 @@ void session_serve_admin(struct session *s)
 
 /* --- bus --- */
 
-/* The query also binds the socket again to an interface that was removed and came back. */
+/* 1 if the cycle has had all its frames back since the last look: the link is up. */
+static int do_frames_return(struct session *s)
+{
+	const struct cycle_stats *st = &s->run.page->cycle;
+	uint64_t cycles = atomic_load_explicit(&st->cycles, memory_order_relaxed);
+	uint64_t lost = atomic_load_explicit(&st->frames_lost, memory_order_relaxed);
+	int do_return = s->is_riding && cycles > s->link_cycles && lost == s->link_lost;
+
+	s->link_cycles = cycles;
+	s->link_lost = lost;
+	return do_return;
+}
+
+/* The query also binds the socket again to an interface that was removed and came back. Nobody is
+ * asked where frames say the same. */
 static void watch_link(struct session *s)
 {
 	const struct transport *tr = line_transport(s->line);
-	int is_up = tr->is_up(tr->ctx);
+	int is_up = do_frames_return(s) && s->is_link_up ? 1 : tr->is_up(tr->ctx);
 	struct event ev = {
 		.id = EVENT_LINK,
 		.slave_pos = EVENT_NO_SLAVE,
@@ -344,7 +358,7 @@ static enum session_result watch(struct session *s)
 		watch_link(s);
 	}
 	if (s->is_held) {
-		return session_watch_held(s);
+		return (enum session_result)session_watch_held(s);
 	}
 	if (!s->is_riding) {
 		return SESSION_GOES_ON;
@@ -376,6 +390,7 @@ int session_service(struct session *session, struct failure *failure)
 		return session_report_ended(s, failure);
 	}
 	session_serve_admin(s);
+	session_reload_if_asked(s);
 	if (s->is_riding) {
 		session_listen(s);
 	}

@@ -470,6 +470,11 @@ int line_sleep(struct line *line, span_t span)
 	return sleep_until(line, until);
 }
 
+int line_pause(struct line *line, unsigned try)
+{
+	return try > 0 && line->is_riding ? line_sleep(line, line_timeout(line, try - 1)) : 0;
+}
+
 void line_ride_begin(struct line *line, struct line_waiter waiter)
 {
 	assert(waiter.wait != NULL);

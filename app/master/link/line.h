@@ -98,6 +98,10 @@ int line_transact(struct line *line, const uint8_t *frame, size_t frame_len, uin
 void line_timeout_set(struct line *line, span_t timeout);
 /** For try 0 to LINE_TRIES - 1. */
 span_t line_timeout(const struct line *line, unsigned try);
+/** Before try 0 to LINE_TRIES - 1: while riding, a frame counts as lost after LINE_LOST_CYCLES, and
+ * what disturbed it may last longer; so the next try waits as long as the last one would have
+ * waited in direct mode. 0 or -ECANCELED. */
+int line_pause(struct line *line, unsigned try);
 
 /** @attend is called whenever this thread sends or waits: its keepalive. NULL: none. */
 void line_set_keepalive(struct line *line, void (*attend)(void *ctx), void *ctx);

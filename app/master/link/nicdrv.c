@@ -140,6 +140,9 @@ int ecx_srconfirm(ecx_portt *port, uint8 idx, int timeout)
 		return transact(port, idx, whole_us * NS_PER_US);
 	}
 	for (unsigned i = 0; i < LINE_TRIES && port->line != NULL && wkc == EC_NOFRAME; i++) {
+		if (line_pause(port->line, i) < 0) {
+			return EC_ERROR;
+		}
 		port->retries += i > 0;
 		wkc = transact(port, idx, line_timeout(port->line, i).ns);
 	}

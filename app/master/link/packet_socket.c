@@ -26,6 +26,7 @@ enum { SOCKET_BUFFER_BYTES = 1 << 20, BUSY_POLL_US = 50, SPIN_CPUS_MIN = 3 };
 struct packet_socket {
 	int fd;
 	int is_spinning;
+	int has_sent;                /* [owner of the transport] and not looked for a frame since */
 	_Atomic int interface_index; /* [service] changes when the NIC was removed and came back */
 	char interface[IF_NAMESIZE];
 };
@@ -40,9 +41,10 @@ static int64_t now_ns(void)
 
 static int packet_send(void *ctx, const uint8_t *frame, size_t frame_len)
 {
-	const struct packet_socket *ps = ctx;
+	struct packet_socket *ps = ctx;
 	ssize_t r = send(ps->fd, frame, frame_len, MSG_DONTWAIT);
 
+	ps->has_sent = 1;
 	if (r < 0) {
 		return -errno;
 	}
@@ -72,11 +74,24 @@ static void sleep_for_frame(const struct packet_socket *ps, int64_t left_ns)
 	ppoll(&pfd, 1, &ts, NULL);
 }
 
+/* Right behind a frame that was sent its answer is not there: a look would be one system call for
+ * nothing. */
+static void wait_behind_send(struct packet_socket *ps, mono_t deadline)
+{
+	int64_t left_ns = ps->has_sent && !ps->is_spinning ? deadline.ns - now_ns() : 0;
+
+	ps->has_sent = 0;
+	if (left_ns > 0) {
+		sleep_for_frame(ps, left_ns);
+	}
+}
+
 static int packet_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadline,
 			  mono_t *ret_at)
 {
-	const struct packet_socket *ps = ctx;
+	struct packet_socket *ps = ctx;
 
+	wait_behind_send(ps, deadline);
 	for (;;) {
 		int r = take_frame(ps, frame, capacity);
 		int64_t now = now_ns();
@@ -133,21 +148,30 @@ static int carrier(const struct packet_socket *ps)
 	return (ifr.ifr_flags & IFF_UP) != 0 && (ifr.ifr_flags & IFF_RUNNING) != 0;
 }
 
+/* As if_nametoindex(), which opens a socket of its own each time. 0: there is none. */
+static int index_now(const struct packet_socket *ps)
+{
+	struct ifreq ifr = { 0 };
+
+	memcpy(ifr.ifr_name, ps->interface, sizeof(ps->interface));
+	return ioctl(ps->fd, SIOCGIFINDEX, &ifr) < 0 ? 0 : ifr.ifr_ifindex;
+}
+
 static int packet_is_up(void *ctx)
 {
 	struct packet_socket *ps = ctx;
-	unsigned index = if_nametoindex(ps->interface);
+	int index = index_now(ps);
 
 	if (index == 0) {
 		return 0;
 	}
-	if ((int)index != atomic_load_explicit(&ps->interface_index, memory_order_relaxed)) {
-		int r = bind_to(ps->fd, (int)index);
+	if (index != atomic_load_explicit(&ps->interface_index, memory_order_relaxed)) {
+		int r = bind_to(ps->fd, index);
 
 		if (r < 0) {
 			return r;
 		}
-		atomic_store_explicit(&ps->interface_index, (int)index, memory_order_relaxed);
+		atomic_store_explicit(&ps->interface_index, index, memory_order_relaxed);
 	}
 	return carrier(ps);
 }

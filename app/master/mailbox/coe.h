@@ -89,6 +89,7 @@ struct coe_entry {
 	uint16_t data_type; /* ETG.1020 base data type */
 	uint16_t bit_len;
 	uint16_t access;
+	uint32_t unit; /* wire/coe_unit.h; 0: none */
 	char name[COE_NAME_BYTES];
 };
 

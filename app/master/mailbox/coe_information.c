@@ -6,8 +6,8 @@
 #include "mailbox/coe.h"
 #include "mailbox/coe_internal.h"
 
-/* The optional values of an entry that are asked for: none, so that its name follows at once. */
-enum { VALUE_INFO = 0x07 };
+/* Of the optional values of an entry that lie before its name only the unit is asked for. */
+enum { VALUE_INFO = SDO_VALUE_ACCESS | SDO_VALUE_CATEGORY | SDO_VALUE_MAPPING | SDO_VALUE_UNIT };
 
 static uint8_t opcode_of(const struct mailbox_request *rq)
 {
@@ -126,8 +126,18 @@ int coe_object_get(const uint8_t *buffer, size_t len, struct coe_object *ret)
 	return 0;
 }
 
+/* Does the unit follow? There are slaves that answer that it does, and send the name at once. The
+ * last byte of a unit is 0, which no name begins with, and it comes first. */
+static int has_unit(const uint8_t *buffer, size_t len)
+{
+	return (buffer[3] & SDO_VALUE_UNIT) != 0 && len >= SDO_ENTRY_BYTES + SDO_ENTRY_UNIT_BYTES &&
+	       buffer[SDO_ENTRY_BYTES] == 0;
+}
+
 int coe_entry_get(const uint8_t *buffer, size_t len, struct coe_entry *ret)
 {
+	size_t name_at = SDO_ENTRY_BYTES;
+
 	if (len < SDO_ENTRY_BYTES) {
 		return -EPROTO;
 	}
@@ -136,6 +146,10 @@ int coe_entry_get(const uint8_t *buffer, size_t len, struct coe_entry *ret)
 				   .data_type = get_le16(buffer + 4),
 				   .bit_len = get_le16(buffer + 6),
 				   .access = get_le16(buffer + 8) };
-	get_name(buffer + SDO_ENTRY_BYTES, len - SDO_ENTRY_BYTES, ret->name);
+	if (has_unit(buffer, len)) {
+		ret->unit = get_le32(buffer + SDO_ENTRY_BYTES);
+		name_at += SDO_ENTRY_UNIT_BYTES;
+	}
+	get_name(buffer + name_at, len - name_at, ret->name);
 	return 0;
 }

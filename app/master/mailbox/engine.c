@@ -91,8 +91,8 @@ static void follow(struct mailbox_engine *mb, struct box_slave *sl, struct mailb
 		finish(mb, sl, rq, 0);
 		return;
 	case MAILBOX_SEND:
-		rq->deadline =
-			mono_add(rq->not_before.ns > now.ns ? rq->not_before : now, rq->timeout);
+		rq->deadline = mono_add(rq->not_before.ns > now.ns ? rq->not_before : now,
+					rq->send_timeout.ns > 0 ? rq->send_timeout : rq->timeout);
 		set_step(sl, rq, REQUEST_SEND);
 		return;
 	case MAILBOX_WAIT:

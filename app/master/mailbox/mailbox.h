@@ -100,10 +100,11 @@ struct mailbox_request {
 		struct aoe_parameters aoe;
 		struct voe_parameters voe;
 		struct raw_parameters raw;
-	} with;          /* parameters */
-	uint8_t *buffer; /* what is written, or where it is read to */
-	size_t capacity; /* of the buffer; of what is written: its length */
-	span_t timeout;  /* of one mail's answer, > 0 */
+	} with;              /* parameters */
+	uint8_t *buffer;     /* what is written, or where it is read to */
+	size_t capacity;     /* of the buffer; of what is written: its length */
+	span_t timeout;      /* of one mail's answer, > 0 */
+	span_t send_timeout; /* until the slave has room for one; 0: as timeout */
 	/** Called once, when the request has ended; it may submit another, or this one again. NULL:
 	 * none. */
 	void (*done)(void *ctx, struct mailbox_request *rq);

@@ -7,6 +7,8 @@
 #include <time.h>
 
 #include "dds/ddsrt/log.h"
+
+#include "base/host_clock.h"
 #include "publish/log_limit.h"
 
 enum { LINE_BYTES = 256 };
@@ -14,14 +16,6 @@ enum { LINE_BYTES = 256 };
 /* The library calls from all of its threads. */
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static struct log_limit limit;
-
-static int64_t now_ns(void)
-{
-	struct timespec ts;
-
-	clock_gettime(CLOCK_MONOTONIC, &ts);
-	return (int64_t)ts.tv_sec * NS_PER_S + ts.tv_nsec;
-}
 
 static void write_line(void *ctx, const dds_log_data_t *data)
 {
@@ -31,7 +25,7 @@ static void write_line(void *ctx, const dds_log_data_t *data)
 
 	(void)ctx;
 	pthread_mutex_lock(&lock);
-	is_allowed = log_limit_take(&limit, now_ns());
+	is_allowed = log_limit_take(&limit, host_clock_ns(CLOCK_MONOTONIC));
 	pthread_mutex_unlock(&lock);
 	if (!is_allowed) {
 		return;
@@ -70,7 +64,7 @@ void dds_log_tell(void)
 	uint64_t count;
 
 	pthread_mutex_lock(&lock);
-	count = log_limit_take_count(&limit, now_ns());
+	count = log_limit_take_count(&limit, host_clock_ns(CLOCK_MONOTONIC));
 	pthread_mutex_unlock(&lock);
 	tell(count);
 }

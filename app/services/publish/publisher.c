@@ -10,6 +10,7 @@
 #include <time.h>
 
 #include "base/clock.h"
+#include "base/host_clock.h"
 #include "base/platform.h"
 #include "base/status.h"
 #include "publish/commands.h"
@@ -48,14 +49,6 @@ struct publisher {
 	const char *time_quality; /* reported last; NULL: none */
 };
 
-static int64_t now_ns(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return now.tv_sec * NS_PER_S + now.tv_nsec;
-}
-
 static int open_feed(const struct publisher *p, enum feed_kind kind, const char *name,
 		     struct feed **ret_feed)
 {
@@ -90,7 +83,7 @@ static int open_sources(struct publisher *p)
 static void read_page(struct publisher *p)
 {
 	p->page = page_read_status(p->status_path, &p->page_copy) == 0 ? &p->page_copy : NULL;
-	p->page_read_ns = now_ns();
+	p->page_read_ns = host_clock_ns(CLOCK_MONOTONIC);
 }
 
 static int check_interface(struct publisher *p, char *error, size_t error_bytes)
@@ -307,7 +300,7 @@ static void wait_for_work(const struct publisher *p, int is_pending)
 int publisher_step(struct publisher *publisher, char *error, size_t error_bytes)
 {
 	struct publisher *p = publisher;
-	int64_t now = now_ns();
+	int64_t now = host_clock_ns(CLOCK_MONOTONIC);
 	struct gate_view view = { .now_ns = now };
 	int has_more;
 	int is_pending;

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "ecdaq.h"
+#include "image/field.h"
 #include "image/image.h"
 #include "ros2.h"
 
@@ -14,6 +15,7 @@
 struct slave_out {
 	ecdaq_SampleV1 sample;
 	ecdaq_BlockV1 block;
+	struct image_field *field; /* of the channels, in their order */
 	double *values;
 	uint64_t *raw;
 	uint64_t *cycle;
@@ -65,6 +67,7 @@ static int make_out(struct slave_out *out, const struct channel_table *t, uint32
 	size_t n = t->count[slave] > 0 ? t->count[slave] : 1;
 	size_t k = cycles > 0 ? cycles : 1;
 
+	out->field = calloc(n, sizeof(out->field[0]));
 	out->values = calloc(n, sizeof(double));
 	out->raw = calloc(n, sizeof(uint64_t));
 	out->cycle = calloc(k, sizeof(uint64_t));
@@ -77,11 +80,14 @@ static int make_out(struct slave_out *out, const struct channel_table *t, uint32
 	out->sample_time_ns = calloc(k, sizeof(int64_t));
 	out->block_values = calloc(n * k, sizeof(double));
 	out->block_raw = calloc(n * k, sizeof(uint64_t));
-	if (out->values == NULL || out->raw == NULL || out->cycle == NULL ||
+	if (out->field == NULL || out->values == NULL || out->raw == NULL || out->cycle == NULL ||
 	    out->dc_time_ns == NULL || out->utc_ns == NULL || out->flags == NULL ||
 	    out->is_good == NULL || out->adc == NULL || out->counter == NULL ||
 	    out->sample_time_ns == NULL || out->block_values == NULL || out->block_raw == NULL) {
 		return -ENOMEM;
+	}
+	for (uint32_t i = 0; i < t->count[slave]; i++) {
+		out->field[i] = image_field_of(channel_table_at(t, slave, i));
 	}
 	out->adc_channel = input(t, slave, "adc");
 	out->counter_channel = input(t, slave, "counter");
@@ -98,6 +104,7 @@ static int make_out(struct slave_out *out, const struct channel_table *t, uint32
 
 static void free_out(struct slave_out *out)
 {
+	free(out->field);
 	free(out->values);
 	free(out->raw);
 	free(out->cycle);
@@ -262,10 +269,9 @@ static void put_slave(struct sample_writer *s, uint32_t slave)
 	m->flags = h->flags;
 	m->is_good = sample_is_good(h, (uint16_t)slave) != 0;
 	for (uint32_t i = 0; i < s->table->count[slave]; i++) {
-		const struct channel *ch = channel_table_at(s->table, slave, i);
-
-		out->raw[i] = image_get_raw(image, ch);
-		out->values[i] = image_raw_to_physical(ch, out->raw[i]);
+		out->raw[i] = image_field_get(image, out->field[i]);
+		out->values[i] =
+			image_raw_to_physical(channel_table_at(s->table, slave, i), out->raw[i]);
 	}
 	m->adc = out->adc_channel == NULL ? NAN : image_get_physical(image, out->adc_channel);
 	m->counter = raw_of(out->counter_channel, image);

@@ -43,10 +43,10 @@ static inline void cdr_put(struct cdr *c, uint64_t value, size_t bytes)
 	size_t at = cdr_align(c->len, bytes);
 
 	assert(at + bytes <= c->capacity);
-	memset(c->data + c->len, 0, at - c->len);
-	for (size_t i = 0; i < bytes; i++) {
-		c->data[at + i] = (uint8_t)(value >> (8 * i));
+	while (c->len < at) {
+		c->data[c->len++] = 0;
 	}
+	put_le(c->data + at, (unsigned)bytes, value);
 	c->len = at + bytes;
 }
 

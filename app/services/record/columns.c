@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "record/columns.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <inttypes.h>
 #include <stdlib.h>
@@ -11,12 +12,13 @@
 #include "record/messages.h"
 #include "record/ros2msg.h"
 
-enum { COLUMN_NAME_BYTES = 192 };
+enum { COLUMN_NAME_BYTES = 192, COLUMN_UNIT_BYTES = 64 };
 
 struct column {
 	char name[COLUMN_NAME_BYTES];
 	size_t topic;
 	size_t field;
+	char unit[COLUMN_UNIT_BYTES]; /* of the values in the table; "" without one */
 	double scale;
 	double offset;
 };
@@ -25,8 +27,10 @@ struct topic {
 	uint16_t id;
 	struct ros2msg msg;
 	struct ros2msg_value *value; /* of the newest message */
-	uint64_t cycle;              /* of that */
-	int is_fresh;                /* it belongs to the row */
+	size_t cycle_field;
+	size_t good_field;
+	uint64_t cycle; /* of that */
+	int is_fresh;   /* it belongs to the row */
 };
 
 struct schema {
@@ -45,7 +49,8 @@ struct columns {
 	size_t topic_count;
 	struct column *column;
 	size_t column_count;
-	int cycle_channel; /* -1: none */
+	char without_raw[COLUMN_NAME_BYTES]; /* first channel whose raw values are missing */
+	int cycle_channel;                   /* -1: none */
 	int is_frozen;
 	int has_row;
 	struct {
@@ -55,8 +60,6 @@ struct columns {
 		uint32_t flags;
 	} row;
 };
-
-enum { GOOD_FIELD = 3, FIRST_FIELD = 3 }; /* cycle, dc_time_ns, flags, good: see layout_text.c */
 
 struct columns *columns_create(const char *channels, int is_raw, enum log_format format)
 {
@@ -94,6 +97,7 @@ static void *grow(void **array, size_t *count, size_t element_bytes)
 {
 	char *grown;
 
+	assert(*count == 0 || *array != NULL);
 	if ((*count & (*count - 1)) == 0) { /* full at each power of two */
 		grown = realloc(*array, (*count == 0 ? 1 : *count * 2) * element_bytes);
 		if (grown == NULL) {
@@ -129,7 +133,7 @@ static int learn_schema(struct columns *c, const struct mcap_item *item)
 }
 
 /* 1 if @name is in the requested list; no list means all. */
-static int is_wanted(const struct columns *c, const char *name)
+static int is_selected(const struct columns *c, const char *name)
 {
 	size_t len = strlen(name);
 
@@ -161,6 +165,26 @@ static double real_of(const struct mcap_item *item, const char *field, const cha
 	return end == text || *end != '\0' ? otherwise : value;
 }
 
+/* Of two fields of one channel the first is physical and names the second, which is raw. Whether
+ * @field is the one for this table. */
+static int is_chosen(struct columns *c, const struct mcap_item *item, size_t topic,
+		     const char *field, const char *channel)
+{
+	const struct column *last = c->column_count > 0 ? &c->column[c->column_count - 1] : NULL;
+	char key[COLUMN_NAME_BYTES];
+	char raw[COLUMN_NAME_BYTES];
+
+	snprintf(key, sizeof(key), "%s.raw", field);
+	if (mcap_pairs_get(item, key, raw, sizeof(raw)) < 0) { /* a raw field */
+		return c->is_raw || last == NULL || last->topic != topic ||
+		       strcmp(last->name, channel) != 0;
+	}
+	if (c->is_raw && raw[0] == '\0' && c->without_raw[0] == '\0') {
+		snprintf(c->without_raw, sizeof(c->without_raw), "%s", channel);
+	}
+	return !c->is_raw;
+}
+
 static int add_column(struct columns *c, const struct mcap_item *item, size_t topic, size_t field)
 {
 	const char *name = c->topic[topic].msg.field[field].name;
@@ -175,10 +199,15 @@ static int add_column(struct columns *c, const struct mcap_item *item, size_t to
 		mcap_pairs_get(item, "slave", slave, sizeof(slave));
 		snprintf(col.name, sizeof(col.name), "%s.%s", slave, name);
 	}
+	if (!is_selected(c, col.name) || c->topic[topic].msg.field[field].type == ROS2MSG_STRING ||
+	    !is_chosen(c, item, topic, name, col.name)) {
+		return 0;
+	}
 	col.scale = real_of(item, name, "scale", 1);
 	col.offset = real_of(item, name, "offset", 0);
-	if (!is_wanted(c, col.name) || c->topic[topic].msg.field[field].type == ROS2MSG_STRING) {
-		return 0;
+	snprintf(key, sizeof(key), "%s.unit", name);
+	if (c->is_raw || mcap_pairs_get(item, key, col.unit, sizeof(col.unit)) < 0) {
+		col.unit[0] = '\0';
 	}
 	added = grow((void **)&c->column, &c->column_count, sizeof(col));
 	if (added == NULL) {
@@ -192,12 +221,16 @@ static int learn_topic(struct columns *c, const struct mcap_item *item, const st
 {
 	struct ros2msg msg;
 	struct topic *t;
+	int cycle_field;
+	int good_field;
 	int r = ros2msg_parse(schema->text, schema->text_len, &msg);
 
 	if (r < 0) {
 		return r == -ENOMEM ? r : 0; /* not one of ours */
 	}
-	if (ros2msg_find(&msg, "cycle") != 0 || ros2msg_find(&msg, "good") != GOOD_FIELD) {
+	cycle_field = ros2msg_find(&msg, "cycle");
+	good_field = ros2msg_find(&msg, "good");
+	if (cycle_field < 0 || good_field < cycle_field) {
 		ros2msg_done(&msg);
 		return 0;
 	}
@@ -208,11 +241,13 @@ static int learn_topic(struct columns *c, const struct mcap_item *item, const st
 	}
 	t->id = item->id;
 	t->msg = msg;
+	t->cycle_field = (size_t)cycle_field;
+	t->good_field = (size_t)good_field;
 	t->value = calloc(msg.count, sizeof(t->value[0]));
 	if (t->value == NULL) {
 		return -ENOMEM;
 	}
-	for (size_t i = FIRST_FIELD; i < msg.count; i++) {
+	for (size_t i = t->good_field; i < msg.count; i++) {
 		r = add_column(c, item, c->topic_count - 1, i);
 		if (r < 0) {
 			return r;
@@ -265,6 +300,10 @@ int columns_freeze(struct columns *c, char *ret_missing, size_t missing_bytes)
 	if (c->cycle_channel < 0) {
 		return -ENODATA;
 	}
+	if (c->without_raw[0] != '\0') {
+		snprintf(ret_missing, missing_bytes, "%s", c->without_raw);
+		return -ENOTSUP;
+	}
 	while (at != NULL) {
 		size_t len = strcspn(at, ",");
 
@@ -289,7 +328,8 @@ int columns_are_equal(const struct columns *a, const struct columns *b)
 		return 0;
 	}
 	for (size_t i = 0; i < a->column_count; i++) {
-		if (strcmp(a->column[i].name, b->column[i].name) != 0) {
+		if (strcmp(a->column[i].name, b->column[i].name) != 0 ||
+		    strcmp(a->column[i].unit, b->column[i].unit) != 0) {
 			return 0;
 		}
 	}
@@ -335,7 +375,7 @@ int columns_take(struct columns *c, const struct mcap_item *item)
 		if (ros2msg_decode(&t->msg, item->data, item->data_len, t->value) < 0) {
 			return -EBADMSG;
 		}
-		t->is_fresh = c->has_row && t->value[0].raw == c->row.cycle;
+		t->is_fresh = c->has_row && t->value[t->cycle_field].raw == c->row.cycle;
 		return 0;
 	}
 	return 0;
@@ -372,8 +412,13 @@ void columns_put_header(const struct columns *c, FILE *out)
 {
 	fputs(c->channels == NULL ? "cycle,utc_ns,dc_time_ns,flags" : "cycle,utc_ns", out);
 	for (size_t i = 0; i < c->column_count; i++) {
+		char title[COLUMN_NAME_BYTES + COLUMN_UNIT_BYTES + 3];
+		const struct column *col = &c->column[i];
+
+		snprintf(title, sizeof(title), col->unit[0] != '\0' ? "%s [%s]" : "%s", col->name,
+			 col->unit);
 		fputc(',', out);
-		put_csv_text(out, c->column[i].name);
+		put_csv_text(out, title);
 	}
 	fputc('\n', out);
 }
@@ -416,7 +461,7 @@ static int has_value(const struct columns *c, const struct column *col)
 	const struct topic *t = &c->topic[col->topic];
 
 	return t->is_fresh &&
-	       (c->is_raw || col->field == GOOD_FIELD || t->value[GOOD_FIELD].raw != 0);
+	       (c->is_raw || col->field == t->good_field || t->value[t->good_field].raw != 0);
 }
 
 static void put_json_row(const struct columns *c, FILE *out)

@@ -22,11 +22,12 @@ void columns_destroy(struct columns *c);
 int columns_learn(struct columns *c, const struct mcap_item *item);
 /**
  * All channels are known: check that every requested one exists. 0; -ENOENT with its name in
- * @ret_missing; -ENODATA: there is no "/ecdaq/cycle".
+ * @ret_missing; -ENOTSUP: the raw values of the one in @ret_missing were not recorded; -ENODATA:
+ * there is no "/ecdaq/cycle".
  */
 int columns_freeze(struct columns *c, char *ret_missing, size_t missing_bytes);
 int columns_is_frozen(const struct columns *c);
-/** 1 if both are the same table. */
+/** 1 if both are the same table: names and units. */
 int columns_are_equal(const struct columns *a, const struct columns *b);
 
 /** 1 if the message begins a cycle: put the row gathered so far, then begin the next. */
@@ -38,7 +39,8 @@ int columns_take(struct columns *c, const struct mcap_item *item);
 int columns_has_row(const struct columns *c);
 uint64_t columns_row_cycle(const struct columns *c);
 
-/** The names as one CSV line; the row gathered, as a CSV line or a JSON object. */
+/** The names as one CSV line, "piccolo0.adc [V]"; the row gathered, as a CSV line or a JSON object.
+ */
 void columns_put_header(const struct columns *c, FILE *out);
 void columns_put_row(const struct columns *c, FILE *out);
 

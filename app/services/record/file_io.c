@@ -87,6 +87,24 @@ int file_source(int *fd, struct mcap_source *ret_source)
 	return 0;
 }
 
+static int watched_read_at(void *ctx, uint64_t offset, void *buf, size_t len)
+{
+	const struct file_watch *watch = ctx;
+
+	watch->at(watch->before + offset);
+	return watch->plain.read_at(watch->plain.ctx, offset, buf, len);
+}
+
+void file_watch(struct file_watch *watch, struct mcap_source *source, void (*at)(uint64_t done),
+		uint64_t before)
+{
+	*watch = (struct file_watch){ .at = at, .before = before, .plain = *source };
+	if (at != NULL) {
+		source->read_at = watched_read_at;
+		source->ctx = watch;
+	}
+}
+
 int file_sync_dir(const char *path)
 {
 	int fd = open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);

@@ -12,6 +12,18 @@ struct mcap_io file_io(int *fd);
 /** Read from *@fd as long as it is now. 0 or -errno. */
 int file_source(int *fd, struct mcap_source *ret_source);
 
+/* Tells how far the reading of a source is. */
+struct file_watch {
+	void (*at)(uint64_t done);
+	uint64_t before; /* done, when the reading begins */
+	struct mcap_source plain;
+};
+
+/** @source, each read of which calls @at (NULL: none) with @before and the place in it; @watch must
+ * stay where it is as long as @source is used. */
+void file_watch(struct file_watch *watch, struct mcap_source *source, void (*at)(uint64_t done),
+		uint64_t before);
+
 /** fsync the directory at @path, so that names in it are durable. 0 or -errno. */
 int file_sync_dir(const char *path);
 

@@ -1,23 +1,49 @@
 /* SPDX-License-Identifier: MIT */
 #include "record/layout.h"
 
+#include <assert.h>
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/bytes.h"
+#include "base/clock.h"
 #include "base/limits.h"
+#include "image/field.h"
 #include "image/image.h"
 #include "reader/table.h"
 #include "record/cdr.h"
 #include "record/messages.h"
 #include "record/names.h"
 
+#define RAW_SUFFIX "_raw"
+
+enum {
+	RAW_SUFFIX_BYTES = sizeof(RAW_SUFFIX) - 1,
+};
+
+/* Where the head of a slave's message has what: as CDR aligns it. */
+enum head_at {
+	HEAD_SECONDS = CDR_HEADER_BYTES, /* header.stamp */
+	HEAD_NANOSECONDS = HEAD_SECONDS + 4,
+	HEAD_FRAME_ID = HEAD_NANOSECONDS + 4, /* empty: its length, and the closing zero */
+	HEAD_CYCLE = HEAD_FRAME_ID + 4 + 1 + 3,
+	HEAD_DC_TIME = HEAD_CYCLE + 8,
+	HEAD_FLAGS = HEAD_DC_TIME + 8,
+	HEAD_GOOD = HEAD_FLAGS + 4,
+	HEAD_BYTES = HEAD_GOOD + 1,
+};
+
+static_assert((HEAD_CYCLE - CDR_HEADER_BYTES) % 8 == 0, "a number of 8 octets");
+
 struct layout {
 	const struct channel_table *table;
 	struct layout_topic topic[LIMIT_SLAVES];
 	size_t topic_count;
-	struct layout_field *field; /* one a channel, grouped by topic */
+	struct layout_field *field; /* grouped by topic */
+	enum config_record_values values;
 };
 
 static const struct {
@@ -31,7 +57,7 @@ static const struct {
 	  { "int8", "int8" }, { "int16", "short" }, { "int32", "long" }, { "int64", "long long" }
   };
 
-static void set_type(struct layout_field *f)
+static void set_raw_type(struct layout_field *f)
 {
 	const struct channel *ch = f->channel;
 	unsigned size = ch->bit_len <= 8 ? 0 : ch->bit_len <= 16 ? 1 : ch->bit_len <= 32 ? 2 : 3;
@@ -68,8 +94,8 @@ static const char *entry_name(const struct channel *ch, const struct slave_info 
 
 static int field_exists(const struct layout_topic *t, const char *name)
 {
-	static const char *const head[LAYOUT_HEAD_FIELDS] = { "cycle", "dc_time_ns", "flags",
-							      "good" };
+	static const char *const head[LAYOUT_HEAD_FIELDS] = { "header", "cycle", "dc_time_ns",
+							      "flags", "good" };
 
 	for (size_t i = 0; i < LAYOUT_HEAD_FIELDS; i++) {
 		if (strcmp(head[i], name) == 0) {
@@ -84,19 +110,57 @@ static int field_exists(const struct layout_topic *t, const char *name)
 	return 0;
 }
 
-static void add_field(struct layout_topic *t, struct layout_field *f, const struct channel *ch)
+static struct layout_field *add_field(struct layout_topic *t, struct layout_field *field,
+				      const struct channel *ch, const char *suffix)
 {
+	struct layout_field *f = &field[t->field_count];
+	char entry[LAYOUT_NAME_BYTES - 12 - RAW_SUFFIX_BYTES];
 	char plain[LAYOUT_NAME_BYTES - 12];
 
 	f->channel = ch;
-	name_make_field(entry_name(ch, t->slave), plain, sizeof(plain));
+	name_make_field(entry_name(ch, t->slave), entry, sizeof(entry));
+	snprintf(plain, sizeof(plain), "%s%s", entry, suffix);
 	snprintf(f->name, sizeof(f->name), "%s", plain);
 	for (unsigned n = 2; field_exists(t, f->name); n++) {
 		snprintf(f->name, sizeof(f->name), "%s_%u", plain, n);
 	}
-	set_type(f);
-	t->message_bytes = cdr_align(t->message_bytes, f->bytes) + f->bytes;
 	t->field_count++;
+	return f;
+}
+
+static void place(struct layout_topic *t, struct layout_field *f)
+{
+	f->image = image_field_of(f->channel);
+	f->sign = f->channel->type == CHANNEL_INT ? UINT64_C(1) << (f->channel->bit_len - 1) : 0;
+	f->is_copied = f->raw_name == NULL && f->image.whole == f->bytes;
+	f->at = (uint32_t)cdr_align(t->message_bytes, f->bytes);
+	t->message_bytes = f->at + f->bytes;
+}
+
+static void add_channel(struct layout *l, struct layout_topic *t, struct layout_field *field,
+			const struct channel *ch)
+{
+	int has_physical = image_is_scaled(ch) && l->values != CONFIG_RECORD_RAW;
+	int has_raw = !has_physical || l->values == CONFIG_RECORD_BOTH;
+	struct layout_field *physical = NULL;
+
+	if (has_physical) {
+		physical = add_field(t, field, ch, "");
+		physical->ros_type = "float64";
+		physical->idl_type = "double";
+		physical->bytes = 8;
+		physical->raw_name = "";
+		place(t, physical);
+	}
+	if (has_raw) {
+		struct layout_field *raw = add_field(t, field, ch, has_physical ? RAW_SUFFIX : "");
+
+		set_raw_type(raw);
+		place(t, raw);
+		if (has_physical) {
+			physical->raw_name = raw->name;
+		}
+	}
 }
 
 static int topic_exists(const struct layout *l, const struct layout_topic *t)
@@ -122,10 +186,9 @@ static size_t add_topic(struct layout *l, const struct slave_info *slave,
 	size_t type_len;
 
 	*t = (struct layout_topic){ .slave = slave, .field = field };
-	/* cycle, dc_time_ns, flags, good */
-	t->message_bytes = CDR_HEADER_BYTES + 8 + 8 + 4 + 1;
+	t->message_bytes = HEAD_BYTES;
 	for (uint32_t i = 0; i < l->table->count[slave->slave_pos]; i++) {
-		add_field(t, &field[i], channel_table_at(l->table, slave->slave_pos, i));
+		add_channel(l, t, field, channel_table_at(l->table, slave->slave_pos, i));
 	}
 	if (t->field_count == 0) {
 		return 0;
@@ -142,7 +205,8 @@ static size_t add_topic(struct layout *l, const struct slave_info *slave,
 	return t->field_count;
 }
 
-int layout_create(const struct channel_table *table, struct layout **ret_layout)
+int layout_create(const struct channel_table *table, enum config_record_values values,
+		  struct layout **ret_layout)
 {
 	struct layout *l = calloc(1, sizeof(*l));
 	size_t used = 0;
@@ -151,7 +215,8 @@ int layout_create(const struct channel_table *table, struct layout **ret_layout)
 		return -ENOMEM;
 	}
 	l->table = table;
-	l->field = calloc(table->meta.channel_count + 1u, sizeof(l->field[0]));
+	l->values = values;
+	l->field = calloc(2u * table->meta.channel_count + 1u, sizeof(l->field[0]));
 	if (l->field == NULL) {
 		layout_destroy(l);
 		return -ENOMEM;
@@ -210,31 +275,63 @@ size_t layout_cycle_bytes(const struct layout *l)
 	return bytes;
 }
 
-static uint64_t field_value(const struct channel *ch, const uint8_t *image)
+/* 1, 2, 4 or 8: each a load and a store. */
+static inline void copy_octets(uint8_t *to, const uint8_t *from, unsigned octets)
 {
-	uint64_t raw = image_get_raw(image, ch);
-
-	if (ch->type == CHANNEL_INT && ch->bit_len < 64) {
-		uint64_t sign = UINT64_C(1) << (ch->bit_len - 1);
-
-		raw = (raw ^ sign) - sign; /* extends the sign */
+	switch (octets) {
+	case 1:
+		*to = *from;
+		break;
+	case 2:
+		memcpy(to, from, 2);
+		break;
+	case 4:
+		memcpy(to, from, 4);
+		break;
+	default:
+		memcpy(to, from, 8);
+		break;
 	}
-	return raw;
+}
+
+/* The field's bits. */
+static uint64_t field_value(const struct layout_field *f, const uint8_t *image, int is_good)
+{
+	uint64_t raw = image_field_get(image, f->image);
+	double physical;
+	uint64_t bits;
+
+	if (f->raw_name == NULL) {
+		return (raw ^ f->sign) - f->sign; /* extends the sign, if it has one */
+	}
+	physical = is_good ? image_raw_to_physical(f->channel, raw) : (double)NAN;
+	memcpy(&bits, &physical, sizeof(bits));
+	return bits;
 }
 
 size_t layout_encode(const struct layout_topic *topic, const struct sample_header *header,
-		     const uint8_t *image, uint8_t *buf, size_t buf_len)
+		     const uint8_t *image, uint64_t utc_ns, uint8_t *buf, size_t buf_len)
 {
-	struct cdr c = cdr_begin(buf, buf_len);
+	int is_good = sample_is_good(header, topic->slave->slave_pos) != 0;
 
-	cdr_put(&c, header->cycle, 8);
-	cdr_put(&c, (uint64_t)header->dc_time_ns, 8);
-	cdr_put(&c, header->flags, 4);
-	cdr_put(&c, sample_is_good(header, topic->slave->slave_pos) != 0, 1);
+	assert(topic->message_bytes <= buf_len);
+	memset(buf, 0, topic->message_bytes); /* what aligning leaves out */
+	cdr_begin(buf, buf_len);
+	put_le32(buf + HEAD_SECONDS, (uint32_t)(utc_ns / NS_PER_S));
+	put_le32(buf + HEAD_NANOSECONDS, (uint32_t)(utc_ns % NS_PER_S));
+	put_le32(buf + HEAD_FRAME_ID, 1);
+	put_le64(buf + HEAD_CYCLE, header->cycle);
+	put_le64(buf + HEAD_DC_TIME, (uint64_t)header->dc_time_ns);
+	put_le32(buf + HEAD_FLAGS, header->flags);
+	buf[HEAD_GOOD] = (uint8_t)is_good;
 	for (size_t i = 0; i < topic->field_count; i++) {
 		const struct layout_field *f = &topic->field[i];
 
-		cdr_put(&c, field_value(f->channel, image), f->bytes);
+		if (f->is_copied) {
+			copy_octets(buf + f->at, image + f->image.byte, f->bytes);
+		} else {
+			put_le(buf + f->at, f->bytes, field_value(f, image, is_good));
+		}
 	}
-	return c.len;
+	return topic->message_bytes;
 }

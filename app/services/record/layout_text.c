@@ -12,6 +12,14 @@
 
 enum { COMMENT_BYTES = 160 };
 
+/* As MCAP has the definitions of nested messages. */
+#define SEPARATOR                                                                                  \
+	"================================================================================\n"
+#define HEADER_DEFINITIONS                                                                         \
+	SEPARATOR                                                                                  \
+	"MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n" SEPARATOR         \
+	"MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
+
 /* Close the stream; its text, or NULL if it could not be made. */
 static char *finish_text(FILE *out, char **text)
 {
@@ -23,6 +31,12 @@ static char *finish_text(FILE *out, char **text)
 	}
 	return *text;
 }
+
+#define HEADER_IDL                                                                                 \
+	"module builtin_interfaces {\n module msg {\n  @final\n  struct Time {\n"                  \
+	"    long sec;\n    unsigned long nanosec;\n  };\n };\n};\n"                               \
+	"module std_msgs {\n module msg {\n  @final\n  struct Header {\n"                          \
+	"    builtin_interfaces::msg::Time stamp;\n    string frame_id;\n  };\n };\n};\n"
 
 static void put_comment(FILE *out, const struct layout_field *f)
 {
@@ -39,8 +53,11 @@ static void put_comment(FILE *out, const struct layout_field *f)
 	fprintf(out, "%s, %s 0x%04x:%02x, %u bit", name,
 		ch->direction == CHANNEL_OUTPUT ? "output" : "input", ch->index, ch->subindex,
 		ch->bit_len);
-	if (unit[0] != '\0') {
-		fprintf(out, "; %s = raw * %s + %s", unit, scale, offset);
+	if (f->raw_name != NULL) {
+		fprintf(out, "; %s", unit[0] != '\0' ? unit : "physical");
+	} else if (unit[0] != '\0' || image_is_scaled(ch)) {
+		fprintf(out, "; %s = raw * %s + %s", unit[0] != '\0' ? unit : "value", scale,
+			offset);
 	}
 }
 
@@ -53,7 +70,7 @@ static void put_slave_comment(FILE *out, const struct slave_info *s)
 	name_make_comment(s->device, device, sizeof(device));
 	fprintf(out,
 		"Slave %s at position %u: %s, vendor 0x%08" PRIx32 ", product 0x%08" PRIx32
-		", revision 0x%08" PRIx32 ". Values are raw.",
+		", revision 0x%08" PRIx32 ".",
 		name, s->slave_pos, device, s->vendor, s->product, s->revision);
 }
 
@@ -68,7 +85,8 @@ char *layout_ros2msg(const struct layout_topic *topic)
 	}
 	fprintf(out, "# ");
 	put_slave_comment(out, topic->slave);
-	fprintf(out, "\nuint64 cycle  # index of the SYNC0 edge, one more in every message\n"
+	fprintf(out, "\nstd_msgs/Header header  # stamp: UTC of that edge, as the log time\n"
+		     "uint64 cycle  # index of the SYNC0 edge, one more in every message\n"
 		     "int64 dc_time_ns  # DC time of that edge, ns since 2000-01-01\n"
 		     "uint32 flags  # as in " MESSAGES_PACKAGE "/msg/Cycle\n"
 		     "bool good  # fresh, and the slave's own checks hold\n");
@@ -79,6 +97,7 @@ char *layout_ros2msg(const struct layout_topic *topic)
 		put_comment(out, f);
 		fputc('\n', out);
 	}
+	fputs(HEADER_DEFINITIONS, out);
 	return finish_text(out, &text);
 }
 
@@ -93,7 +112,7 @@ char *layout_idl(const struct layout *l)
 	if (out == NULL) {
 		return NULL;
 	}
-	fprintf(out, "module " MESSAGES_PACKAGE " {\n module msg {\n");
+	fputs(HEADER_IDL "module " MESSAGES_PACKAGE " {\n module msg {\n", out);
 	for (int kind = 0; kind < MESSAGE_KINDS; kind++) {
 		messages_put_idl((enum messages_kind)kind, out);
 	}
@@ -101,7 +120,8 @@ char *layout_idl(const struct layout *l)
 		fprintf(out, "  // ");
 		put_slave_comment(out, topic[i].slave);
 		fprintf(out,
-			"\n  @final\n  struct %s {\n    unsigned long long cycle;\n"
+			"\n  @final\n  struct %s {\n    std_msgs::msg::Header header;\n"
+			"    unsigned long long cycle;\n"
 			"    long long dc_time_ns;\n    unsigned long flags;\n    boolean good;\n",
 			topic[i].type);
 		for (size_t n = 0; n < topic[i].field_count; n++) {
@@ -132,10 +152,12 @@ static const char *type_to_str(uint8_t type)
 	return "unknown";
 }
 
+/* One object a channel: its physical field, if there is one, names the raw one. */
 static void put_json_channel(FILE *out, const struct layout_topic *topic,
 			     const struct layout_field *f)
 {
 	const struct channel *ch = f->channel;
+	const char *raw = f->raw_name != NULL ? f->raw_name : f->name;
 
 	fprintf(out, "{\"name\":");
 	json_put_text(out, ch->name);
@@ -143,6 +165,12 @@ static void put_json_channel(FILE *out, const struct layout_topic *topic,
 	json_put_text(out, topic->topic);
 	fprintf(out, ",\"field\":");
 	json_put_text(out, f->name);
+	fprintf(out, ",\"raw_field\":");
+	if (raw[0] != '\0') {
+		json_put_text(out, raw);
+	} else {
+		fputs("null", out);
+	}
 	fprintf(out,
 		",\"slave\":%u,\"index\":%u,\"subindex\":%u,\"type\":\"%s\","
 		"\"direction\":\"%s\",\"bit_len\":%u,\"bit_offset\":%" PRIu32 ",\"unit\":",
@@ -202,6 +230,7 @@ char *layout_json(const struct layout *l)
 			fputs(comma, out);
 			put_json_channel(out, &topic[i], &topic[i].field[n]);
 			comma = ",";
+			n += (size_t)layout_has_raw_beside(&topic[i].field[n]);
 		}
 	}
 	fprintf(out, "]}");

@@ -11,6 +11,7 @@
 #include "program/error.h"
 #include "program/progress.h"
 #include "record/log_common.h"
+#include "record/messages.h"
 
 struct arguments {
 	const char *dir;
@@ -43,6 +44,7 @@ static void help(FILE *out)
 	      "       ecdaq log export [--dir DIR | FILE-OR-DIR...] [--channels NAME,...] [--from "
 	      "CYCLE]\n"
 	      "                        [--to CYCLE] [--raw] [--output FILE] [--json]\n"
+	      "       ecdaq log ros2pkg FILE... [--output DIR]\n"
 	      "\n"
 	      "  list     the recordings: start, duration, cycles, size, state\n"
 	      "  info     topics with their fields, counts, metadata of one recording\n"
@@ -51,17 +53,24 @@ static void help(FILE *out)
 	      "and\n"
 	      "           between files\n"
 	      "  recover  repair an incomplete recording; --output copies what is intact\n"
-	      "  export   a table with one row per cycle, as CSV (pandas.read_csv reads it)\n"
+	      "  export   a table with one row per cycle, as CSV (pandas.read_csv reads it); "
+	      "columns as\n"
+	      "           NAME [UNIT]\n"
+	      "  ros2pkg  the ROS 2 package with the recording's message types, for ros2 bag "
+	      "play\n"
 	      "\n"
 	      "  --dir DIR        the recordings' directory (default: record.dir)\n"
 	      "  --config FILE    ecdaq.yaml, for record.dir\n"
 	      "  --channels LIST  only these, as `ecdaq channels` names them\n"
 	      "  --from, --to     first and last cycle\n"
-	      "  --raw            raw values (default: physical, raw * scale + offset)\n"
-	      "  --output FILE    file to write (export: default is standard output)\n"
+	      "  --raw            raw values (default: physical)\n"
+	      "  --output FILE    file to write (export: default is standard output; ros2pkg: the "
+	      "new\n"
+	      "                   folder, default " MESSAGES_PACKAGE ")\n"
 	      "  --json           JSON (export: one object per line)\n"
-	      "  --progress       check, export: progress also where standard error is no "
-	      "terminal\n"
+	      "  --progress       check, export, recover: progress also where standard error is "
+	      "no\n"
+	      "                   terminal\n"
 	      "\n",
 	      out);
 	exit_code_help(out, EXIT_CODE_COMMON | EXIT_CODE_BIT(CONFIG));
@@ -209,6 +218,12 @@ static int run_export(const struct arguments *a, char **operands, int count)
 	return r;
 }
 
+static int run_ros2pkg(const struct arguments *a, char **operands, int count)
+{
+	return log_ros2pkg((const char *const *)operands, (size_t)count,
+			   a->output != NULL ? a->output : MESSAGES_PACKAGE, stdout, stderr);
+}
+
 static const struct command {
 	const char *name;
 	unsigned takes;
@@ -222,6 +237,7 @@ static const struct command {
 	{ "check", TAKES_DIR, 0, INT_MAX, "", run_check },
 	{ "recover", TAKES_OUTPUT, 1, 1, "FILE", run_recover },
 	{ "export", TAKES_DIR | TAKES_OUTPUT | TAKES_EXPORT, 0, INT_MAX, "", run_export },
+	{ "ros2pkg", TAKES_OUTPUT, 1, INT_MAX, "FILE", run_ros2pkg },
 };
 
 static int run_command(const struct command *command, struct arguments *a, const struct args *words)
@@ -253,7 +269,8 @@ int log_main(int argc, char **argv)
 	struct args args = { .options = options,
 			     .option_count = select_options(TAKES_ALL, &a, options),
 			     .operands_min = 1,
-			     .operands_usage = "command: list, info, check, recover or export",
+			     .operands_usage =
+				     "command: list, info, check, recover, export or ros2pkg",
 			     .ends_at_operand = 1 };
 	char error[ARGS_ERROR_BYTES];
 	int code;

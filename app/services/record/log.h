@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What people do with recordings: `ecdaq log list|info|check|recover|export`. Context: blocking.
+ * What people do with recordings: `ecdaq log list|info|check|recover|export|ros2pkg`. Context:
+ * blocking.
  */
 #ifndef RECORD_LOG_H
 #define RECORD_LOG_H
@@ -31,6 +32,9 @@ int log_info(const char *path, enum log_format format, FILE *out, FILE *err);
 int log_check(const char *const *paths, size_t count, enum log_format format, FILE *out, FILE *err);
 /** Repair @path in place, or copy its undamaged part to @output if that is not NULL. */
 int log_recover(const char *path, const char *output, enum log_format format, FILE *out, FILE *err);
+
+/** A ROS 2 package with the message types of the files at @paths as the new folder @dir. */
+int log_ros2pkg(const char *const *paths, size_t count, const char *dir, FILE *out, FILE *err);
 
 struct log_export_options {
 	const char *const *paths;

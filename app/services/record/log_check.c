@@ -7,6 +7,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "base/host_clock.h"
 #include "program/exit_code.h"
 #include "program/json.h"
 #include "program/progress.h"
@@ -295,7 +296,7 @@ static int put_result(const struct check *ck, enum log_format format, FILE *out,
 int log_check(const char *const *paths, size_t count, enum log_format format, FILE *out, FILE *err)
 {
 	struct check ck = { .count = 0 };
-	int64_t start_ns = progress_now_ns();
+	int64_t start_ns = host_clock_ns(CLOCK_MONOTONIC);
 	int result = EXIT_CODE_OK;
 
 	for (size_t i = 0; i < count && result == EXIT_CODE_OK; i++) {

@@ -12,7 +12,6 @@
 #include "base/clock.h"
 #include "program/exit_code.h"
 #include "program/progress.h"
-#include "record/file_io.h"
 #include "record/store.h"
 
 int log_fail(FILE *err, const char *what, const char *why)
@@ -43,7 +42,7 @@ int log_file_open(const char *path, struct log_file *file)
 {
 	int r;
 
-	file->plain.read_at = NULL;
+	file->watch.at = NULL;
 	file->fd = open(path, O_RDONLY | O_CLOEXEC);
 	if (file->fd < 0) {
 		return -errno;
@@ -55,25 +54,15 @@ int log_file_open(const char *path, struct log_file *file)
 	return r;
 }
 
-static int watched_read_at(void *ctx, uint64_t offset, void *buf, size_t len)
-{
-	const struct log_file *file = ctx;
-
-	progress_at(offset);
-	return file->plain.read_at(file->plain.ctx, offset, buf, len);
-}
-
 void log_file_watch(struct log_file *file, const char *path)
 {
 	progress_begin(path, file->source.bytes);
-	file->plain = file->source;
-	file->source.read_at = watched_read_at;
-	file->source.ctx = file;
+	file_watch(&file->watch, &file->source, progress_at, 0);
 }
 
 void log_file_close(struct log_file *file)
 {
-	if (file->plain.read_at != NULL) {
+	if (file->watch.at != NULL) {
 		progress_end();
 	}
 	close(file->fd);

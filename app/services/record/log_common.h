@@ -6,6 +6,7 @@
 #include <stdint.h>
 #include <stdio.h>
 
+#include "record/file_io.h"
 #include "record/mcap_recover.h"
 #include "record/track.h"
 
@@ -18,7 +19,7 @@ int log_fail_errno(FILE *err, const char *what, int error);
 struct log_file {
 	int fd;
 	struct mcap_source source;
-	struct mcap_source plain; /* below source, with log_file_watch() */
+	struct file_watch watch; /* with log_file_watch() */
 };
 
 /** 0 or -errno. @file stays where it is until log_file_close(). */

@@ -7,6 +7,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "base/host_clock.h"
 #include "program/exit_code.h"
 #include "program/progress.h"
 #include "record/columns.h"
@@ -48,6 +49,11 @@ static int freeze(struct export *ex, struct columns *c, const char *path)
 		snprintf(why, sizeof(why), "has no channel %s", missing);
 		return log_fail(ex->err, path, why);
 	}
+	if (r == -ENOTSUP) {
+		snprintf(why, sizeof(why),
+			 "%s was recorded as physical values only (record.values)", missing);
+		return log_fail(ex->err, path, why);
+	}
 	if (r == -ENODATA) {
 		return log_fail(ex->err, path, "has no /ecdaq/cycle: not a recording of ours");
 	}
@@ -58,8 +64,9 @@ static int freeze(struct export *ex, struct columns *c, const char *path)
 		}
 	} else if (!columns_are_equal(ex->first, c)) {
 		ex->is_hopeless = 1;
-		return log_fail(ex->err, path,
-				"has other channels than the files before: export it by itself");
+		return log_fail(
+			ex->err, path,
+			"has other channels or units than the files before: export it by itself");
 	}
 	return EXIT_CODE_OK;
 }
@@ -167,7 +174,7 @@ static int export_directory(struct export *ex, const char *dir)
 int log_export(const struct log_export_options *options, FILE *out, FILE *err)
 {
 	struct export ex = { .options = options, .out = out, .err = err };
-	int64_t start_ns = progress_now_ns();
+	int64_t start_ns = host_clock_ns(CLOCK_MONOTONIC);
 	int result = EXIT_CODE_OK;
 	off_t bytes;
 

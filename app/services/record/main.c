@@ -88,6 +88,7 @@ static struct recorder_options recorder_options(const struct recording *pg)
 		.budget_bytes = cfg->record_budget_bytes,
 		.reserve_bytes = cfg->record_reserve_bytes,
 		.when_full = cfg->record_when_full,
+		.values = cfg->record_values,
 		.zstd_level = cfg->record_compression,
 		.config_path = cfg->path,
 		.config_text = pg->config_text,

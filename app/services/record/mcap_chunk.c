@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <zlib.h>
+#include <libdeflate.h>
 
 #include "base/bytes.h"
 #include "record/mcap_parse.h"
@@ -284,7 +284,7 @@ int64_t mcap_chunk_put(struct mcap_buf *out, const struct mcap_chunk_index *mess
 	mcap_buf_u64(out, messages->start_ns);
 	mcap_buf_u64(out, messages->end_ns);
 	mcap_buf_u64(out, records_len);
-	mcap_buf_u32(out, (uint32_t)crc32(0, records, (uInt)records_len));
+	mcap_buf_u32(out, libdeflate_crc32(0, records, records_len));
 	mcap_buf_string(out, zstd != NULL ? "zstd" : "");
 	mcap_buf_u64(out, 0);
 	content_at = out->len;

@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include <zlib.h>
+#include <libdeflate.h>
 
 #include "base/bytes.h"
 #include "base/utf8.h"
@@ -137,7 +137,7 @@ static void parse_attachment(struct cursor *c, struct mcap_item *item)
 	take_bytes(c, take_u64(c), item);
 	covered = (size_t)(c->at - start);
 	crc = take_u32(c);
-	if (c->error == 0 && crc != 0 && crc != (uint32_t)crc32(0, start, (uInt)covered)) {
+	if (c->error == 0 && crc != 0 && crc != libdeflate_crc32(0, start, covered)) {
 		c->error = -EBADMSG;
 	}
 }

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <zlib.h>
+#include <libdeflate.h>
 #include <zstd.h>
 
 #include "base/bytes.h"
@@ -152,7 +152,7 @@ int mcap_reader_create(const struct mcap_source *source, struct mcap_reader **re
 	r->offset = offset;
 	r->sound_end = offset;
 	r->has_bad_magic = has_bad_magic;
-	r->data_crc = (uint32_t)crc32(0, magic, sizeof(magic));
+	r->data_crc = libdeflate_crc32(0, magic, sizeof(magic));
 	r->zstd = ZSTD_createDCtx();
 	if (r->zstd == NULL) {
 		mcap_reader_destroy(r);
@@ -248,7 +248,7 @@ static const char *open_chunk(struct mcap_reader *r, const struct mcap_chunk_fie
 	}
 	r->inner_len = (size_t)c->uncompressed_len;
 	/* A CRC of 0 means: none. */
-	if (c->crc != 0 && c->crc != (uint32_t)crc32(0, r->inner, (uInt)r->inner_len)) {
+	if (c->crc != 0 && c->crc != libdeflate_crc32(0, r->inner, r->inner_len)) {
 		return "chunk has a wrong CRC";
 	}
 	return NULL;
@@ -401,7 +401,7 @@ static void take_record(struct mcap_reader *r, struct mcap_item *item)
 			return;
 		}
 	} else if (!r->is_summary && item->record != NULL) {
-		r->data_crc = (uint32_t)crc32(r->data_crc, item->record, (uInt)item->record_len);
+		r->data_crc = libdeflate_crc32(r->data_crc, item->record, item->record_len);
 	}
 	if (item->kind != MCAP_ITEM_OTHER && item->kind != MCAP_ITEM_DAMAGE) {
 		r->sound_end = r->offset;
@@ -465,7 +465,7 @@ static int check_summary(const struct mcap_source *source, uint64_t start, uint3
 		if (err < 0) {
 			return err;
 		}
-		crc = (uint32_t)crc32(crc, block, (uInt)n);
+		crc = libdeflate_crc32(crc, block, n);
 		start += n;
 	}
 	*ret_ending = crc == wanted ? MCAP_ENDING_GOOD : MCAP_ENDING_BAD;

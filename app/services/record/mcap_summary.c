@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "record/mcap_summary.h"
 
-#include <zlib.h>
+#include <libdeflate.h>
 
 #include "base/bytes.h"
 
@@ -113,8 +113,8 @@ void mcap_summary_put(const struct mcap_index *ix, uint64_t offset, uint32_t dat
 	if (out->error == 0) {
 		/* Over the summary section and the footer up to the CRC itself. */
 		put_le32(out->data + out->len - 4,
-			 (uint32_t)crc32(0, out->data + summary_start,
-					 (uInt)(out->len - 4 - summary_start)));
+			 libdeflate_crc32(0, out->data + summary_start,
+					  (out->len - 4 - summary_start)));
 	}
 	mcap_buf_put(out, MCAP_MAGIC, MCAP_MAGIC_BYTES);
 }

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include <zlib.h>
+#include <libdeflate.h>
 #include <zstd.h>
 
 #include "base/bytes.h"
@@ -102,7 +102,7 @@ static int write_out(struct mcap_writer *w)
 		return r;
 	}
 	w->offset += w->out.len;
-	w->data_crc = (uint32_t)crc32(w->data_crc, w->out.data, (uInt)w->out.len);
+	w->data_crc = libdeflate_crc32(w->data_crc, w->out.data, w->out.len);
 	return 0;
 }
 
@@ -316,8 +316,8 @@ int mcap_writer_attachment(struct mcap_writer *w, const char *name, const char *
 	mcap_buf_put(&w->out, data, data_len);
 	if (w->out.error == 0) {
 		/* Over all fields before it, without the record's head. */
-		mcap_buf_u32(&w->out, (uint32_t)crc32(0, w->out.data + MCAP_HEAD_BYTES,
-						      (uInt)(w->out.len - MCAP_HEAD_BYTES)));
+		mcap_buf_u32(&w->out, libdeflate_crc32(0, w->out.data + MCAP_HEAD_BYTES,
+						       (w->out.len - MCAP_HEAD_BYTES)));
 	}
 	mcap_buf_end(&w->out, start);
 	return put_record(w);

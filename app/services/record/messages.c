@@ -3,6 +3,7 @@
 
 #include <assert.h>
 #include <errno.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "base/limits.h"
@@ -193,6 +194,28 @@ void messages_put_ros2msg(enum messages_kind kind, FILE *out)
 	for (const struct field *f = kinds[kind].field; f->name != NULL; f++) {
 		fprintf(out, "%s %s  # %s\n", f->ros_type, f->name, f->comment);
 	}
+}
+
+char *messages_ros2msg(enum messages_kind kind)
+{
+	char *text = NULL;
+	size_t len;
+	FILE *out = open_memstream(&text, &len);
+
+	if (out == NULL) {
+		return NULL;
+	}
+	messages_put_ros2msg(kind, out);
+	if (fclose(out) != 0) {
+		free(text);
+		return NULL;
+	}
+	return text;
+}
+
+void messages_schema_name(const char *type, char *buf, size_t buf_len)
+{
+	snprintf(buf, buf_len, MESSAGES_PACKAGE "/msg/%s", type);
 }
 
 void messages_put_idl(enum messages_kind kind, FILE *out)

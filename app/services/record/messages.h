@@ -30,6 +30,10 @@ int messages_has_type(const char *type);
 /** The ROS 2 definition; and the struct in IDL, inside its module. */
 void messages_put_ros2msg(enum messages_kind kind, FILE *out);
 void messages_put_idl(enum messages_kind kind, FILE *out);
+/** The ROS 2 definition as a text; free() it. NULL without memory. */
+char *messages_ros2msg(enum messages_kind kind);
+/** Name of the schema of @type (messages_type(), layout_topic.type): "ecdaq_msgs/msg/Cycle". */
+void messages_schema_name(const char *type, char *buf, size_t buf_len);
 
 /* An event as it is recorded: with its place in the event ring, and its text. */
 struct messages_event {

@@ -142,7 +142,8 @@ int record_file_sample(struct record_file *f, const struct sample_header *header
 		messages_encode_cycle(header, layout_meta(f->layout)->slave_count, f->buf));
 	for (size_t i = 0; i < f->topic_count && r == 0; i++) {
 		r = put(f, MESSAGE_KINDS + (unsigned)i, sequence,
-			layout_encode(&f->topic[i], header, image, f->buf, f->buf_len));
+			layout_encode(&f->topic[i], header, image, f->last_utc_ns, f->buf,
+				      f->buf_len));
 	}
 	if (r < 0) {
 		return r;

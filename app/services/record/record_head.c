@@ -11,7 +11,7 @@
 #include "program/json.h"
 #include "record/messages.h"
 
-enum { PAIRS_PER_FIELD = 6, NUMBERS = 20, NUMBER_BYTES = 24 };
+enum { PAIRS_PER_FIELD = 7, NUMBERS = 20, NUMBER_BYTES = 24 };
 
 /* A small list of pairs whose values are numbers, made on the spot. */
 struct numbers {
@@ -45,20 +45,13 @@ static int put_fixed_channel(struct mcap_writer *w, enum messages_kind kind)
 					     .pairs = pairs,
 					     .pair_count = 1 };
 	char type[LAYOUT_NAME_BYTES + 32];
-	char *text = NULL;
-	size_t len;
-	FILE *out = open_memstream(&text, &len);
+	char *text = messages_ros2msg(kind);
 	int r;
 
-	if (out == NULL) {
+	if (text == NULL) {
 		return -ENOMEM;
 	}
-	messages_put_ros2msg(kind, out);
-	if (fclose(out) != 0) {
-		free(text);
-		return -ENOMEM;
-	}
-	snprintf(type, sizeof(type), MESSAGES_PACKAGE "/msg/%s", messages_type(kind));
+	messages_schema_name(messages_type(kind), type, sizeof(type));
 	r = mcap_writer_schema(w, type, "ros2msg", text);
 	free(text);
 	if (r < 0) {
@@ -68,7 +61,9 @@ static int put_fixed_channel(struct mcap_writer *w, enum messages_kind kind)
 	return mcap_writer_channel(w, &channel);
 }
 
-/* Unit, scale and so on of each field, as "FIELD.unit": what a reader needs for physical values. */
+/* Unit, scale and so on of each field, as "FIELD.unit": what a reader needs for physical values.
+ * Those of a raw field are those of its channel; a physical one has scale 1, and "FIELD.raw" is the
+ * raw field of the same channel, empty where there is none. */
 struct field_pairs {
 	struct mcap_pair *pair;
 	size_t count;
@@ -91,15 +86,19 @@ static void add_key(struct field_pairs *p, const char *field, const char *what, 
 
 static void add_field_pairs(struct field_pairs *p, const struct layout_field *f)
 {
+	int is_raw = f->raw_name == NULL;
 	char *scale = next_text(p);
 	char *offset = next_text(p);
 
-	json_real_format(f->channel->scale, scale, sizeof(p->text[0]));
-	json_real_format(f->channel->offset, offset, sizeof(p->text[0]));
+	json_real_format(is_raw ? f->channel->scale : 1, scale, sizeof(p->text[0]));
+	json_real_format(is_raw ? f->channel->offset : 0, offset, sizeof(p->text[0]));
 	add_key(p, f->name, "channel", f->channel->name);
 	add_key(p, f->name, "unit", f->channel->unit);
 	add_key(p, f->name, "scale", scale);
 	add_key(p, f->name, "offset", offset);
+	if (!is_raw) {
+		add_key(p, f->name, "raw", f->raw_name);
+	}
 	if (image_has_range(f->channel)) {
 		char *min = next_text(p);
 		char *max = next_text(p);
@@ -150,7 +149,7 @@ static int put_topic(struct mcap_writer *w, const struct layout_topic *topic)
 	if (text == NULL) {
 		return -ENOMEM;
 	}
-	snprintf(type, sizeof(type), MESSAGES_PACKAGE "/msg/%s", topic->type);
+	messages_schema_name(topic->type, type, sizeof(type));
 	r = mcap_writer_schema(w, type, "ros2msg", text);
 	free(text);
 	return r < 0 ? r : put_topic_channel(w, topic, r);

@@ -210,7 +210,7 @@ static void look_for_session(struct recorder *rec)
 		note_ring_error(rec, reader_error(rec->reader), reader_problem(rec->reader));
 		return;
 	}
-	r = sample_feed_create(rec->reader, rec->sink, &rec->samples);
+	r = sample_feed_create(rec->reader, rec->sink, rec->opt.values, &rec->samples);
 	note_ring_error(rec, r, reader_error_to_str(r));
 	if (r < 0) {
 		reader_skip_session(rec->reader);

@@ -45,14 +45,17 @@ static int note_and_finish(struct mcap_writer *w, const struct recover_outcome *
 	return r < 0 ? r : mcap_writer_finish(w);
 }
 
-static int look(int *fd, struct recover_outcome *o, struct mcap_scan **ret_scan)
+static int look(int *fd, void (*watch)(uint64_t done), struct recover_outcome *o,
+		struct mcap_scan **ret_scan)
 {
 	const struct mcap_visitor visitor = { .item = track_visit, .ctx = &o->track };
+	struct file_watch watching;
 	struct mcap_source source;
 	int r = file_source(fd, &source);
 
 	track_init(&o->track);
 	if (r == 0) {
+		file_watch(&watching, &source, watch, 0);
 		r = mcap_scan_create(&source, &visitor, ret_scan);
 	}
 	if (r == 0) {
@@ -75,7 +78,8 @@ static int repair(int *fd, struct mcap_scan *scan, const struct recover_outcome 
 	return r;
 }
 
-int recover_in_place(const char *path, struct recover_outcome *ret_outcome)
+int recover_in_place(const char *path, void (*watch)(uint64_t done),
+		     struct recover_outcome *ret_outcome)
 {
 	struct recover_outcome o = { .result = RECOVER_REPAIRED };
 	struct mcap_scan *scan = NULL;
@@ -85,7 +89,7 @@ int recover_in_place(const char *path, struct recover_outcome *ret_outcome)
 	if (fd < 0) {
 		return -errno;
 	}
-	r = look(&fd, &o, &scan);
+	r = look(&fd, watch, &o, &scan);
 	if (r != 0) {
 		close(fd);
 		return r;
@@ -109,8 +113,9 @@ int recover_in_place(const char *path, struct recover_outcome *ret_outcome)
 }
 
 static int copy_to(int *fd, const struct mcap_scan *scan, const char *output,
-		   const struct recover_outcome *o)
+		   void (*watch)(uint64_t done), const struct recover_outcome *o)
 {
+	struct file_watch watching;
 	struct mcap_source source;
 	struct mcap_writer *w;
 	struct mcap_io io;
@@ -124,7 +129,10 @@ static int copy_to(int *fd, const struct mcap_scan *scan, const char *output,
 	r = mcap_writer_create(&io, 0, &w);
 	if (r == 0) {
 		r = file_source(fd, &source);
-		r = r < 0 ? r : mcap_copy_whole(&source, scan, w);
+		if (r == 0) {
+			file_watch(&watching, &source, watch, source.bytes);
+			r = mcap_copy_whole(&source, scan, w);
+		}
 		r = r < 0 ? r : note_and_finish(w, o);
 		mcap_writer_destroy(w);
 	}
@@ -137,7 +145,8 @@ static int copy_to(int *fd, const struct mcap_scan *scan, const char *output,
 	return r;
 }
 
-int recover_copy(const char *path, const char *output, struct recover_outcome *ret_outcome)
+int recover_copy(const char *path, const char *output, void (*watch)(uint64_t done),
+		 struct recover_outcome *ret_outcome)
 {
 	struct recover_outcome o = { .result = RECOVER_COPIED };
 	struct mcap_scan *scan = NULL;
@@ -147,9 +156,9 @@ int recover_copy(const char *path, const char *output, struct recover_outcome *r
 	if (fd < 0) {
 		return -errno;
 	}
-	r = look(&fd, &o, &scan);
+	r = look(&fd, watch, &o, &scan);
 	if (r == 0) {
-		r = copy_to(&fd, scan, output, &o);
+		r = copy_to(&fd, scan, output, watch, &o);
 		mcap_scan_destroy(scan);
 	}
 	close(fd);
@@ -232,7 +241,7 @@ static int replace_by_copy(const char *part, struct recover_outcome *o)
 		return -ENAMETOOLONG;
 	}
 	unlink(copy); /* of an attempt that was cut short */
-	r = recover_copy(part, copy, o);
+	r = recover_copy(part, copy, NULL, o);
 	if (r < 0) {
 		return r;
 	}
@@ -263,7 +272,7 @@ static void set_aside(const char *path, const char *name, int error,
 
 static int recover_path(const char *path, struct recover_outcome *o)
 {
-	int r = recover_in_place(path, o);
+	int r = recover_in_place(path, NULL, o);
 
 	if (r == -EPROTO || r == -ENOMEM) {
 		return r;
@@ -319,7 +328,7 @@ static void ask_finished(const struct store *s, const struct store_entry *e, int
 		     ? -1
 		     : open(path, O_RDONLY | O_CLOEXEC);
 	if (fd >= 0) {
-		if (look(&fd, &o, &scan) == 0) {
+		if (look(&fd, NULL, &o, &scan) == 0) {
 			mcap_scan_destroy(scan);
 			set_state(state, &o.track);
 		}

@@ -24,13 +24,16 @@ struct recover_outcome {
 /**
  * Repair the file at @path in place and make it durable. 0; -EXDEV: damaged before its end, copy
  * it; -EPROTO: not MCAP; -ENODATA: ends before its first record; or -errno. An empty recording is
- * left as it is.
+ * left as it is. @watch (or NULL) is called with how many bytes have been read.
  */
-int recover_in_place(const char *path, struct recover_outcome *ret_outcome);
+int recover_in_place(const char *path, void (*watch)(uint64_t done),
+		     struct recover_outcome *ret_outcome);
 
 /** Copy what is whole in @path to a new file at @output (-EEXIST if it is there), durable. Errors
- * as above. */
-int recover_copy(const char *path, const char *output, struct recover_outcome *ret_outcome);
+ * and
+ * @watch as above; @path is read twice. */
+int recover_copy(const char *path, const char *output, void (*watch)(uint64_t done),
+		 struct recover_outcome *ret_outcome);
 
 struct recover_report {
 	/** One line for a person. */

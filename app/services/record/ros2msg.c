@@ -2,6 +2,7 @@
 #include "record/ros2msg.h"
 
 #include <errno.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -39,10 +40,15 @@ static size_t take_word(const char **at, const char *end, const char **ret_word)
 	return len;
 }
 
+static int is_word(const char *word, size_t len, const char *text)
+{
+	return strlen(text) == len && memcmp(word, text, len) == 0;
+}
+
 static int find_type(const char *word, size_t len, struct ros2msg_field *field)
 {
 	for (size_t i = 0; i < sizeof(types) / sizeof(types[0]); i++) {
-		if (strlen(types[i].name) == len && memcmp(types[i].name, word, len) == 0) {
+		if (is_word(word, len, types[i].name)) {
 			field->type = types[i].type;
 			field->bytes = types[i].bytes;
 			return 0;
@@ -51,32 +57,12 @@ static int find_type(const char *word, size_t len, struct ros2msg_field *field)
 	return -ENOTSUP;
 }
 
-/* 1 a field, 0 nothing in this line, -errno. */
-static int parse_line(const char *at, const char *end, struct ros2msg_field *ret_field)
-{
-	struct ros2msg_field field = { .name = "" };
-	const char *word;
-	size_t len = take_word(&at, end, &word);
-	int r;
-
-	if (len == 0) {
-		return 0;
-	}
-	r = find_type(word, len, &field);
-	if (r < 0) {
-		return r;
-	}
-	len = take_word(&at, end, &word);
-	if (len == 0 || len >= sizeof(field.name)) {
-		return -EBADMSG;
-	}
-	memcpy(field.name, word, len);
-	if (memchr(field.name, '=', len) != NULL || take_word(&at, end, &word) > 0) {
-		return -ENOTSUP; /* a constant or a default */
-	}
-	*ret_field = field;
-	return 1;
-}
+/* std_msgs/Header as the fields that it has. The definition of that follows behind a separator. */
+static const struct ros2msg_field header_fields[] = {
+	{ "stamp.sec", ROS2MSG_INT, 4 },
+	{ "stamp.nanosec", ROS2MSG_UINT, 4 },
+	{ "frame_id", ROS2MSG_STRING, 4 },
+};
 
 static int append(struct ros2msg *msg, const struct ros2msg_field *field)
 {
@@ -97,21 +83,56 @@ static int append(struct ros2msg *msg, const struct ros2msg_field *field)
 	return 0;
 }
 
+static int append_header(struct ros2msg *msg, const char *name)
+{
+	int r = 0;
+
+	for (size_t i = 0; i < sizeof(header_fields) / sizeof(header_fields[0]) && r == 0; i++) {
+		struct ros2msg_field field = header_fields[i];
+
+		if ((size_t)snprintf(field.name, sizeof(field.name), "%s.%s", name,
+				     header_fields[i].name) >= sizeof(field.name)) {
+			return -EBADMSG;
+		}
+		r = append(msg, &field);
+	}
+	return r;
+}
+
+/* The field of this line, if it has one. */
+static int parse_line(const char *at, const char *end, struct ros2msg *msg)
+{
+	struct ros2msg_field field = { .name = "" };
+	const char *word;
+	size_t len = take_word(&at, end, &word);
+	int is_header = is_word(word, len, "std_msgs/Header");
+	int r = len == 0 || is_header ? 0 : find_type(word, len, &field);
+
+	if (len == 0 || r < 0) {
+		return r;
+	}
+	len = take_word(&at, end, &word);
+	if (len == 0 || len >= sizeof(field.name)) {
+		return -EBADMSG;
+	}
+	memcpy(field.name, word, len);
+	if (memchr(field.name, '=', len) != NULL || take_word(&at, end, &word) > 0) {
+		return -ENOTSUP; /* a constant or a default */
+	}
+	return is_header ? append_header(msg, field.name) : append(msg, &field);
+}
+
 int ros2msg_parse(const char *text, size_t text_len, struct ros2msg *ret_msg)
 {
 	struct ros2msg msg = { .field = NULL };
 	const char *end = text + text_len;
 	int r = 0;
 
-	while (text < end && r >= 0) {
+	while (text < end && r == 0 && *text != '=') { /* a separator: nested definitions */
 		const char *line_end = memchr(text, '\n', (size_t)(end - text));
-		struct ros2msg_field field;
 
 		line_end = line_end != NULL ? line_end : end;
-		r = parse_line(text, line_end, &field);
-		if (r > 0) {
-			r = append(&msg, &field);
-		}
+		r = parse_line(text, line_end, &msg);
 		text = line_end < end ? line_end + 1 : end;
 	}
 	if (r < 0) {
@@ -126,16 +147,6 @@ void ros2msg_done(struct ros2msg *msg)
 {
 	free(msg->field);
 	*msg = (struct ros2msg){ .field = NULL };
-}
-
-static uint64_t get_le(const uint8_t *p, size_t bytes)
-{
-	uint64_t v = 0;
-
-	for (size_t i = 0; i < bytes; i++) {
-		v |= (uint64_t)p[i] << (8 * i);
-	}
-	return v;
 }
 
 static uint64_t extend_sign(uint64_t raw, size_t bytes)
@@ -161,7 +172,7 @@ int ros2msg_decode(const struct ros2msg *msg, const uint8_t *data, size_t data_l
 		if (at > data_len || f->bytes > data_len - at) {
 			return -EBADMSG;
 		}
-		raw = get_le(data + at, f->bytes);
+		raw = get_le(data + at, (unsigned)f->bytes);
 		at += f->bytes;
 		values[i] = (struct ros2msg_value){ .raw = raw, .text = NULL };
 		if (f->type == ROS2MSG_INT) {

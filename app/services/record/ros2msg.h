@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Reads a flat ROS 2 message definition (what our recordings have) and decodes messages by it.
+ * Reads a ROS 2 message definition as our recordings have it and decodes messages by it: flat, or
+ * with a std_msgs/Header, whose fields are then header.stamp.sec and so on.
  * Whatever the text and the bytes are, nothing is read outside of them. Context: blocking.
  */
 #ifndef RECORD_ROS2MSG_H
@@ -28,7 +29,7 @@ struct ros2msg_value {
 	const char *text; /* strings: not zero-terminated */
 };
 
-/** 0; -ENOTSUP: not flat (arrays, nested types, constants); -EBADMSG; -ENOMEM. Free with
+/** 0; -ENOTSUP: arrays, other nested types, constants; -EBADMSG; -ENOMEM. Free with
  * ros2msg_done(). */
 int ros2msg_parse(const char *text, size_t text_len, struct ros2msg *ret_msg);
 void ros2msg_done(struct ros2msg *msg);

@@ -5,7 +5,6 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "base/clock.h"
 #include "reader/utc.h"
@@ -47,7 +46,8 @@ static void go_to_start(struct sample_feed *s)
 	s->missed_start = s->has_next ? 0 : oldest;
 }
 
-int sample_feed_create(struct reader *reader, struct sink *sink, struct sample_feed **ret_session)
+int sample_feed_create(struct reader *reader, struct sink *sink, enum config_record_values values,
+		       struct sample_feed **ret_session)
 {
 	const struct channel_table *table = reader_table(reader);
 	const struct store_state *resume = sink_resume_point(sink);
@@ -60,7 +60,7 @@ int sample_feed_create(struct reader *reader, struct sink *sink, struct sample_f
 	s->reader = reader;
 	s->sink = sink;
 	s->utc = utc_create(&table->meta);
-	r = s->utc == NULL ? -ENOMEM : layout_create(table, &s->layout);
+	r = s->utc == NULL ? -ENOMEM : layout_create(table, values, &s->layout);
 	if (r < 0) {
 		sample_feed_destroy(s);
 		return r;

@@ -18,7 +18,8 @@ struct sample_feed;
  * session, else from the oldest sample. The caller keeps both. 0, or -ENOMEM. Free with
  * sample_feed_destroy().
  */
-int sample_feed_create(struct reader *reader, struct sink *sink, struct sample_feed **ret_session);
+int sample_feed_create(struct reader *reader, struct sink *sink, enum config_record_values values,
+		       struct sample_feed **ret_session);
 void sample_feed_destroy(struct sample_feed *s);
 uint64_t sample_feed_number(const struct sample_feed *s);
 /** Slots that had left the ring before this session could be read for the first time. */

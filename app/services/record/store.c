@@ -6,6 +6,7 @@
 #include <fcntl.h>
 #include <inttypes.h>
 #include <limits.h>
+#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,6 +20,8 @@
 #define LOCK_NAME ".ecdaq-record.lock"
 #define STATE_NAME ".ecdaq-record.state"
 #define STATE_HEAD "ecdaq-record-state 1\n"
+
+enum { LOCK_TRIES = 20, LOCK_PAUSE_MS = 5 };
 
 struct store {
 	char dir[PATH_MAX];
@@ -44,12 +47,24 @@ static int make_dirs(const char *dir)
 	return mkdir(path, 0755) < 0 && errno != EEXIST ? -errno : 0;
 }
 
+/* Who asks store_is_locked() has the lock for a moment. */
+static int try_lock(int fd)
+{
+	int r = flock(fd, LOCK_EX | LOCK_NB);
+
+	for (int i = 0; i < LOCK_TRIES && r < 0 && errno == EWOULDBLOCK; i++) {
+		poll(NULL, 0, LOCK_PAUSE_MS);
+		r = flock(fd, LOCK_EX | LOCK_NB);
+	}
+	return r;
+}
+
 static int take_lock(int fd, int64_t *ret_pid)
 {
 	char text[24];
 	ssize_t n;
 
-	if (flock(fd, LOCK_EX | LOCK_NB) == 0) {
+	if (try_lock(fd) == 0) {
 		n = snprintf(text, sizeof(text), "%d\n", (int)getpid());
 		/* The number is a help for people; the lock is what counts. */
 		if (ftruncate(fd, 0) < 0 || pwrite(fd, text, (size_t)n, 0) != n) {
@@ -226,6 +241,28 @@ static int parse_any_name(const char *name, struct store_entry *e)
 	}
 	snprintf(part, sizeof(part), "%.*s.mcap", (int)(len - strlen(damaged)), name);
 	return store_parse_name(part, &e->sequence, &e->is_part);
+}
+
+int store_is_name(const char *name)
+{
+	struct store_entry e;
+
+	for (const char *p = name; *p != '\0'; p++) {
+		if (!((*p >= 'a' && *p <= 'z') || (*p >= 'A' && *p <= 'Z') ||
+		      (*p >= '0' && *p <= '9') || *p == '-' || *p == '.')) {
+			return 0;
+		}
+	}
+	return parse_any_name(name, &e);
+}
+
+int64_t store_name_utc_s(const char *name)
+{
+	struct tm tm = { .tm_sec = 0 };
+	const char *end =
+		strncmp(name, "ecdaq-", 6) == 0 ? strptime(name + 6, "%Y%m%dT%H%M%SZ", &tm) : NULL;
+
+	return end == NULL || *end != '-' ? 0 : (int64_t)timegm(&tm);
 }
 
 /* NAME.keep, with or without the suffix of the recording in NAME. */

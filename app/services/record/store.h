@@ -64,6 +64,10 @@ void store_make_name(char buf[STORE_NAME_BYTES], int64_t utc_ns, uint64_t sessio
 		     uint64_t sequence);
 /** 1 if @name is one of ours, and then its sequence and whether it is a .part. */
 int store_parse_name(const char *name, uint64_t *ret_sequence, int *ret_is_part);
+/** 1 if @name is one that a file of store_list_all() can have; never a path. */
+int store_is_name(const char *name);
+/** Unix time at which the file with this name was begun, s; 0: its name does not have it. */
+int64_t store_name_utc_s(const char *name);
 
 /** 0, -ENOENT, -EBADMSG (ret untouched on failure). */
 int store_load_state(const struct store *s, struct store_state *ret_state);

@@ -7,6 +7,7 @@
 #include <time.h>
 
 #include "base/clock.h"
+#include "base/host_clock.h"
 #include "sync0/calibration.h"
 #include "sync0/gpio_lines.h"
 #include "sync0/print.h"
@@ -42,26 +43,18 @@ static void take_edge(void *ctx, const struct edge *edge)
 	}
 }
 
-static int64_t now_ns(void)
-{
-	struct timespec ts;
-
-	clock_gettime(CLOCK_MONOTONIC, &ts);
-	return (int64_t)ts.tv_sec * NS_PER_S + ts.tv_nsec;
-}
-
 static void collect(struct listening *ls, const volatile sig_atomic_t *has_stopped)
 {
-	int64_t heard_ns = now_ns();
+	int64_t heard_ns = host_clock_ns(CLOCK_MONOTONIC);
 
 	while (!*has_stopped && (ls->count[0] < EDGES || ls->count[1] < EDGES) &&
-	       now_ns() - heard_ns < SILENCE_NS) {
+	       host_clock_ns(CLOCK_MONOTONIC) - heard_ns < SILENCE_NS) {
 		size_t before = ls->count[0] + ls->count[1];
 
 		gpio_lines_wait(ls->lines, WAIT_MS);
 		gpio_lines_read(ls->lines, take_edge, on_line, ls);
 		if (ls->count[0] + ls->count[1] > before) {
-			heard_ns = now_ns();
+			heard_ns = host_clock_ns(CLOCK_MONOTONIC);
 		}
 	}
 }

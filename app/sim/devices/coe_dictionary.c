@@ -313,6 +313,7 @@ enum coe_abort coe_dictionary_entry_info(const struct coe_dictionary *d, uint16_
 		return abort_code;
 	}
 	ret->text = "";
+	ret->unit = 0;
 	ret->bit_len = (uint16_t)(v.len * 8);
 	ret->data_type = index == DEVICE_NAME ? TYPE_STRING
 			 : v.len <= 4         ? unsigned_by_bytes[v.len]
@@ -322,7 +323,8 @@ enum coe_abort coe_dictionary_entry_info(const struct coe_dictionary *d, uint16_
 
 		*ret = (struct coe_entry_info){ .data_type = e->data_type,
 						.bit_len = e->bit_len,
-						.text = text_of(d, e->name) };
+						.text = text_of(d, e->name),
+						.unit = d->unit != NULL ? d->unit[n] : 0 };
 	}
 	return COE_OK;
 }
@@ -372,4 +374,18 @@ uint32_t coe_dictionary_sm_bits(const struct coe_dictionary *d, size_t sm)
 		bits += pdo != NULL ? pdo->bits : 0;
 	}
 	return bits;
+}
+
+int coe_dictionary_sm_has_twice(const struct coe_dictionary *d, size_t sm)
+{
+	const struct coe_assignment *a = &d->assignment[sm];
+
+	for (uint8_t i = 0; i < a->count; i++) {
+		for (uint8_t j = 0; j < i; j++) {
+			if (a->pdo[i] == a->pdo[j] && a->pdo[i] != 0) {
+				return 1;
+			}
+		}
+	}
+	return 0;
 }

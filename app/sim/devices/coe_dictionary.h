@@ -59,6 +59,7 @@ struct coe_dictionary {
 	const char *const *text; /* of entries, by their name number - 1; NULL: no SDO information
 				  */
 	size_t text_count;
+	const uint32_t *unit; /* of entries, by their number in sii; NULL: none has one */
 	uint32_t device_type; /* object 0x1000; after init: a modular device */
 	uint8_t is_fixed;     /* assignments can never be written */
 	struct coe_assignment assignment[SII_LIMIT_SM];
@@ -81,6 +82,7 @@ struct coe_entry_info {
 	uint16_t data_type; /* ETG.1020 base data type */
 	uint16_t bit_len;
 	const char *text; /* "" where there is none */
+	uint32_t unit;    /* wire/coe_unit.h; 0: none */
 };
 
 /** COE_OK or the abort code; @ret untouched then. */
@@ -91,5 +93,7 @@ uint16_t coe_dictionary_next(const struct coe_dictionary *d, uint16_t after);
 
 /** Bits that are assigned to SyncManager @sm now. */
 uint32_t coe_dictionary_sm_bits(const struct coe_dictionary *d, size_t sm);
+/** 1: a PDO is assigned to SyncManager @sm more than once, so that its objects are mapped twice. */
+int coe_dictionary_sm_has_twice(const struct coe_dictionary *d, size_t sm);
 
 #endif

@@ -103,16 +103,21 @@ static size_t answer_entry(const struct coe_dictionary *d, const uint8_t *reques
 	enum coe_abort code = coe_dictionary_entry_info(d, index, subindex, &info);
 	size_t len = BODY_AT + SDO_ENTRY_BYTES;
 
-	if (code != COE_OK || capacity < len) {
+	if (code != COE_OK || capacity < len + SDO_ENTRY_UNIT_BYTES) {
 		return refuse(request, code != COE_OK ? code : COE_ABORT_ACCESS, answer);
 	}
 	put_header(request, SDO_ENTRY, answer);
 	put_le16(answer + BODY_AT, index);
 	answer[BODY_AT + 2] = subindex;
-	answer[BODY_AT + 3] = 0; /* none of the optional values is sent */
+	answer[BODY_AT + 3] = 0; /* of the optional values only a unit is sent */
 	put_le16(answer + BODY_AT + 4, info.data_type);
 	put_le16(answer + BODY_AT + 6, info.bit_len);
 	put_le16(answer + BODY_AT + 8, ACCESS_READ);
+	if (info.unit != 0 && (request[BODY_AT + 3] & SDO_VALUE_UNIT) != 0) {
+		answer[BODY_AT + 3] = SDO_VALUE_UNIT;
+		put_le32(answer + len, info.unit);
+		len += SDO_ENTRY_UNIT_BYTES;
+	}
 	return len + put_text(answer + len, info.text, capacity - len);
 }
 

@@ -63,9 +63,12 @@ int number_of(struct parse *p, const char *text, const char *what, long long min
 
 	if (end != text && *end == '+' && p->repeat_pos != NULL) {
 		const char *step = end + 1;
+		long long more = strtoll(step, &end, 0);
 
-		value += p->channel * strtol(step, &end, 0);
-		end = end == step ? (char *)text : end;
+		if (end == step || __builtin_mul_overflow(more, (long long)p->channel, &more) ||
+		    __builtin_add_overflow(value, more, &value)) {
+			end = (char *)text;
+		}
 	}
 	if (end == text || *end != '\0' || value < min || value > max) {
 		return parse_fail(p, "%s: '%s' is not a number from %lld to %lld", what, text, min,

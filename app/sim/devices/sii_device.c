@@ -401,6 +401,7 @@ struct sim_device *sii_device_from_model(const struct slave_model *model)
 		}
 		d->app.coe.dictionary.text = d->text;
 		d->app.coe.dictionary.text_count = model->text_count;
+		d->app.coe.dictionary.unit = d->model.unit;
 	}
 	d->dev.ops = &model_ops;
 	return &d->dev;

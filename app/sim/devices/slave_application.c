@@ -87,6 +87,10 @@ static uint16_t check_process_data(struct slave_application *app, int64_t t_ns)
 		uint8_t type = app->sii->sm[n].type;
 		uint32_t bits = coe_dictionary_sm_bits(&app->coe.dictionary, n);
 
+		if (coe_dictionary_sm_has_twice(&app->coe.dictionary, n)) {
+			return type == SLAVE_SM_OUTPUTS ? AL_CODE_INVALID_OUTPUT_MAPPING
+							: AL_CODE_INVALID_INPUT_MAPPING;
+		}
 		if ((type == SLAVE_SM_OUTPUTS || type == SLAVE_SM_INPUTS) && bits > 0 &&
 		    !sm_is(app, t_ns, n, app->sii->sm[n].start, (bits + 7) / 8)) {
 			return type == SLAVE_SM_OUTPUTS ? AL_CODE_INVALID_OUTPUT_CONFIG

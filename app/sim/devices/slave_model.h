@@ -63,6 +63,7 @@ struct slave_model {
 	struct model_dc_mode dc[MODEL_DC_MODES];
 	size_t dc_count;
 	struct model_input input[MODEL_ENTRIES]; /* by number of the entry in sii */
+	uint32_t unit[MODEL_ENTRIES];            /* the same; wire/coe_unit.h */
 	struct esc_features features;
 };
 

@@ -394,6 +394,22 @@ static int take_entry(struct parse *p)
 	return add_entry(p, &entry, &input);
 }
 
+/* Of the entry before, in its SDO information. */
+static int take_unit(struct parse *p)
+{
+	const struct sii *s = &p->m->sii;
+	long long code;
+
+	if (s->entry_count == 0 || s->entry[s->entry_count - 1].index == 0) {
+		return parse_fail(p, "a unit comes after the entry that it belongs to");
+	}
+	if (number(p, "unit", 1, UINT32_MAX, &code) < 0) {
+		return -EBADMSG;
+	}
+	p->m->unit[s->entry_count - 1] = (uint32_t)code;
+	return 1;
+}
+
 static int take_gap(struct parse *p)
 {
 	static const struct model_input zero = { .source = MODEL_ZERO };
@@ -505,6 +521,7 @@ static int take_line(struct parse *p)
 		{ "txpdo", take_txpdo },
 		{ "rxpdo", take_rxpdo },
 		{ "entry", take_entry },
+		{ "unit", take_unit },
 		{ "gap", take_gap },
 		{ "dc", take_dc },
 		{ "repeat", take_repeat },

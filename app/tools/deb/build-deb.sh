@@ -9,16 +9,22 @@ root=$(CDPATH='' cd -- "$here/../../.." && pwd)
 . "$root/app/tools/setup.sh"
 # shellcheck source-path=SCRIPTDIR source=chroot.sh
 . "$here/chroot.sh"
+# shellcheck source-path=SCRIPTDIR source=../arm64.sh
+. "$root/app/tools/arm64.sh"
 
 usage()
 {
 	cat <<'USAGE'
-usage: ./build.sh deb [--suffix SUFFIX] [--to DIR] [--refresh] [amd64]
+usage: ./build.sh deb [--suffix SUFFIX] [--to DIR] [--refresh] [amd64 | arm64 | all]
 
 Builds the packages ecdaq, ecdaq-sim, libecdaq1, libecdaq-dev and python3-ecdaq for Debian 12 into
-build/deb/, for amd64, and checks them with lintian: an error or a warning of lintian is a failure. They
-are built in a Debian 12 tree of their own, which is kept in ~/.cache/ecdaq/deb/. Needs x86-64 and root.
-For arm64 there is the image (./build.sh help image).
+build/deb/ and checks them with lintian: an error or a warning of lintian is a failure. They are built in
+a Debian 12 tree of their own, which is kept in ~/.cache/ecdaq/deb/. Needs x86-64 and root.
+
+  amd64            for a PC (default)
+  arm64            for a board with Debian 12, cross-compiled; programs that write manual pages run in
+                   QEMU's user mode
+  all              both
 
   --suffix SUFFIX  appended to the version, which is that of app/CMakeLists.txt: +git5 makes a version
                    that is newer than the release, ~rc1 one that is older
@@ -27,7 +33,7 @@ For arm64 there is the image (./build.sh help image).
 
 environment:
   ECDAQ_APT_MIRROR, ECDAQ_APT_SECURITY_MIRROR  Debian mirrors, as for ./build.sh image
-  XDG_CACHE_HOME   ecdaq/deb/ below it keeps the trees, 2 GB (default: ~/.cache)
+  XDG_CACHE_HOME   ecdaq/deb/ below it keeps the trees, 2 GB for each architecture (default: ~/.cache)
 USAGE
 }
 
@@ -35,6 +41,7 @@ suffix=
 to=$root/build/deb
 refresh=no
 check=no
+architectures=
 while [ $# -gt 0 ]; do
 	case $1 in
 	--suffix)
@@ -55,13 +62,14 @@ while [ $# -gt 0 ]; do
 		usage
 		exit 0
 		;;
-	amd64) ;;
-	arm64 | all) usage_error "deb: $1: packages are built for amd64 only" ;;
-	*) usage_error "deb: no architecture or option '$1'; there are: amd64 --suffix --to --refresh" ;;
+	amd64 | arm64) architectures="$architectures $1" ;;
+	all) architectures="$architectures amd64 arm64" ;;
+	*) usage_error "deb: no architecture or option '$1'; there are: amd64 arm64 all --suffix --to --refresh" ;;
 	esac
 	shift
 done
 [ "$check" = no ] || exit 0
+architectures=$(printf '%s\n' "${architectures:-amd64}" | tr ' ' '\n' | sort -u)
 
 out=$root/build/deb
 packaging=$root/app/packaging
@@ -70,7 +78,7 @@ version=$(sed -n 's/^project(ecdaq VERSION \([0-9.]*\) .*/\1/p' "$root/app/CMake
 # The libraries' headers that app/tools/packages.txt names for the build, as "libyaml-dev, libzstd-dev".
 header_packages()
 {
-	awk '$1 !~ /^#/ && $2 ~ /(^|,)(build|dds)(,|$)/ && $1 ~ /-dev$/ && $1 != "libc6-dev" { print $1 }' \
+	awk '$1 !~ /^#/ && $2 ~ /(^|,)(build|dds|web|stream)(,|$)/ && $1 ~ /-dev$/ && $1 != "libc6-dev" { print $1 }' \
 		"$root/app/tools/packages.txt" | paste -s -d ' ' | sed 's/ /, /g'
 }
 
@@ -124,41 +132,48 @@ need_archives()
 	done
 }
 
-# The Python packages that Debian does not have, pinned with their hashes; kept in the cache.
+# The Python packages that Debian does not have, pinned with their hashes; kept in the cache. pip asks the sources
+# of cyclonedds for their metadata, and these look for the library: an empty one will do.
 fetch_wheels()
 {
 	wheels=$deb_cache/wheels-$(sha256sum < "$packaging/python-private.txt" | cut -c 1-12)
 	if [ ! -e "$wheels/.complete" ]; then
 		need_pip
-		rm -rf "$deb_cache"/wheels-*
-		mkdir -p "$wheels"
-		run_step "fetching Python packages" "$deb_cache/wheels.log" "$PYTHON" -m pip download --quiet \
-			--disable-pip-version-check --no-deps --only-binary :all: --require-hashes \
-			--platform manylinux2014_x86_64 --python-version 3.11 --implementation cp \
+		rm -rf "$deb_cache"/wheels-* "$deb_cache/no-cyclonedds"
+		mkdir -p "$wheels" "$deb_cache/no-cyclonedds/bin" "$deb_cache/no-cyclonedds/include" \
+			"$deb_cache/no-cyclonedds/lib"
+		: > "$deb_cache/no-cyclonedds/lib/libddsc.so"
+		run_step "fetching Python packages" "$deb_cache/wheels.log" \
+			env CYCLONEDDS_HOME="$deb_cache/no-cyclonedds" "$PYTHON" -m pip download --quiet \
+			--disable-pip-version-check --no-deps --only-binary mcap --no-binary cyclonedds --require-hashes \
 			--dest "$wheels" --requirement "$packaging/python-private.txt" || {
 			cat "$deb_cache/wheels.log" >&2
 			die "pip cannot fetch app/packaging/python-private.txt (see above)"
 		}
 		touch "$wheels/.complete"
 	fi
-	find "$wheels" -name '*.whl' | grep -q . || die "$wheels has no wheels: remove it"
+	[ "$(find "$wheels" -name '*.whl' -o -name '*.tar.gz' | wc -l)" = 2 ] || die "$wheels is not complete: remove it"
 }
 
-# The tree with tools and headers.
+# The tree with tools and headers; for arm64 the cross compiler is amd64's.
 need_build_tree()
 {
-	arch=$1
 	tools="debhelper,dh-python,fakeroot,help2man,lintian,ccache,binutils"
-	key=$({ echo "$suite $arch $tools" && sed -n '/^Build-Depends:/,/^$/p' "$source/debian/control"; } |
+	machines=$arch
+	if [ "$arch" != amd64 ]; then
+		tools="$tools,crossbuild-essential-$arch"
+		machines=amd64,$arch
+	fi
+	key=$({ echo "$suite $machines $tools" && sed -n '/^Build-Depends:/,/^$/p' "$source/debian/control"; } |
 		sha256sum | cut -c 1-12)
 	[ "$refresh" = no ] || rm -f "$deb_cache/build-$arch"-*.complete
 	# shellcheck disable=SC2016 # expanded by mmdebstrap's shell
 	need_chroot "build-$arch" "$key" "making the Debian tree for $arch" --variant=buildd \
-		--architectures="$arch" --include="$tools" \
+		--architectures="$machines" --include="$tools" \
 		--customize-hook='mkdir -p "$1/tmp/source/debian"' \
 		--customize-hook="copy-in $source/debian/control $source/debian/changelog /tmp/source/debian" \
-		--customize-hook='chroot "$1" sh -c "cd /tmp && apt-get -q -y --no-install-recommends build-dep \
-			./source && rm -rf source"'
+		--customize-hook='chroot "$1" sh -c "cd /tmp && apt-get -q -y --no-install-recommends \
+			--host-architecture '"$arch"' build-dep ./source && rm -rf source"'
 }
 
 build()
@@ -166,6 +181,7 @@ build()
 	arch=$1
 	work=$out/work/$arch
 	source=$work/ecdaq
+	[ "$arch" = amd64 ] || need_arm64_programs
 	prepare_source
 	need_build_tree "$arch"
 	# shellcheck disable=SC2016 # expanded by the shell inside
@@ -173,8 +189,8 @@ build()
 		"$chroot" "$work" sh -euc '
 		cd /mnt/ecdaq
 		export DEB_BUILD_OPTIONS="parallel=$(nproc) nocheck noautodbgsym"
-		dpkg-buildpackage --build=binary --unsigned-changes --no-pre-clean
-		' build || {
+		dpkg-buildpackage --build=binary --unsigned-changes --no-pre-clean --host-arch="$1"
+		' build "$arch" || {
 		tail -n 40 "$out/build-$arch.log" >&2
 		die "cannot build the packages (see above, and build/deb/build-$arch.log)"
 	}
@@ -203,4 +219,6 @@ exec 9> "$out/lock"
 flock 9
 need_archives
 fetch_wheels
-build amd64
+for architecture in $architectures; do
+	build "$architecture"
+done

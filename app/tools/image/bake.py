@@ -20,12 +20,13 @@ TOP = Path(__file__).resolve().parents[3]
 
 def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="bake")
-    parser.add_argument("--machine", default="qemuarm64")
+    parser.add_argument("--machine", default="ecdaq-qemuarm64")
     parser.add_argument("--cache", type=Path, required=True)
     parser.add_argument("--build", type=Path, required=True)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--task", default="do_build")
     parser.add_argument("--dry-run", action="store_true")
+    parser.add_argument("--keyring", type=Path)
     parser.add_argument("recipe")
     return parser.parse_args(arguments)
 
@@ -38,6 +39,7 @@ def settings(options: argparse.Namespace) -> dict[str, str]:
         "TMPDIR": str(options.cache.resolve()),
         "DEPLOY_DIR_IMAGE": str(options.build.resolve() / options.machine),
         "ECDAQ_TOP": str(TOP),
+        "ECDAQ_UPDATE_KEYRING": str(options.keyring.resolve()) if options.keyring else "",
     }
 
 

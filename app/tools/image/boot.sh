@@ -12,7 +12,7 @@ usage()
 usage: ./build.sh boot [--fresh] [--ssh-port N] [--key FILE] [--config FILE] [--icount]
                        [--lan] [--wire] [-- QEMU-OPTION...]
 
-Boots the image of machine qemuarm64 in QEMU (no KVM needed): its serial console here, its SSH port on
+Boots the image of machine ecdaq-qemuarm64 in QEMU (no KVM needed): its serial console here, its SSH port on
 127.0.0.1, the EtherCAT segment simulated inside. There are no passwords: log in with
 
   ssh -p 2222 -i build/image/boot/key operator@127.0.0.1
@@ -87,8 +87,8 @@ esac
 [ "$wire$timing" != yesguest ] || usage_error "--wire: the segment keeps the host's time, --icount does not"
 [ "$check" = no ] || exit 0
 
-image=$root/build/image/qemuarm64
-name=ecdaq-image-ecdaq-qemuarm64
+image=$root/build/image/ecdaq-qemuarm64
+name=ecdaq-image-ecdaq-ecdaq-qemuarm64
 [ -f "$image/$name.img" ] || die "no image yet: run ./build.sh image first"
 vm=$root/build/image/boot
 mkdir -p "$vm"

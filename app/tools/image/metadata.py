@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 LAYERS = ("layers/meta-local", "layers/meta-ecdaq")
-PASSED_ON = ("ECDAQ_APT_MIRROR", "ECDAQ_APT_SECURITY_MIRROR")
+PASSED_ON = ("ECDAQ_APT_MIRROR", "ECDAQ_APT_SECURITY_MIRROR", "ECDAQ_WIFI")
 
 
 class MetadataError(Exception):

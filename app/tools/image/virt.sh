@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# The machine qemuarm64, in a folder with disk.img and u-boot.bin:
+# The machine ecdaq-qemuarm64, in a folder with disk.img and u-boot.bin:
 # virt.sh FOLDER host|guest [QEMU-OPTION...]
 #
 # host:  its clock is the host's; both processors run at once. Function, not timing.

@@ -18,9 +18,9 @@ NOTE = (
 
 INDEX = """# Measurement results
 
-One page per subject, written by `./build.sh measure`, as is this list: the command, the commit,
-the machine, the date, and what was measured. The manuals state bounds and commands; figures of
-one machine belong here.
+One page per subject, written by `./build.sh measure` or `bench`, as is this list: the command,
+the commit, the machine, the date, and what was measured. The manuals state bounds and commands;
+figures of one machine belong here.
 
 """
 
@@ -39,6 +39,12 @@ class Subject:
     # The lines of the page.
     measure: Callable[[Path], list[str]]
     is_quick: bool = False
+    # Of build.sh.
+    verb: str = "measure"
+
+    @property
+    def written_by(self) -> str:
+        return f"`./build.sh {self.verb} {self.name}`"
 
 
 def machine() -> str:
@@ -75,22 +81,23 @@ def write_index(root: Path, subjects: Iterable[Subject]) -> None:
             title = page.read_text().splitlines()[0].removeprefix("# ")
             lines.append(f"- [{title}]({page.name})")
         else:
-            lines.append(f"- {subject.title}: no page yet, `./build.sh measure {subject.name}`")
+            lines.append(f"- {subject.title}: no page yet, {subject.written_by}")
     (folder / "README.md").write_text(INDEX + "\n".join(lines) + "\n")
 
 
-def write_page(root: Path, subject: Subject) -> Path:
+def write_page(root: Path, subject: Subject, place: Path | None = None) -> Path:
+    """Into the file @place, or where the pages are."""
     at = commit(root)
     lines = subject.measure(root)
     if not lines:
         raise NotMeasuredError("nothing was measured")
     today = datetime.datetime.now(datetime.UTC).date().isoformat()
     commands = "<br>".join(f"`{command}`" for command in subject.commands)
-    page = root / "app" / "doc" / "results" / f"{subject.name}.md"
+    page = place or root / "app" / "doc" / "results" / f"{subject.name}.md"
     page.parent.mkdir(parents=True, exist_ok=True)
     page.write_text(
         f"# {subject.title}\n\n"
-        f"Written by `./build.sh measure {subject.name}`.\n\n"
+        f"Written by {subject.written_by}.\n\n"
         "| | |\n| --- | --- |\n"
         f"| command | {commands} |\n"
         f"| commit | {at} |\n"

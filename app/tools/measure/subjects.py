@@ -20,6 +20,10 @@ SECONDS = os.environ.get("ECDAQ_DDS_SECONDS", "60")
 TRIALS = os.environ.get("ECDAQ_FAULT_TRIALS", "20")
 CUTS = os.environ.get("ECDAQ_POWER_CUTS", "20")
 DISKS = os.environ.get("ECDAQ_CUT_DISKS", "10000")
+UPDATE_DISKS = os.environ.get("ECDAQ_UPDATE_DISKS", "2000")
+FUZZ_TARGETS = os.environ.get("ECDAQ_FUZZ_TARGETS", "eni esi").split()
+FUZZ_SECONDS = int(os.environ.get("ECDAQ_FUZZ_SECONDS", "3600"))
+UPDATE_BOOTS = os.environ.get("ECDAQ_UPDATE_BOOTS", "8")
 
 
 def run(command: list[str], keep: str, root: Path) -> list[str]:
@@ -32,6 +36,8 @@ def run(command: list[str], keep: str, root: Path) -> list[str]:
         "ECDAQ_DDS_SECONDS": SECONDS,
         "ECDAQ_POWER_CUTS": CUTS,
         "ECDAQ_CUT_DISKS": DISKS,
+        "ECDAQ_UPDATE_DISKS": UPDATE_DISKS,
+        "ECDAQ_UPDATE_BOOTS": UPDATE_BOOTS,
         "ECDAQ_FAULT_TRIALS": TRIALS,
         "PYTHONDONTWRITEBYTECODE": "1",
     }
@@ -120,6 +126,40 @@ ALL = (
         is_quick=True,
     ),
     subject(
+        "fleet",
+        "Recordings of 50 appliances to one Parquet dataset",
+        (
+            "python tests/kit/fleet.py",
+            partial(run, [sys.executable, "tests/kit/fleet.py"], "."),
+        ),
+    ),
+    subject(
+        "web",
+        "Clients of ecdaq-web",
+        (
+            "python tests/cli/web_figures.py",
+            partial(run, [sys.executable, "tests/cli/web_figures.py"], "."),
+        ),
+    ),
+    subject(
+        "cycle",
+        "Instructions of a cycle, counted by callgrind",
+        (
+            "python tests/cost/cycle_table.py",
+            partial(run, [sys.executable, "tests/cost/cycle_table.py"], ""),
+        ),
+        is_quick=True,
+    ),
+    subject(
+        "record",
+        "Instructions and bytes of a recorded sample",
+        (
+            "python tests/cost/record_table.py",
+            partial(run, [sys.executable, "tests/cost/record_table.py"], ""),
+        ),
+        is_quick=True,
+    ),
+    subject(
         "dds",
         f"DDS, {SECONDS} s each (ECDAQ_DDS_SECONDS)",
         pytest(
@@ -141,11 +181,22 @@ ALL = (
         f"{DISKS} disks as a power cut may leave them (ECDAQ_CUT_DISKS)",
         pytest("tests/boot/test_50_power_cut.py", "-k", "every_disk", keep=NOT_PYTEST),
     ),
+    subject(
+        "update-cuts",
+        f"{UPDATE_DISKS} disks as a power cut in an update may leave them (ECDAQ_UPDATE_DISKS)",
+        pytest("tests/boot/test_95_update_cuts.py", keep=NOT_PYTEST),
+    ),
     Subject(
         "fuzz",
         "Lines of the parsers that the fuzz targets reach",
         ("./build.sh test coverage",),
         fuzz.measure,
+    ),
+    Subject(
+        "fuzz-search",
+        f"Search for crashes, {FUZZ_SECONDS} s each (ECDAQ_FUZZ_SECONDS, ECDAQ_FUZZ_TARGETS)",
+        tuple(f"./build.sh fuzz {name} {FUZZ_SECONDS}" for name in FUZZ_TARGETS),
+        partial(fuzz.search, FUZZ_TARGETS, FUZZ_SECONDS),
     ),
     Subject(
         "ci",
@@ -163,3 +214,8 @@ ALL = (
     ),
 )
 SUBJECTS = {s.name: s for s in ALL}
+# Measured by app/tools/bench.py.
+PEERS = Subject(
+    "peers", "Beside other masters", ("./build.sh bench peers",), lambda _: [], verb="bench"
+)
+PAGES = (*ALL, PEERS)

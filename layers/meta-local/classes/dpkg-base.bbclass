@@ -28,29 +28,45 @@ APT_SOURCE = "${@apt_source(d)}"
 do_fetch[depends] += "${@'sdk-chroot:do_bootstrap' if apt_source(d) else ''}"
 do_fetch[postfuncs] += "${@'fetch_apt_source' if apt_source(d) else ''}"
 do_unpack[postfuncs] += "${@'unpack_apt_source' if apt_source(d) else ''}"
-do_fetch[vardeps] += "SRC_URI fetch_apt_source"
+do_fetch[vardeps] += "SRC_URI fetch_apt_source download"
 do_unpack[vardeps] += "unpack_apt_source"
 
-fetch_apt_source() {
-	sdk_run -w apt-get -q update
-	for source in "${APT_SOURCE}" "${APT_SOURCE}/${BASE_DISTRO_CODENAME}"; do
+# download SOURCE...: the first of them that the mirror gives.
+download() {
+	for source in "$@"; do
 		rm -rf "${WORKDIR}/apt-source"
 		mkdir -p "${WORKDIR}/apt-source"
 		if sdk_run sh -euc 'cd "$1" && apt-get -q -o APT::Sandbox::User=root --download-only --only-source source "$2"' \
 			fetch "${PP}/apt-source" "$source"; then
 			return 0
 		fi
-		# Some mirrors list the security suite's sources and do not hold them.
+		# Some mirrors list sources, of the security suite and others, and do not hold them.
 		bbwarn "the mirror does not give the source of $source"
 	done
+	return 1
+}
+
+fetch_apt_source() {
+	sdk_run -w apt-get -q update
+	if download "${APT_SOURCE}" "${APT_SOURCE}/${BASE_DISTRO_CODENAME}"; then
+		return 0
+	fi
 	# Where nothing but the .dsc is missing: the signed index states the same.
-	sdk_run sh -euc '
+	if sdk_run sh -euc '
 		cd "$1"
 		apt-cache showsrc --only-source "$2" |
 			sed -e "/^\$/q" -e "s/^Package: /Source: /" -e "/ [^ ]*\.dsc\$/d" > "$2.dsc"
 		sed -n "/^Checksums-Sha256:/,/^[^ ]/s/^ \([0-9a-f]\{64\}\) [0-9]* /\1  /p" "$2.dsc" > sums
-		sha256sum --check sums' index "${PP}/apt-source" "${@apt_source(d).partition('=')[0]}" ||
-		bbfatal "no source of ${APT_SOURCE}"
+		sha256sum --check sums' index "${PP}/apt-source" "${@apt_source(d).partition('=')[0]}"; then
+		return 0
+	fi
+	# The newest of the older versions that the mirror lists and holds, where none is asked for by its number.
+	case "${APT_SOURCE}" in
+	*=*) bbfatal "no source of ${APT_SOURCE}" ;;
+	esac
+	sdk_run apt-cache showsrc --only-source "${APT_SOURCE}" | sed -n 's/^Version: /${APT_SOURCE}=/p' | sort -Vru \
+		> "${WORKDIR}/versions"
+	download $(cat "${WORKDIR}/versions") || bbfatal "no source of ${APT_SOURCE}"
 }
 
 unpack_apt_source() {

@@ -30,8 +30,11 @@ def image_recipes(d):
         names.append("linux-" + d.getVar("KERNEL_NAME"))
     return names
 
-# First Debian's part, which changes rarely and takes minutes (maintainer scripts run emulated); then
-# our packages on top of it, which takes seconds.
+# First Debian's part, which changes rarely and takes minutes (maintainer scripts run emulated): what all machines
+# have is made once, for the first of them. Then the packages of one machine and ours, on top of it, in seconds.
+ROOTFS_BASE_PACKAGES = "${@' '.join(n for n in d.getVar('IMAGE_PREINSTALL').split() \
+                              if n not in d.getVar('MACHINE_PREINSTALL').split())}"
+ROOTFS_BASE_PACKAGES[vardepvalue] = "${ROOTFS_BASE_PACKAGES}"
 do_rootfs_base[cleandirs] = "${WORKDIR}/base"
 do_rootfs_base[network] = "1"
 do_rootfs_base[vardeps] += "${@archive_vardeps(d)}"
@@ -39,21 +42,47 @@ do_rootfs_base[vardepsexclude] += "apt_sources archive_vardeps"
 do_rootfs_base[keep] = "${WORKDIR}/base"
 python do_rootfs_base() {
     suite = d.getVar("BASE_DISTRO_CODENAME")
-    sources = apt_sources(d, suite, d.getVar("IMAGE_COMPONENTS"))
     options = ["--dpkgopt=path-exclude=" + p for p in d.getVar("ROOTFS_EXCLUDE").split()]
     options += ["--dpkgopt=path-include=" + p for p in d.getVar("ROOTFS_INCLUDE").split()]
     bb.process.run(
         ["mmdebstrap", "--mode=root", "--variant=essential", "--format=tar",
          "--architectures=" + d.getVar("DISTRO_ARCH"),
-         "--include=" + ",".join(d.getVar("IMAGE_PREINSTALL").split()), *options,
+         "--include=" + ",".join(d.getVar("ROOTFS_BASE_PACKAGES").split()), *options,
          # Host keys made here would be deleted, and take a minute under emulation.
          "--essential-hook=mkdir -p $1/etc/ssh && cd $1/etc/ssh && "
          "touch ssh_host_rsa_key ssh_host_ecdsa_key ssh_host_ed25519_key",
          "--aptopt=APT::Install-Recommends \"false\"", "--aptopt=Acquire::Retries \"3\"",
-         suite, os.path.join(d.getVar("WORKDIR"), "base", "base.tar"), *sources],
+         suite, os.path.join(d.getVar("WORKDIR"), "base", "base.tar"), *apt_sources(d, suite, "main")],
         log=open(d.getVar("BB_LOGFILE"), "a"))
 }
 addtask rootfs_base
+
+# MACHINE_PREINSTALL, and of what it depends on what the base does not have: fetched only.
+do_rootfs_machine[cleandirs] = "${WORKDIR}/apt ${WORKDIR}/machine"
+do_rootfs_machine[network] = "1"
+do_rootfs_machine[vardepsexclude] += "apt_run apt_sources"
+do_rootfs_machine[keep] = "${WORKDIR}/machine"
+python do_rootfs_machine() {
+    import shutil
+    names = d.getVar("MACHINE_PREINSTALL").split()
+    if not names:
+        return
+    folder = os.path.join(d.getVar("WORKDIR"), "apt")
+    machine = os.path.join(d.getVar("WORKDIR"), "machine")
+    arch = d.getVar("DISTRO_ARCH")
+    status, _ = bb.process.run(["tar", "-xOf", os.path.join(d.getVar("WORKDIR"), "base", "base.tar"),
+                                "./var/lib/dpkg/status"])
+    with open(os.path.join(folder, "status"), "w") as file:
+        file.write(status)
+    sources = apt_sources(d, d.getVar("BASE_DISTRO_CODENAME"), d.getVar("IMAGE_COMPONENTS"))
+    settings = {"Dir::State::status": folder + "/status", "Dir::Cache::archives": machine + "/",
+                "APT::Architecture": arch, "APT::Architectures": arch}
+    apt_run(folder, sources, settings, "update")
+    apt_run(folder, sources, settings, "install", "--download-only", "--no-install-recommends", "--yes", *names)
+    shutil.rmtree(os.path.join(machine, "partial"))
+    os.remove(os.path.join(machine, "lock"))
+}
+addtask rootfs_machine after do_rootfs_base
 
 do_rootfs[depends] += "${@' '.join(n + ':do_deploy_deb' for n in image_recipes(d))}"
 do_rootfs[vardeps] += "IMAGE_INSTALL"
@@ -63,6 +92,7 @@ do_rootfs[keep] = "${WORKDIR}/tar"
 do_rootfs() {
 	tar -xpf "${WORKDIR}/base/base.tar" --numeric-owner --xattrs --xattrs-include='*' -C "${IMAGE_ROOTFS}"
 	mkdir "${IMAGE_ROOTFS}/tmp/debs"
+	find "${WORKDIR}/machine" -name "*.deb" -exec cp -t "${IMAGE_ROOTFS}/tmp/debs" {} +
 	for name in ${@' '.join(image_recipes(d))}; do
 		for package in ${IMAGE_INSTALL}; do
 			for deb in "${REPO_DIR}/$name/$package"_*.deb; do
@@ -81,7 +111,7 @@ do_rootfs() {
 		--format=posix --pax-option=exthdr.name=%d/PaxHeaders/%f,delete=atime,delete=ctime \
 		--mtime="@$SOURCE_DATE_EPOCH" --clamp-mtime -C "${IMAGE_ROOTFS}" .
 }
-addtask rootfs after do_rootfs_base
+addtask rootfs after do_rootfs_machine
 
 addtask image after do_rootfs before do_build
 do_image[depends] += "sdk-chroot:do_bootstrap"

@@ -70,3 +70,17 @@ def apt_sources(d, suite, components):
     if security:
         lines.append(f"deb {security} {suite}-security {components}")
     return lines
+
+# apt-get with lists and cache of its own in a folder: apt_run(FOLDER, SOURCES, SETTINGS, ARGUMENT...). What it said.
+def apt_run(folder, sources, settings, *arguments):
+    for name in ("lists/partial", "cache"):
+        os.makedirs(os.path.join(folder, name), exist_ok=True)
+    with open(os.path.join(folder, "sources.list"), "w") as file:
+        file.write("".join(line + "\n" for line in sources))
+    settings = {"Dir::State::Lists": folder + "/lists", "Dir::Cache": folder + "/cache",
+                "Dir::Etc::SourceList": folder + "/sources.list", "Dir::Etc::SourceParts": "-",
+                "Acquire::IndexTargets::deb::DEP-11::DefaultEnabled": "false",
+                "Acquire::Languages": "none", "Acquire::Retries": "3", "APT::Sandbox::User": "root"} | settings
+    options = [word for item in settings.items() for word in ("-o", "=".join(item))]
+    said, _ = bb.process.run(["apt-get", "-q", *options, *arguments])
+    return said

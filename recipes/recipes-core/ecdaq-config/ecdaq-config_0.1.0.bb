@@ -13,8 +13,8 @@ FILESEXTRAPATHS:prepend := "${ECDAQ_TOP}:"
 inherit dpkg-raw
 
 DEBIAN_SECTION = "admin"
-DEBIAN_DEPENDS = "chrony, e2fsprogs, ecdaq, ethtool, fdisk, iproute2, libubootenv-tool, nftables, openssh-server, \
-                  procps, sudo, systemd, udev, util-linux"
+DEBIAN_DEPENDS = "chrony, curl, e2fsprogs, ecdaq, ethtool, fdisk, iproute2, libubootenv-tool, linuxptp, nftables, \
+                  openssh-server, procps, rauc, rauc-service, sudo, systemd, systemd-journal-remote, udev, util-linux"
 
 # What was renamed or taken away since the last time does not stay in the folder.
 do_unpack[cleandirs] += "${WORKDIR}/root"
@@ -24,6 +24,6 @@ do_install() {
 	cp -r "${WORKDIR}/root/." "${D}/"
 	install -d "${D}/data" "${D}/boot" "${D}/usr/share/doc/ecdaq-config"
 	install -m 644 "${WORKDIR}/LICENSE" "${D}/usr/share/doc/ecdaq-config/copyright"
-	chmod 755 "${D}"/usr/lib/ecdaq/*
+	chmod 755 "${D}"/usr/lib/ecdaq/* "${D}/usr/bin/ecdaq-update"
 	chmod 440 "${D}/etc/sudoers.d/operator"
 }

@@ -39,6 +39,63 @@ name_image() {
 		run_privileged tee "${IMAGE_ROOTFS}/usr/lib/ecdaq/image"
 }
 
+# RAUC's configuration: the slots, the boot state of the boot script, and which bundles are taken. Versions are
+# compared by the rules of semver.org, by which -0 is in front of every commit.
+# ECDAQ_UPDATE_KEYRING: certificates (PEM) of the keys that sign bundles. Without it no bundle is taken.
+ECDAQ_UPDATE_KEYRING ??= ""
+ROOTFS_POSTPROCESS_COMMAND =+ "configure_rauc"
+configure_rauc[vardepsexclude] += "ECDAQ_UPDATE_KEYRING"
+do_rootfs[file-checksums] += "${@d.getVar('ECDAQ_UPDATE_KEYRING') + ':True' if d.getVar('ECDAQ_UPDATE_KEYRING') else ''}"
+configure_rauc() {
+	run_privileged mkdir -p "${IMAGE_ROOTFS}/usr/lib/rauc"
+	cat <<SYSTEM | run_privileged tee "${IMAGE_ROOTFS}/usr/lib/rauc/system.conf"
+[system]
+compatible=${MACHINE}
+bootloader=uboot
+boot-attempts=3
+boot-attempts-primary=3
+bundle-formats=verity
+min-bundle-version=${PV}-0
+data-directory=/data/rauc
+mountprefix=/run/rauc
+
+[keyring]
+path=/usr/lib/rauc/keyring.pem
+use-bundle-signing-time=true
+
+[handlers]
+pre-install=/usr/lib/ecdaq/update-begins
+
+[slot.rootfs.0]
+device=/dev/ecdaq-slot-a
+type=raw
+bootname=A
+
+[slot.rootfs.1]
+device=/dev/ecdaq-slot-b
+type=raw
+bootname=B
+SYSTEM
+	if [ -n "${ECDAQ_UPDATE_KEYRING}" ]; then
+		run_privileged install -m 644 "${ECDAQ_UPDATE_KEYRING}" "${IMAGE_ROOTFS}/usr/lib/rauc/keyring.pem"
+	fi
+}
+
+# Nobody changes a password, a shell or a mount as an ordinary user here: of Debian's set-user-ID and set-group-ID
+# programs only sudo is left.
+ROOTFS_POSTPROCESS_COMMAND =+ "clear_set_id"
+clear_set_id() {
+	run_privileged find "${IMAGE_ROOTFS}" -xdev -type f -perm /6000 ! -path "${IMAGE_ROOTFS}/usr/bin/sudo" \
+		-exec chmod ug-s {} +
+}
+
+# Which units start is decided in the slot. systemd would do it at the first start of a machine, in /etc of the data
+# partition, and a slot that comes by an update would have none of it.
+ROOTFS_POSTPROCESS_COMMAND =+ "enable_units"
+enable_units() {
+	run_privileged chroot "${IMAGE_ROOTFS}" systemctl preset-all --preset-mode=enable-only
+}
+
 # What U-Boot takes from a slot: kernel, command line, and the board's device trees under the names that U-Boot
 # has for them. Links are followed by U-Boot within the slot's file system.
 ROOTFS_POSTPROCESS_COMMAND =+ "fill_slot"
@@ -73,7 +130,8 @@ do_copy_boot_files:append() {
 IMAGE_INSTALL += "ecdaq ecdaq-config u-boot-ecdaq"
 # Debian's: boot, network, time, diagnosis; and the libraries of our packages.
 IMAGE_PREINSTALL += "init systemd-sysv udev dbus kmod \
-                     openssh-server sudo chrony \
+                     openssh-server sudo chrony linuxptp systemd-journal-remote \
                      iproute2 ethtool iputils-ping nftables \
                      e2fsprogs fdisk dosfstools procps less gpiod libubootenv-tool \
-                     libddsc0t64 libexpat1 libyaml-0-2 libzstd1 zlib1g"
+                     rauc rauc-service curl ca-certificates \
+                     libcjson1 libddsc0t64 libdeflate0 libexpat1 libnats3.10 libwebsockets19t64 libyaml-0-2 libzstd1"

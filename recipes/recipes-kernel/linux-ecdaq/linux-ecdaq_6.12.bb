@@ -19,7 +19,7 @@ SRC_URI = "apt://linux \
            file://watchdog.cfg \
            file://qemuarm64.cfg \
            file://raspberrypi4-64.cfg"
-FILESEXTRAPATHS:prepend := "${ECDAQ_TOP}/kernel-config:"
+FILESEXTRAPATHS:prepend := "${ECDAQ_TOP}/kernel-config:${ECDAQ_TOP}/kernel-config/optional:"
 # One kernel for all machines: what the emulator tests is what a board runs.
 S = "${WORKDIR}/linux"
 # Not quilt, Isar's default: in a source that Debian's own patches are applied to it takes those away, and
@@ -33,3 +33,14 @@ KERNEL_NAME_PROVIDED = "ecdaq"
 KERNEL_DEFCONFIG = "defconfig allnoconfig"
 # Isar's default needs an initramfs generator, too; none of our machines has an initial RAM disk.
 KERNEL_DEBIAN_DEPENDS = "kmod, linux-base (>= 4.3~)"
+
+# ECDAQ_WIFI = "1" (local.conf, or the environment of ./build.sh image): one more fragment, and not the line of
+# net.cfg that turns Wi-Fi off. The other images' kernel is the same with and without this function.
+python () {
+    if d.getVar("ECDAQ_WIFI") == "1":
+        d.appendVar("SRC_URI", " file://wifi.cfg")
+        d.appendVarFlag("do_unpack", "postfuncs", " allow_wifi")
+}
+allow_wifi() {
+	sed -i '/^CONFIG_WLAN=n$/d' "${WORKDIR}/net.cfg"
+}

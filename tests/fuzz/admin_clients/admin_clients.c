@@ -92,7 +92,9 @@ static void bus_request(void *ctx, struct admin_pending *pending)
 		return;
 	}
 	/* Answered from memory. */
-	if (pending->request.verb == ADMIN_DATAGRAMS || pending->request.verb == ADMIN_COMPARE) {
+	if (pending->request.verb == ADMIN_DATAGRAMS || pending->request.verb == ADMIN_COMPARE ||
+	    pending->request.verb == ADMIN_CONFIG_RELOAD ||
+	    pending->request.verb == ADMIN_STARTUP) {
 		admin_pending_complete(pending, 0);
 		return;
 	}
@@ -169,13 +171,14 @@ static void check_good_client(void)
 
 static void ask(int fd, const uint8_t *arg)
 {
-	static const uint8_t verbs[] = { ADMIN_PING,         ADMIN_SET,       ADMIN_SDO_READ,
-					 ADMIN_SDO_WRITE,    ADMIN_STOP,      ADMIN_CANCEL,
-					 ADMIN_RESCAN,       ADMIN_STATE,     ADMIN_REGISTER_READ,
-					 ADMIN_SII_WRITE,    ADMIN_VOE,       ADMIN_FOE_WRITE,
-					 ADMIN_DIAGNOSIS,    ADMIN_SOE_READ,  ADMIN_CLEAR,
-					 ADMIN_ERRORS_RESET, ADMIN_DATAGRAMS, ADMIN_COMPARE,
-					 ADMIN_CAPTURE };
+	static const uint8_t verbs[] = {
+		ADMIN_PING,          ADMIN_SET,       ADMIN_SDO_READ, ADMIN_SDO_WRITE,
+		ADMIN_STOP,          ADMIN_CANCEL,    ADMIN_RESCAN,   ADMIN_STATE,
+		ADMIN_REGISTER_READ, ADMIN_SII_WRITE, ADMIN_VOE,      ADMIN_FOE_WRITE,
+		ADMIN_DIAGNOSIS,     ADMIN_SOE_READ,  ADMIN_CLEAR,    ADMIN_ERRORS_RESET,
+		ADMIN_DATAGRAMS,     ADMIN_COMPARE,   ADMIN_CAPTURE,  ADMIN_CONFIG_RELOAD,
+		ADMIN_STARTUP
+	};
 	struct admin_request rq = { .magic = ADMIN_MAGIC,
 				    .verb = verbs[arg[0] % sizeof(verbs)],
 				    .id = arg[1] % 16,

@@ -44,7 +44,7 @@ static void judge_config(const struct config *cfg)
 	require(cfg->output_count <= CONFIG_LIMIT_OUTPUTS, "outputs");
 	for (size_t i = 0; i < cfg->sdo_count; i++) {
 		require(cfg->sdo[i].slave_pos < cfg->slave_count, "an object of no slave");
-		require(cfg->sdo[i].bytes == 8 || cfg->sdo[i].value >> (8 * cfg->sdo[i].bytes) == 0,
+		require(cfg->sdo[i].bytes >= 8 || cfg->sdo[i].value >> (8 * cfg->sdo[i].bytes) == 0,
 			"a value wider than its type");
 	}
 	for (size_t i = 0; i < cfg->output_count; i++) {

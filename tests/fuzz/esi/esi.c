@@ -7,7 +7,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
+#include "../memory_file.h"
 #include "esi/esi.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
@@ -61,6 +63,12 @@ static void judge_device(const struct esi_device *d)
 		}
 		require(bits == pdo->bits, "bits of a PDO");
 	}
+	require(d->object_count <= ESI_LIMIT_OBJECTS, "dictionary");
+	for (size_t i = 0; i < d->object_count; i++) {
+		require(memchr(d->object[i].unit, 0, sizeof(d->object[i].unit)) != NULL &&
+				memchr(d->object[i].name, 0, ESI_NAME_BYTES) != NULL,
+			"a text without an end");
+	}
 	for (size_t i = 0; i < d->command_count; i++) {
 		require(d->command[i].len <= ESI_LIMIT_COMMAND_BYTES, "data of a command");
 	}
@@ -104,16 +112,34 @@ static void judge_written(const struct kept *kept)
 	free(text);
 }
 
+/* A file says what its text says. */
+static void judge_file(const uint8_t *data, size_t size, int result, size_t count)
+{
+	struct kept kept = { .count = 0 };
+	const struct esi_visitor visitor = { .device = take, .ctx = &kept };
+	char error[256] = "";
+	char path[32];
+	int fd = memory_file(data, size, path);
+
+	require(esi_read_file(path, &visitor, error, sizeof(error)) == result &&
+			kept.count == count,
+		"a file is not what its text is");
+	release(&kept);
+	close(fd);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 {
 	struct kept kept = { .count = 0 };
 	const struct esi_visitor visitor = { .device = take, .ctx = &kept };
 	char error[256] = "";
+	int r = esi_read("f.xml", (const char *)data, size, &visitor, error, sizeof(error));
 
-	if (esi_read("f.xml", (const char *)data, size, &visitor, error, sizeof(error)) < 0) {
+	if (r < 0) {
 		require(strncmp(error, "f.xml:", 6) == 0, "no FILE:LINE");
 		require(strpbrk(error, "\n\r") == NULL, "more than one line");
 	}
+	judge_file(data, size, r, kept.count);
 	for (size_t i = 0; i < kept.count; i++) {
 		judge_device(kept.device[i]);
 	}

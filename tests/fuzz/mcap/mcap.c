@@ -12,6 +12,7 @@
 
 #include "record/columns.h"
 #include "record/mcap_recover.h"
+#include "record/overview.h"
 #include "record/track.h"
 
 struct bytes {
@@ -158,6 +159,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 	struct mcap_source source;
 	struct mcap_reader *reader;
 	struct mcap_item item;
+	struct overview overview;
 
 	if (nowhere == NULL) {
 		nowhere = fopen("/dev/null", "w");
@@ -169,6 +171,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 		while (mcap_reader_next(reader, &item) > 0) {
 		}
 		mcap_reader_destroy(reader);
+	}
+	if (overview_read(&source, &overview) == 0) {
+		assert(!overview.has_counts ||
+		       overview.missing + overview.cycles >= overview.missing);
 	}
 	print_table(&b, nowhere);
 	repair(&b);

@@ -111,6 +111,7 @@ TEST(esc_access, diagnosis_is_decoded_and_counters_are_reset)
 	CHECK_EQ(d.is_pdi_operational, 1);
 	CHECK_EQ(d.port[0].is_communicating, 1);
 	CHECK_EQ(d.port[1].is_communicating, 1);
+	CHECK_EQ(d.port[0].is_ebus, 0);
 	CHECK_EQ(d.port[1].invalid_frames, 6);
 	CHECK_EQ(d.port[1].rx_errors, 7);
 	CHECK_EQ(d.port[1].forwarded_errors, 8);

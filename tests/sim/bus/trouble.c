@@ -144,9 +144,12 @@ TEST(trouble, refused_startup_sdo_is_an_error_with_line_and_abort_code)
 
 	b->cfg.slave_count = 1;
 	b->cfg.sdo_count = 1;
-	b->cfg.sdo[0] = (struct config_sdo){
-		.index = 0x8000, .subindex = 1, .bytes = 1, .value = 7, .line = 12
-	};
+	b->cfg.sdo[0] = (struct config_sdo){ .transition = CONFIG_TRANSITION_PS,
+					     .index = 0x8000,
+					     .subindex = 1,
+					     .bytes = 1,
+					     .value = 7,
+					     .line = 12 };
 	snprintf(b->cfg.path, sizeof(b->cfg.path), "ecdaq.yaml");
 	CHECK_EQ(bench_find(b), 0);
 	CHECK_EQ(bench_map(b), -EPROTO);

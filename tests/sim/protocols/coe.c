@@ -17,7 +17,7 @@ enum {
 	FEW = 3000,
 };
 
-static const char *const terminals[] = { "el3104", "el3204", NULL };
+static const char *const terminals[] = { "el3104", "el3204", "gauge", NULL };
 
 static struct mailbox_request coe(enum coe_operation operation, uint16_t index, uint8_t subindex,
 				  uint8_t *buffer, size_t capacity)
@@ -172,6 +172,50 @@ TEST(coe_engine, sdo_information_describes_the_dictionary)
 	CHECK_EQ(bench_do(&b, 0, &rq), -EREMOTEIO);
 	CHECK_EQ(rq.detail, 0x06020000);
 	bench_end(&b);
+}
+
+TEST(coe_engine, an_entry_has_the_unit_that_its_slave_gives)
+{
+	struct protocol_bench b;
+	uint8_t data[256];
+	struct mailbox_request rq = coe(COE_ENTRY, 0x6000, 2, data, sizeof(data));
+	struct coe_entry entry;
+
+	begin(&b);
+	bench_to_preop(&b, 2);
+	CHECK_EQ(bench_do(&b, 2, &rq), 0);
+	CHECK_EQ(coe_entry_get(data, rq.len, &entry), 0);
+	CHECK_EQ(entry.unit, 0xff2d0000);
+	CHECK_STR(entry.name, "temperature");
+	rq = coe(COE_ENTRY, 0x6000, 5, data, sizeof(data));
+	CHECK_EQ(bench_do(&b, 2, &rq), 0);
+	CHECK_EQ(coe_entry_get(data, rq.len, &entry), 0);
+	CHECK_EQ(entry.unit, 0);
+	CHECK_STR(entry.name, "count");
+	rq = coe(COE_ENTRY, 0x6000, 0x11, data, sizeof(data));
+	CHECK_EQ(bench_do(&b, 0, &rq), 0);
+	CHECK_EQ(coe_entry_get(data, rq.len, &entry), 0);
+	CHECK_EQ(entry.unit, 0);
+	bench_end(&b);
+}
+
+TEST(coe_engine, a_unit_that_is_announced_and_not_sent_is_none)
+{
+	static const uint8_t announced[] = "\x00\x60\x01\x0f\x03\x00\x10\x00\x07\x00speed";
+	static const uint8_t sent[] =
+		"\x00\x60\x01\x08\x03\x00\x10\x00\x07\x00\x00\x47\xb4\x00speed";
+	struct coe_entry entry;
+
+	CHECK_EQ(coe_entry_get(announced, sizeof(announced) - 1, &entry), 0);
+	CHECK_EQ(entry.unit, 0);
+	CHECK_STR(entry.name, "speed");
+	CHECK_EQ(coe_entry_get(sent, sizeof(sent) - 1, &entry), 0);
+	CHECK_EQ(entry.unit, 0x00b44700);
+	CHECK_STR(entry.name, "speed");
+	for (size_t len = 10; len < 14; len++) {
+		CHECK_EQ(coe_entry_get(sent, len, &entry), 0);
+		CHECK_EQ(entry.unit, 0);
+	}
 }
 
 /* --- misbehaviour --- */

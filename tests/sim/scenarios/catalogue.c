@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Every slave of the simulator's catalogue on one line, brought to OP by the whole master. */
-#include "devices/catalogue.h"
+#include <math.h>
+
 #include "base/ring.h"
+#include "devices/catalogue.h"
 #include "devices/plant.h"
 #include "devices/wago_750_354.h"
 #include "harness/test.h"
@@ -110,6 +112,56 @@ TEST(catalogue, an_analog_terminal_shows_the_signal_at_its_scale)
 	/* 1 V and a sine of 0.5 V; 10 V are 0x7fff. */
 	CHECK(low > 1620 && low < 1660);
 	CHECK(high > 4890 && high < 4930);
+	close_all();
+}
+
+static int make_gauge(int position, struct segment_slave_spec *ret_spec)
+{
+	static const char *const names[] = { "ek1100", "el3104", "gauge" };
+
+	return virtual_bench_slave(names[position], position, ret_spec);
+}
+
+static const struct channel *channel(const char *name)
+{
+	size_t bytes;
+	const struct sample_meta *meta = ring_meta(vm.samples, &bytes);
+
+	for (uint32_t i = 0; i < meta->channel_count; i++) {
+		if (strcmp(sample_meta_channels(meta)[i].name, name) == 0) {
+			return &sample_meta_channels(meta)[i];
+		}
+	}
+	test_fail(__FILE__, __LINE__, "no channel %s", name);
+	return NULL;
+}
+
+TEST(catalogue, channels_have_the_units_of_their_objects_unless_they_are_configured)
+{
+	static const char *const settings[] = { "slaves[0].name=coupler", "slaves[1].name=ai",
+						"slaves[2].name=gauge", NULL };
+	struct config_channel *item;
+
+	virtual_bench_init(&b,
+			   &(struct virtual_spec){ .slaves = 3, .make = make_gauge, .seed = 5 });
+	virtual_master_init(&vm, &b, settings);
+	item = &vm.cfg.channel[vm.cfg.channel_count++];
+	*item = (struct config_channel){ .slave_pos = 2,
+					 .match = "pressure",
+					 .unit = "psi",
+					 .min = -HUGE_VAL,
+					 .max = HUGE_VAL };
+	if (virtual_master_bring_up(&vm) < 0) {
+		test_fail(__FILE__, __LINE__, "%s", vm.failure.text);
+	}
+	CHECK_STR(channel("gauge.voltage")->unit, "mV");
+	CHECK_STR(channel("gauge.temperature")->unit, "1e-1 degC");
+	CHECK_STR(channel("gauge.pressure")->unit, "psi");
+	CHECK_STR(channel("gauge.speed")->unit, "rev/min");
+	CHECK_STR(channel("gauge.speed_set")->unit, "rev/min");
+	CHECK_STR(channel("gauge.count")->unit, "");
+	CHECK(channel("gauge.voltage")->scale == 1);
+	CHECK_STR(channel("ai.ai_standard_channel_1_value")->unit, "");
 	close_all();
 }
 

@@ -94,6 +94,38 @@ TEST(differences, an_output_that_does_not_exist_is_reported_in_pre_op)
 	virtual_master_close(&vm);
 }
 
+static void list_pdo(size_t at, uint16_t slave_pos, uint16_t index)
+{
+	vm.cfg.pdo[at] = (struct config_pdo){ .slave_pos = slave_pos, .index = index };
+	snprintf(vm.cfg.pdo[at].pdo, sizeof(vm.cfg.pdo[at].pdo), "0x%04x", index);
+	vm.cfg.pdo_count = at + 1;
+}
+
+TEST(differences, pdos_that_were_not_mapped_yet_are_said_not_to_be_compared)
+{
+	static const char *const preop[] = { "slaves[0].name=a", "slaves[1].name=b",
+					     "bus.target=preop", NULL };
+	static const char *const op[] = { "slaves[0].name=a", "slaves[1].name=b", NULL };
+	struct difference diff[1];
+
+	open_bench(preop);
+	list_pdo(0, 0, 0x1600);
+	list_pdo(1, 0, 0x1a00);
+	list_pdo(2, 1, 0x1a00);
+	CHECK_EQ(virtual_master_bring_up(&vm), 0);
+	CHECK_STR(ask(diff, 1), "8:-1@-1; ");
+	CHECK_STR(diff[0].name, "slaves[].pdos");
+	CHECK_STR(diff[0].found, "2 cannot be compared: process data are mapped on the way from "
+				 "PRE-OP to SAFE-OP");
+	CHECK(difference_is_note(&diff[0]));
+	virtual_master_close(&vm);
+	open_bench(op);
+	list_pdo(0, 0, 0x1600);
+	virtual_master_settle(&vm);
+	CHECK_STR(ask(NULL, 0), "");
+	virtual_master_close(&vm);
+}
+
 TEST(differences, without_any_slave_all_are_missing)
 {
 	static const char *const settings[] = { "slaves[0].name=a", "slaves[1].name=b",

@@ -155,6 +155,44 @@ TEST(esc_requests, an_eeprom_is_read_in_op_without_disturbing_the_cycle)
 	virtual_master_close(&vm);
 }
 
+TEST(esc_requests, a_request_outlives_frames_that_are_lost_for_some_cycles)
+{
+	struct admin_reply reply;
+	struct esc *esc;
+	uint64_t lost;
+
+	open_bench("bus.target=op");
+	virtual_master_settle(&vm);
+	esc = esc_of(1);
+	virtual_bench_fault(&b, "at=0s for=12ms lose");
+	lost = vm.result.lost;
+	reply = read_register(1, ESC_REG_AL_STATUS, 2);
+	CHECK_STR(reply.text, "");
+	CHECK_EQ(reply.result, 0);
+	CHECK_EQ(get_le16(reply.data), AL_OP);
+	CHECK(vm.result.lost >= lost + 10);
+	virtual_bench_fault(&b, "at=5ms for=60ms lose");
+	lost = vm.result.lost;
+	reply = ask(ADMIN_SII_READ, 1, 0, 0);
+	CHECK_STR(reply.text, "");
+	CHECK_EQ(reply.result, 0);
+	CHECK(vm.result.lost >= lost + 50);
+	CHECK_EQ(tr.answer_len, sii_stated_bytes(esc->sii));
+	CHECK_EQ(memcmp(tr.answer, esc->sii,
+			esc->sii_bytes < tr.answer_len ? esc->sii_bytes : tr.answer_len),
+		 0);
+	virtual_master_close(&vm);
+}
+
+TEST(esc_requests, an_eeprom_that_no_frame_reaches_is_an_error)
+{
+	open_bench("bus.target=op");
+	virtual_master_settle(&vm);
+	virtual_bench_fault(&b, "at=5ms for=30s lose");
+	CHECK(ask(ADMIN_SII_READ, 1, 0, 0).result < 0);
+	virtual_master_close(&vm);
+}
+
 TEST(esc_requests, an_image_is_written_in_preop_and_refused_in_op)
 {
 	static uint8_t image[8192];

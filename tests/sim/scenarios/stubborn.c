@@ -3,8 +3,12 @@
  * Slaves that are slow, refuse, fall back again and again, or are not what they were: how often the
  * master tries, what it reports, and what ends it.
  */
+#include <stdio.h>
+#include <unistd.h>
+
 #include "base/bytes.h"
 #include "harness/test.h"
+#include "sim/harness/run_dir.h"
 #include "sim/harness/virtual_master.h"
 #include "wire/al.h"
 #include "wire/esc_reg.h"
@@ -111,6 +115,30 @@ TEST(sim_stubborn, a_slave_that_needs_nine_seconds_for_op_comes_back)
 TEST(sim_stubborn, a_slave_comes_back_in_the_time_its_configuration_gives_it)
 {
 	check_slow("at=0s slow slave=1 state=preop by=8s", "slaves[1].preop_timeout=10s", 8, 11);
+}
+
+TEST(sim_stubborn, a_slave_comes_back_in_the_time_its_vendor_gives_it)
+{
+	static const char text[] =
+		"<EtherCATInfo><Vendor><Id>2</Id></Vendor><Descriptions><Devices><Device><Type "
+		"ProductCode=\"#x04570862\" RevisionNo=\"0\">B</Type><Info><StateMachine><Timeout>"
+		"<PreopTimeout>10000</PreopTimeout></Timeout></StateMachine></Info></Device>"
+		"</Devices></Descriptions></EtherCATInfo>";
+	char dir[64];
+	char path[96];
+	char setting[96];
+	FILE *file;
+
+	run_dir_make(dir, sizeof(dir));
+	snprintf(path, sizeof(path), "%s/board.xml", dir);
+	snprintf(setting, sizeof(setting), "bus.esi_dir=%s", dir);
+	file = fopen(path, "we");
+	CHECK(file != NULL);
+	CHECK(fputs(text, file) >= 0);
+	CHECK_EQ(fclose(file), 0);
+	check_slow("at=0s slow slave=1 state=preop by=8s", setting, 8, 11);
+	unlink(path);
+	run_dir_remove(dir);
 }
 
 TEST(sim_stubborn, a_slave_slower_than_its_time_is_named_and_started_over)

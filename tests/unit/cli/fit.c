@@ -34,6 +34,39 @@ TEST(fit, without_fields_it_is_broken_between_words_and_else_anywhere)
 	check_folded("0123456789abcdef\n", 10, 2, "0123456789\n  abcdef\n");
 }
 
+TEST(fit, a_line_goes_on_behind_a_prefix)
+{
+	const char *text = "  # one two three";
+	char *got = NULL;
+	size_t len = 0;
+	FILE *out = open_memstream(&got, &len);
+
+	CHECK(out != NULL);
+	fit_write_line(text, strlen(text), 10, "  #   ", out);
+	fit_write_line(text, strlen(text), 0, "  #   ", out);
+	fit_write_line("ab c", 4, 2, "  ", out);
+	CHECK_EQ(fclose(out), 0);
+	CHECK_STR(got, "  # one\n  #   two\n  #   thre\n  #   e\n  # one two three\nab\n  c\n");
+	free(got);
+}
+
+TEST(fit, text_is_collected_for_a_terminal_only)
+{
+	char *got = NULL;
+	size_t len = 0;
+	FILE *to = open_memstream(&got, &len);
+	struct fit fit;
+
+	CHECK(to != NULL);
+	CHECK(fit_begin(&fit, 0, to) == to);
+	fit_end(&fit, 2);
+	fputs("one two three\n", fit_begin(&fit, 8, to));
+	fit_end(&fit, 2);
+	CHECK_EQ(fclose(to), 0);
+	CHECK_STR(got, "one two\n  three\n");
+	free(got);
+}
+
 TEST(fit, no_width_changes_nothing)
 {
 	check_folded("cycle      17   period 1 ms   WKC 6/6\n", 0, 11,

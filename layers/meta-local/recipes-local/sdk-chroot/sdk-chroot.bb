@@ -13,11 +13,14 @@ SDK_PREINSTALL = "crossbuild-essential-${DISTRO_ARCH} ccache cmake debhelper dpk
 SDK_PREINSTALL += "bc bison cpio flex kmod libelf-dev libssl-dev rsync"
 # What images are made with.
 SDK_PREINSTALL += "bmap-tools dosfstools e2fsprogs fdisk mtools"
+# What bundles of updates are made and signed with.
+SDK_PREINSTALL += "openssl rauc squashfs-tools"
 # What images are booted with.
 SDK_PREINSTALL += "qemu-system-arm"
 # What our programs link; each is a Build-Depends of a recipe, too.
-SDK_PREINSTALL += "libyaml-dev:${DISTRO_ARCH} libzstd-dev:${DISTRO_ARCH} zlib1g-dev:${DISTRO_ARCH} \
+SDK_PREINSTALL += "libyaml-dev:${DISTRO_ARCH} libzstd-dev:${DISTRO_ARCH} libdeflate-dev:${DISTRO_ARCH} \
                    libexpat1-dev:${DISTRO_ARCH} libgpiod-dev:${DISTRO_ARCH} libssl-dev:${DISTRO_ARCH} \
+                   libcjson-dev:${DISTRO_ARCH} libnats-dev:${DISTRO_ARCH} libwebsockets-dev:${DISTRO_ARCH} \
                    cyclonedds-dev:${DISTRO_ARCH} cyclonedds-tools"
 
 do_bootstrap[dirs] = "${TMPDIR}"
@@ -45,7 +48,6 @@ addtask bootstrap before do_build
 
 # The state of the archive as it is now becomes that of the cache. Only the Release files are fetched.
 do_refresh[cleandirs] = "${WORKDIR}/archive"
-do_refresh[dirs] = "${WORKDIR}/archive/lists/partial"
 do_refresh[network] = "1"
 do_refresh[nostamp] = "1"
 python do_refresh() {
@@ -55,15 +57,8 @@ python do_refresh() {
     import archive
     folder = os.path.join(d.getVar("WORKDIR"), "archive")
     sources = apt_sources(d, d.getVar("BASE_DISTRO_CODENAME"), "main")
-    with open(os.path.join(folder, "sources.list"), "w") as file:
-        file.write("".join(line + "\n" for line in sources))
-    settings = {"Dir::State::Lists": folder + "/lists", "Dir::Cache": folder + "/cache",
-                "Dir::Etc::SourceList": folder + "/sources.list", "Dir::Etc::SourceParts": "-",
-                "Acquire::IndexTargets::deb::Packages::DefaultEnabled": "false",
-                "Acquire::IndexTargets::deb::DEP-11::DefaultEnabled": "false",
-                "Acquire::Languages": "none", "Acquire::Retries": "3", "APT::Sandbox::User": "root"}
-    options = [word for item in settings.items() for word in ("-o", "=".join(item))]
-    said, _ = bb.process.run(["apt-get", "-q", *options, "update"])
+    said = apt_run(folder, sources,
+                   {"Acquire::IndexTargets::deb::Packages::DefaultEnabled": "false"}, "update")
     found = glob.glob(folder + "/lists/*Release")
     # apt ends with success when a suite is missing.
     if len(found) != len(sources):

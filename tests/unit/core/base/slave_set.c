@@ -2,6 +2,7 @@
 #include "base/slave_set.h"
 
 #include "base/limits.h"
+#include "base/prng.h"
 #include "harness/test.h"
 
 enum { ALL = SLAVE_SET_WORDS * SLAVE_SET_WORD_BITS };
@@ -89,4 +90,38 @@ TEST(slave_set, union_intersection_and_difference_work_across_words)
 	CHECK(!slave_set_is_equal(&set, &some));
 	slave_set_add(&set, 100);
 	CHECK(slave_set_is_equal(&set, &some));
+}
+
+TEST(slave_set, the_runs_of_a_word_are_its_bits_in_order)
+{
+	struct prng prng = { 3 };
+
+	for (int round = 0; round < 20000; round++) {
+		uint64_t word = round == 0 ? 0 : round == 1 ? UINT64_MAX : prng_next(&prng);
+		uint64_t rest = word | (round % 3 == 0 ? prng_next(&prng) : 0);
+		uint64_t seen = 0;
+		unsigned end = 0;
+		struct slave_run run;
+
+		word = rest;
+		while (slave_set_take_run(&rest, 3, &run)) {
+			CHECK(run.first < run.end && run.first >= 3 * 64 && run.end <= 4 * 64);
+			CHECK(end == 0 || run.first > end); /* two runs are not one */
+			for (unsigned pos = run.first; pos < run.end; pos++) {
+				seen |= UINT64_C(1) << pos % 64;
+			}
+			end = run.end;
+		}
+		CHECK(seen == word);
+	}
+}
+
+TEST(slave_set, only_the_words_in_use_are_compared)
+{
+	struct slave_set a = { .word = { 1, 2, 3 } };
+	struct slave_set b = { .word = { 1, 2, 4 } };
+
+	CHECK_EQ(slave_set_differs(&a, &b, 2), 0);
+	CHECK_EQ(slave_set_differs(&a, &b, 3), 1);
+	CHECK_EQ(slave_set_differs(&a, &b, 0), 0);
 }

@@ -41,7 +41,7 @@ TEST(config, conflicting_options_are_reported_with_a_line_of_the_file)
 	parse_fails("outputs:\n- { channel: a, timeout: 1s }\n",
 		    "t.yaml:2: outputs[].timeout: requires owner: remote");
 	parse_fails("outputs:\n- channel: a\n- channel: a\n",
-		    "t.yaml:3: outputs[].channel: duplicate channel");
+		    "t.yaml:3: outputs[].channel: a is already in line 2");
 	parse_fails("outputs:\n- channel: \"\"\n", "t.yaml:2: outputs[].channel: is missing");
 }
 

@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "config/config.h"
+#include "config/output.h"
 #include "harness/test.h"
 #include "unit/core/config/parsing.h"
 
@@ -311,10 +312,66 @@ TEST(config, objects_must_be_whole_and_fit_their_type)
 		    "t.yaml:5: slaves[0].sdo[0].value: 70000 does not fit into UINT");
 	parse_fails("slaves:\n- sdo:\n  - { index: 0x8000, type: UINT, value: x }\n",
 		    "t.yaml:3: slaves[0].sdo[0].value: \"x\" is not a valid UINT");
-	parse_fails("slaves:\n- sdo:\n  - { index: 0x8000, type: WORD, value: 1 }\n",
-		    "t.yaml:3: slaves[0].sdo[0].type: expected one of "
-		    "BOOL|SINT|INT|DINT|LINT|USINT|UINT|UDINT|ULINT|REAL|LREAL, not \"WORD\"");
+	parse_fails(
+		"slaves:\n- sdo:\n  - { index: 0x8000, type: WORD, value: 1 }\n",
+		"t.yaml:3: slaves[0].sdo[0].type: expected one of "
+		"BOOL|SINT|INT|DINT|LINT|USINT|UINT|UDINT|ULINT|REAL|LREAL|STRING|OCTETS|AUTO, not "
+		"\"WORD\"");
 	parse_fails("outputs:\n- owner: local\n", "t.yaml:2: outputs[0].channel: is missing");
+}
+
+TEST(config, outputs_beside_their_slave_are_those_of_the_list)
+{
+	static struct config cfg;
+
+	parse_ok("outputs:\n"
+		 "  - channel: b.x\n"
+		 "slaves:\n"
+		 "  - {}\n"
+		 "  - outputs:\n"
+		 "      - { channel: led, max: 1, owner: remote, timeout: 50 }\n"
+		 "      - { channel: speed }\n"
+		 "    name: a\n",
+		 &cfg);
+	CHECK_EQ(cfg.output_count, 3);
+	CHECK_STR(cfg.output[0].channel, "b.x");
+	CHECK_EQ(cfg.output[0].slave_pos, CONFIG_NO_SLAVE);
+	CHECK_STR(cfg.output[1].channel, "a.led");
+	CHECK_EQ(cfg.output[1].slave_pos, 1);
+	CHECK_EQ(cfg.output[1].line, 6);
+	CHECK(cfg.output[1].max == 1 && cfg.output[1].timeout_ns == 50000000);
+	CHECK_EQ(cfg.output[1].owner, CONFIG_OWNER_REMOTE);
+	CHECK_STR(cfg.output[2].channel, "a.speed");
+	CHECK(config_output_find(&cfg, "a.led") == &cfg.output[1]);
+	CHECK(config_output_at(&cfg, 1, 1) == &cfg.output[2]);
+	CHECK(config_output_at(&cfg, CONFIG_NO_SLAVE, 0) == &cfg.output[0]);
+	CHECK(config_output_at(&cfg, CONFIG_NO_SLAVE, 1) == NULL);
+}
+
+TEST(config, an_output_is_in_one_list_only_and_its_slave_has_a_name)
+{
+	static const char long_name[] =
+		"slaves:\n- name: a23456789012345678901234567890\n  outputs:\n"
+		"  - channel: c2345678901234567890123456789012345\n";
+
+	parse_fails(
+		"slaves:\n- name: a\n  outputs:\n  - channel: led\noutputs:\n- channel: a.led\n",
+		"t.yaml:6: outputs[].channel: a.led is already in line 4");
+	parse_fails(
+		"outputs:\n- channel: a.led\nslaves:\n- name: a\n  outputs:\n  - channel: led\n",
+		"t.yaml:6: slaves[].outputs[].channel: a.led is already in line 2");
+	parse_fails("slaves:\n- outputs:\n  - channel: led\n",
+		    "t.yaml:3: slaves[].outputs[].channel: requires slaves[].name");
+	parse_fails("slaves:\n- name: a\n  outputs:\n  - { channel: led, min: 1 }\n",
+		    "t.yaml:4: slaves[].outputs[].fail_safe: is not within min and max");
+	parse_fails("slaves:\n- name: a\n  outputs:\n  - { chanel: led }\n",
+		    "t.yaml:4: slaves[0].outputs[0].chanel: unknown option; did you mean "
+		    "outputs[].channel?");
+	parse_fails("slaves:\n- name: a\n  outputs:\n  - { min: 0 }\n",
+		    "t.yaml:4: slaves[0].outputs[0].channel: is missing");
+	parse_fails(long_name, "t.yaml:4: slaves[].outputs[].channel: "
+			       "a23456789012345678901234567890.c2345678901234567890123456789012345 "
+			       "is longer than 63 characters");
 }
 
 TEST(config, assign_activate_is_a_word_of_the_esi_or_sii_or_none)

@@ -67,7 +67,6 @@ TEST(config, every_problem_of_a_file_is_reported_with_its_line)
 			 ":3: cycle.period: unknown unit \"furlong\": ns, us, ms, s, min, h or d\n"
 			 ":6: slaves[0].vendor: expected a whole number, not \"x\"\n"
 			 ":8: slaves[1].sdo[0].index: is missing\n"
-			 ":8: slaves[1].sdo[0].type: is missing\n"
 			 ":9: busses: unknown option\n");
 }
 
@@ -87,7 +86,7 @@ TEST(config, every_pair_of_options_that_do_not_fit_is_reported)
 			 "control.options: requires control.program\n"
 			 ":3: slaves[].sync0_shift: must be less than one cycle.period\n"
 			 ":5: outputs[].max: is below min\n"
-			 ":6: outputs[].channel: duplicate channel\n");
+			 ":6: outputs[].channel: a.led is already in line 5\n");
 }
 
 TEST(config, a_good_file_has_no_problem)
@@ -137,10 +136,13 @@ TEST(config, every_option_in_effect_has_value_unit_and_origin)
 			 "slaves[0].name=a file 5\n"
 			 "slaves[0].mode=oneshot command line 0\n"
 			 "slaves[1].op_timeout=7s file 8\n"
+			 "slaves[1].sdo[0].transition=PS default 0\n"
 			 "slaves[1].sdo[0].index=0x10 file 7\n"
 			 "slaves[1].sdo[0].subindex=0 default 0\n"
+			 "slaves[1].sdo[0].complete=false default 0\n"
 			 "slaves[1].sdo[0].type=UINT file 7\n"
 			 "slaves[1].sdo[0].value=5 file 7\n"
+			 "slaves[1].sdo[0].comment= default 0\n"
 			 "outputs[0].owner=local default 0\n");
 }
 

@@ -4,7 +4,7 @@
 #include <unistd.h>
 
 #include "bench.h"
-#include "esi/xml.h"
+#include "xml/xml.h"
 
 static char *repeated(const char *head, const char *piece, size_t count)
 {

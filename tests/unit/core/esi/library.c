@@ -113,3 +113,25 @@ TEST(esi_library, folder_that_is_not_there_is_reported)
 	CHECK(esi_library_find(library, 1, 2, 3) == NULL);
 	esi_library_free(library);
 }
+
+TEST(esi_library, a_module_is_found_by_its_vendor_and_ident)
+{
+	const struct esi_identity wanted[] = { { ESI_DEVICE, 0x1337, 7, 1 },
+					       { ESI_MODULE, 0x1337, 7, 0 },
+					       { ESI_MODULE, 0x1337, 8, 0 } };
+	struct folder folder = make_folder();
+	struct esi_library *library;
+
+	put_file(&folder, "a.xml",
+		 BENCH_HEAD DEVICE(1, "device") "</Devices><Modules><Module>"
+						"<Type ModuleIdent=\"7\">module</Type></Module>"
+						"</Modules></Descriptions></EtherCATInfo>");
+	library = read_for(&folder, wanted, 3);
+	CHECK_EQ(folder.bad_count, 0);
+	CHECK_STR(esi_library_find(library, 0x1337, 7, 1)->type, "device");
+	CHECK_STR(esi_library_find_module(library, 0x1337, 7)->type, "module");
+	CHECK(esi_library_find_module(library, 0x1337, 8) == NULL);
+	CHECK(esi_library_find_module(library, 0x1338, 7) == NULL);
+	esi_library_free(library);
+	remove_folder(&folder);
+}

@@ -78,6 +78,40 @@ TEST(echo, command_register_length_and_station_address_count)
 	}
 }
 
+/* Bit @bit of the header's first eight octets is one that an answer has as it was sent. */
+static int is_kept(uint8_t cmd, unsigned bit, enum echo_index index)
+{
+	int is_counted = cmd == ECAT_CMD_BRD || cmd == ECAT_CMD_ARMW || cmd == ECAT_CMD_APRW;
+
+	if (bit / 8 == 1) {
+		return index == ECHO_INDEX_SAME;
+	}
+	if (bit / 16 == 1) {
+		return !is_counted;
+	}
+	return bit < 6 * 8 + 11 || bit == 63;
+}
+
+TEST(echo, each_bit_of_a_header_counts_or_is_the_slaves_to_change)
+{
+	static const enum ecat_cmd commands[] = { ECAT_CMD_BRD,  ECAT_CMD_APRW, ECAT_CMD_ARMW,
+						  ECAT_CMD_FPRD, ECAT_CMD_LRW,  ECAT_CMD_FRMW };
+
+	for (unsigned c = 0; c < sizeof(commands) / sizeof(commands[0]); c++) {
+		for (unsigned bit = 0; bit < 64; bit++) {
+			struct pair p = make_pair();
+
+			p.sent[DATAGRAM] = (uint8_t)commands[c];
+			p.back[DATAGRAM] = (uint8_t)commands[c];
+			p.back[DATAGRAM + bit / 8] ^= (uint8_t)(1u << bit % 8);
+			CHECK_EQ(echo_matches(p.sent, p.back, p.len, ECHO_INDEX_SAME),
+				 !is_kept(p.sent[DATAGRAM], bit, ECHO_INDEX_SAME));
+			CHECK_EQ(echo_matches(p.sent, p.back, p.len, ECHO_INDEX_ANY),
+				 !is_kept(p.sent[DATAGRAM], bit, ECHO_INDEX_ANY));
+		}
+	}
+}
+
 TEST(echo, index_counts_unless_any_is_accepted)
 {
 	struct pair p = make_pair();

@@ -5,89 +5,11 @@
 #include <poll.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include "harness/test.h"
+#include "unit/master/admin/server_bench.h"
 #include "unit/master/admin/target.h"
-
-/* A server in a directory of its own, and the fake session behind it. */
-struct bench {
-	char dir[64];
-	char path[100];
-	struct admin_server *server;
-	struct fake fake;
-	mono_t now;
-};
-
-static void bench_open(struct bench *b)
-{
-	char error[256];
-
-	snprintf(b->dir, sizeof(b->dir), "/tmp/ecdaq-admin-XXXXXX");
-	CHECK(mkdtemp(b->dir) != NULL);
-	snprintf(b->path, sizeof(b->path), "%s/admin", b->dir);
-	CHECK_EQ(admin_server_create(b->path, (gid_t)-1, &b->server, error, sizeof(error)), 0);
-	fake_init(&b->fake);
-	b->now = (mono_t){ 1 };
-}
-
-static void bench_close(struct bench *b)
-{
-	admin_server_destroy(b->server);
-	CHECK_EQ(access(b->path, F_OK), -1);
-	CHECK_EQ(rmdir(b->dir), 0);
-}
-
-static int bench_connect(const struct bench *b)
-{
-	struct sockaddr_un address = { .sun_family = AF_UNIX };
-	int fd = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
-
-	snprintf(address.sun_path, sizeof(address.sun_path), "%s", b->path);
-	CHECK_EQ(connect(fd, (const struct sockaddr *)&address, sizeof(address)), 0);
-	return fd;
-}
-
-static unsigned service(struct bench *b)
-{
-	struct admin_target target = fake_target(&b->fake);
-
-	return admin_server_service(b->server, &target, b->now);
-}
-
-static void ask(int fd, const struct admin_request *rq)
-{
-	CHECK_EQ(send(fd, rq, sizeof(*rq), 0), sizeof(*rq));
-}
-
-static int has_answer(int fd)
-{
-	struct pollfd p = { .fd = fd, .events = POLLIN };
-
-	return poll(&p, 1, 0) == 1;
-}
-
-static struct admin_reply answer(int fd)
-{
-	struct admin_reply reply;
-
-	CHECK_EQ(recv(fd, &reply, sizeof(reply), MSG_DONTWAIT), sizeof(reply));
-	CHECK_EQ(reply.magic, ADMIN_MAGIC);
-	return reply;
-}
-
-/* A client whose set waits for the cycle. */
-static int connect_and_set(struct bench *b)
-{
-	struct admin_request rq = fake_request(ADMIN_SET);
-	int fd = bench_connect(b);
-
-	fake_item(&rq, "a.led", 1);
-	ask(fd, &rq);
-	CHECK_EQ(service(b), 1);
-	return fd;
-}
 
 TEST(admin_server, the_socket_is_for_owner_and_group_only)
 {
@@ -133,6 +55,30 @@ TEST(admin_server, its_descriptor_polls_readable_when_there_is_something_to_do)
 	CHECK(has_answer(admin_server_fd(b.server)));
 	service(&b);
 	CHECK(!has_answer(admin_server_fd(b.server)));
+	close(fd);
+	bench_close(&b);
+}
+
+/* Requests go on in a pass that asks no socket: they end in time. */
+TEST(admin_server, a_pass_behind_silence_asks_no_socket_and_the_next_one_does)
+{
+	struct bench b;
+	struct admin_request rq = fake_request(ADMIN_PING);
+	int waiting;
+	int fd;
+
+	bench_open(&b);
+	waiting = connect_and_set(&b);
+	fd = bench_connect(&b);
+	ask(fd, &rq);
+	b.now = mono_add(b.now, (span_t){ 2 * NS_PER_S });
+	admin_server_note_silence(b.server);
+	CHECK_EQ(service(&b), 0);
+	CHECK_EQ(answer(waiting).result, -ETIMEDOUT);
+	CHECK(!has_answer(fd));
+	service(&b);
+	CHECK_EQ(answer(fd).result, 0);
+	close(waiting);
 	close(fd);
 	bench_close(&b);
 }
@@ -379,6 +325,28 @@ TEST(admin_server, a_request_ends_by_cancel_by_its_timeout_and_with_its_client)
 	close(fd);
 	CHECK_EQ(service(&b), 0);
 	CHECK_EQ(b.fake.cancels, 3);
+	bench_close(&b);
+}
+
+TEST(admin_server, a_look_at_a_bus_that_is_brought_up_for_long_ends_with_the_reason)
+{
+	struct bench b;
+	struct admin_target target;
+	struct admin_reply reply;
+	int fd;
+
+	bench_open(&b);
+	target = fake_target(&b.fake);
+	target.bus_request = NULL;
+	fd = bench_connect(&b);
+	ask_verb(fd, ADMIN_COMPARE, 7);
+	CHECK_EQ(admin_server_service(b.server, &target, b.now), 1);
+	b.now.ns += ADMIN_TIMEOUT_S * NS_PER_S;
+	CHECK_EQ(admin_server_service(b.server, &target, b.now), 0);
+	reply = answer(fd);
+	CHECK_EQ(reply.result, -ETIMEDOUT);
+	CHECK_STR(reply.text, "the bus is being brought up");
+	close(fd);
 	bench_close(&b);
 }
 

@@ -190,7 +190,7 @@ TEST(compare, exchanged_slaves_are_both_named)
 	cfg->slave[1].identification = 2;
 	CHECK_EQ(compare_slaves(cfg, three, id, 3, error, sizeof(error)), -ENXIO);
 	CHECK_STR(error,
-		  "slave 0: wrong identity: expected vendor 0x00000002 product 0x00000001 "
+		  "slave 0 s0: wrong identity: expected vendor 0x00000002 product 0x00000001 "
 		  "revision any identification 1, found vendor 0x00000002 product 0x00000001 "
 		  "revision 0x00000005 identification 2, which is slave 1 s1");
 }
@@ -206,12 +206,12 @@ TEST(compare, a_slave_missing_among_others_in_another_order_is_named)
 		cfg->slave[i].product = 1;
 	}
 	CHECK_EQ(compare_slaves(cfg, three, id, 2, error, sizeof(error)), -ENXIO);
-	CHECK_STR(error, "slave 1 s1 is missing; slave 0: wrong identity: expected vendor "
+	CHECK_STR(error, "slave 1 s1 is missing; slave 0 s0: wrong identity: expected vendor "
 			 "0x00000002 product 0x00000001 revision any identification 1, found "
 			 "vendor 0x00000002 product 0x00000001 revision 0x00000005 identification "
 			 "3, which is slave 2 s2");
 	CHECK_EQ(compare_slaves(cfg, three, id, 1, error, sizeof(error)), -ENXIO);
-	CHECK(strstr(error, "slave 0 s0 and 1 more are missing; slave 0: wrong") == error);
+	CHECK(strstr(error, "slave 0 s0 and 1 more are missing; slave 0 s0: wrong") == error);
 }
 
 /* The first device found would do for the first slave, too, but is the only one for the second. */

@@ -2,6 +2,7 @@
 #include "bus/differences.h"
 
 #include "bus/compare.h"
+#include "bus/pdo.h"
 #include "harness/test.h"
 
 enum { COUPLER = 0x044c2c52, OUT = 0x0b0c3052, IN = 0x03f03052 };
@@ -226,4 +227,116 @@ TEST(differences, an_output_must_be_an_output_channel)
 	CHECK_STR(list.at[1].found, "no channel of this name");
 	CHECK_EQ(list.at[1].line, 30);
 	differences_free(&list);
+}
+
+/* --- PDOs --- */
+
+static struct pdo_entry entry[16];
+static size_t entry_count;
+
+static void map(uint16_t pdo, const char *name, uint8_t sm, uint16_t index)
+{
+	struct pdo_entry *e = &entry[entry_count++];
+
+	*e = (struct pdo_entry){ .pdo = pdo, .index = index, .subindex = 1, .bit_len = 16 };
+	e->sm = sm;
+	e->is_output = pdo < 0x1a00;
+	snprintf(e->pdo_name, sizeof(e->pdo_name), "%s", name);
+}
+
+static struct config_pdo *list_pdo(uint16_t index, const char *pdo)
+{
+	struct config_pdo *item = &cfg.pdo[cfg.pdo_count++];
+
+	*item = (struct config_pdo){ .slave_pos = 1, .index = index, .line = 7 };
+	snprintf(item->pdo, sizeof(item->pdo), "%s", pdo);
+	return item;
+}
+
+/* "expected/found; " of each difference. */
+static const char *compare_pdos(void)
+{
+	static const struct slave_info slave = { .slave_pos = 1, .config_item = 3, .name = "ai" };
+	static char text[512];
+
+	CHECK_EQ(differences_of_pdos(&cfg, &slave, entry, entry_count, &list), 0);
+	text[0] = '\0';
+	for (size_t i = 0; i < list.count; i++) {
+		const struct difference *diff = &list.at[i];
+		size_t used = strlen(text);
+
+		CHECK_EQ(diff->kind, DIFFERENCE_PDOS);
+		CHECK_EQ(diff->item, 2);
+		CHECK_EQ(diff->position, 1);
+		CHECK_EQ(diff->line, 7);
+		CHECK_STR(diff->name, "ai");
+		CHECK_STR(diff->group, "analog");
+		snprintf(text + used, sizeof(text) - used, "%s/%s; ", diff->expected, diff->found);
+	}
+	differences_free(&list);
+	return text;
+}
+
+static void begin_pdos(void)
+{
+	begin();
+	entry_count = 0;
+	snprintf(cfg.slave[1].group, sizeof(cfg.slave[1].group), "analog");
+	map(0x1600, "Control", 2, 0x7000);
+	map(0x1a00, "Status", 3, 0x6000);
+	map(0x1a00, "Status", 3, 0x6001);
+	map(0x1a02, "Value", 3, 0x6002);
+}
+
+TEST(differences, pdos_that_are_assigned_as_listed_are_none)
+{
+	begin_pdos();
+	CHECK_STR(compare_pdos(), ""); /* nothing is listed */
+	list_pdo(0x1a00, "0x1a00");
+	list_pdo(0, "Value");
+	CHECK_STR(compare_pdos(), ""); /* outputs stay as they are */
+	list_pdo(0x1600, "0x1600");
+	CHECK_STR(compare_pdos(), "");
+	cfg.pdo[0].slave_pos = 0; /* of another slave */
+	CHECK_STR(compare_pdos(), "Value/0x1a00, 0x1a02; ");
+}
+
+TEST(differences, pdos_that_are_missing_too_many_or_in_another_order_are_shown)
+{
+	begin_pdos();
+	list_pdo(0x1601, "0x1601");
+	list_pdo(0x1a02, "0x1a02");
+	list_pdo(0x1a00, "0x1a00");
+	CHECK_STR(compare_pdos(), "0x1601/0x1600; 0x1a02, 0x1a00/0x1a00, 0x1a02; ");
+	begin_pdos();
+	list_pdo(0x1a00, "0x1a00");
+	CHECK_STR(compare_pdos(), "0x1a00/0x1a00, 0x1a02; ");
+	begin_pdos();
+	list_pdo(0, "Nothing");
+	CHECK_STR(compare_pdos(), "Nothing/0x1a00, 0x1a02; ");
+	entry_count = 1;
+	CHECK_STR(compare_pdos(), "Nothing/none with entries; ");
+	entry_count = 0;
+	CHECK_STR(compare_pdos(), "Nothing/none with entries; ");
+}
+
+TEST(differences, a_pdo_with_another_mapping_is_shown)
+{
+	struct config_pdo *item;
+
+	begin_pdos();
+	item = list_pdo(0x1a00, "0x1a00");
+	list_pdo(0x1a02, "0x1a02");
+	item->entry_count = 2;
+	cfg.pdo_entry[0] = 0x60000110;
+	cfg.pdo_entry[1] = 0x60010110;
+	CHECK_STR(compare_pdos(), "");
+	cfg.pdo_entry[1] = 0x60010108;
+	CHECK_STR(compare_pdos(), "0x1a00 with other entries, 0x1a02/0x1a00, 0x1a02; ");
+	item->entry_count = 1;
+	CHECK_STR(compare_pdos(), "0x1a00 with other entries, 0x1a02/0x1a00, 0x1a02; ");
+	cfg.pdo_entry[1] = 0x60010110;
+	cfg.pdo_entry[2] = 0x60020110;
+	item->entry_count = 3;
+	CHECK_STR(compare_pdos(), "0x1a00 with other entries, 0x1a02/0x1a00, 0x1a02; ");
 }

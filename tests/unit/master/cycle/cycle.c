@@ -30,6 +30,20 @@ TEST(cycle, every_sample_is_numbered_by_its_sync0_edge_and_good)
 	}
 }
 
+TEST(cycle, its_next_wake_is_the_deadline_that_it_sleeps_to)
+{
+	start_in_op();
+	for (unsigned i = 0; i < 10; i++) {
+		mono_t next = cycle_next_wake(cy);
+		struct got s;
+
+		CHECK(i == 0 || next.ns > world.now.ns);
+		steps(1);
+		s = next_sample();
+		CHECK(i == 0 || s.h.wake_mono_ns - s.h.wake_latency_ns == next.ns);
+	}
+}
+
 TEST(cycle, a_lost_frame_costs_one_bad_sample_a_slave_and_no_overrun)
 {
 	struct got s;

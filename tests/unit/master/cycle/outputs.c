@@ -2,8 +2,10 @@
 /* Limits and timeouts of outputs, as raw values on the wire. */
 #include "cycle/outputs.h"
 
+#include <errno.h>
 #include <math.h>
 
+#include "base/prng.h"
 #include "harness/test.h"
 #include "image/image.h"
 
@@ -74,6 +76,38 @@ TEST(outputs, a_value_beyond_a_limit_goes_out_as_the_limit)
 	CHECK_EQ(sent(100), 1000);
 	CHECK_EQ(sent(100.1), 1000);
 	CHECK_EQ(sent(204.7), 1000);
+}
+
+TEST(outputs, new_limits_are_in_force_from_the_next_cycle_on)
+{
+	char error[128] = "";
+
+	start(-50, 100);
+	CHECK_EQ(sent(150), 1000);
+	cfg.output[0].max = 120;
+	CHECK_EQ(sent(150), 1000); /* nobody has handed them over */
+	for (int i = 0; i < 4; i++) {
+		cfg.output[0].max = 110 + i;
+		CHECK_EQ(outputs_rules_set(&outputs, &cfg, error, sizeof(error)), 0);
+		CHECK_EQ(outputs_rules_set(&outputs, &cfg, error, sizeof(error)), 0);
+		CHECK_EQ(sent(150), 1100 + 10 * i);
+		CHECK_EQ(sent(-80), -500);
+	}
+}
+
+TEST(outputs, rules_that_a_channel_cannot_hold_change_nothing)
+{
+	char error[128] = "";
+
+	start(-50, 100);
+	cfg.output[0].max = 50;
+	cfg.output[0].fail_safe = 1e9;
+	CHECK_EQ(outputs_rules_set(&outputs, &cfg, error, sizeof(error)), -EINVAL);
+	CHECK(strstr(error, "the channel cannot hold its fail_safe value") != NULL);
+	CHECK_EQ(sent(150), 1000);
+	cfg.output[0].fail_safe = 0;
+	CHECK_EQ(outputs_rules_set(&outputs, &cfg, error, sizeof(error)), 0);
+	CHECK_EQ(sent(150), 500);
 }
 
 TEST(outputs, a_limit_that_the_channel_cannot_reach_does_not_limit)
@@ -170,6 +204,140 @@ TEST(outputs, a_timeout_counts_the_cycles_that_an_overrun_has_skipped)
 	CHECK_EQ(silent_since(1000000, 50000000, 1), 151);
 	CHECK_EQ(silent_since(1000000, 50000000, 10), 160);
 	CHECK_EQ(silent_since(1000000, 50000000, 60), 160);
+}
+
+/* --- against a reference that chooses all outputs anew in each cycle --- */
+
+enum { RANDOM_OUTPUTS = 5, RANDOM_CYCLES = 20000 };
+
+static const enum cycle_writer random_writers[] = { CYCLE_WRITER_LOCAL, CYCLE_WRITER_REMOTE };
+static struct board random_boards[CYCLE_WRITERS];
+static struct channel random_channels[RANDOM_OUTPUTS];
+static uint64_t chosen_timeout[RANDOM_OUTPUTS];
+
+static void set_random_rules(struct prng *prng)
+{
+	for (unsigned i = 0; i < RANDOM_OUTPUTS; i++) {
+		struct config_output *rules = &cfg.output[i];
+
+		chosen_timeout[i] = prng_below(prng, 2) * (1 + prng_below(prng, 6));
+		snprintf(rules->channel, sizeof(rules->channel), "a.o%u", i);
+		rules->fail_safe = (double)prng_below(prng, 3);
+		rules->min = -INFINITY;
+		rules->max = prng_below(prng, 2) == 0 ? INFINITY : 50.0 + i;
+		rules->owner = i % 2 == 0 ? CONFIG_OWNER_LOCAL : CONFIG_OWNER_REMOTE;
+		rules->timeout_ns = (int64_t)chosen_timeout[i] * cfg.cycle_period_ns;
+	}
+}
+
+static void start_random(struct prng *prng)
+{
+	struct cycle_spec spec = { .cfg = &cfg,
+				   .channels = random_channels,
+				   .channel_count = RANDOM_OUTPUTS };
+	char error[128] = "";
+
+	memset(&cfg, 0, sizeof(cfg));
+	cfg.cycle_period_ns = 1000000;
+	cfg.output_count = RANDOM_OUTPUTS;
+	for (unsigned i = 0; i < RANDOM_OUTPUTS; i++) {
+		random_channels[i] = (struct channel){ .direction = CHANNEL_OUTPUT,
+						       .type = CHANNEL_UINT,
+						       .bit_len = i == 2 ? 16 : 11,
+						       .bit_offset = 16 * i + (i == 2 ? 0 : 3),
+						       .slave_pos = (uint16_t)(60 + 2 * i),
+						       .scale = 1 };
+		snprintf(random_channels[i].name, sizeof(random_channels[i].name), "a.o%u", i);
+	}
+	for (unsigned i = 0; i < 2; i++) {
+		board_init(&random_boards[random_writers[i]]);
+		spec.boards[random_writers[i]] = &random_boards[random_writers[i]];
+	}
+	set_random_rules(prng);
+	CHECK_EQ(outputs_init(&outputs, &spec, error, sizeof(error)), 0);
+}
+
+static void act(struct prng *prng, struct slave_set *live)
+{
+	struct board *b = &random_boards[random_writers[prng_below(prng, 2)]];
+	char error[128] = "";
+
+	switch (prng_below(prng, 12)) {
+	case 0:
+	case 1:
+		board_begin(b);
+		for (unsigned i = 0; i < RANDOM_OUTPUTS; i++) {
+			if (prng_below(prng, 3) == 0) {
+				board_unset(b, i);
+			} else if (prng_below(prng, 2) == 0) {
+				board_put(b, i, prng_below(prng, 100));
+			}
+		}
+		board_commit(b);
+		break;
+	case 2:
+	case 3:
+	case 4:
+		b->beat++;
+		break;
+	case 5:
+		live->word[prng_below(prng, 2)] ^= UINT64_C(1) << prng_below(prng, 64);
+		live->word[0] |= UINT64_C(0x5) << 60;
+		break;
+	case 6:
+		if (prng_below(prng, 10) == 0) {
+			set_random_rules(prng);
+			CHECK_EQ(outputs_rules_set(&outputs, &cfg, error, sizeof(error)), 0);
+		}
+		break;
+	default:
+		break;
+	}
+}
+
+/* What one output is to be, and whether it is counted as timed out. */
+static uint64_t reference(unsigned i, const struct slave_set *live, uint64_t cycle,
+			  unsigned *timed_out)
+{
+	const struct config_output *rules = &cfg.output[i];
+	enum cycle_writer writer = i % 2 == 0 ? CYCLE_WRITER_LOCAL : CYCLE_WRITER_REMOTE;
+	const struct board_set *set = &outputs.set[writer];
+	int is_silent =
+		chosen_timeout[i] > 0 && cycle - outputs.alive_cycle[writer] > chosen_timeout[i];
+	int is_wanted = set->is_set[i] && slave_set_has(live, random_channels[i].slave_pos);
+
+	*timed_out += is_wanted && is_silent;
+	if (!is_wanted || is_silent) {
+		return (uint64_t)rules->fail_safe;
+	}
+	return (double)set->raw[i] > rules->max ? (uint64_t)rules->max : set->raw[i];
+}
+
+TEST(outputs, what_is_written_when_something_changes_is_what_each_cycle_would_write)
+{
+	struct slave_set live = { .word = { UINT64_MAX, UINT64_MAX } };
+	struct prng prng = { 5 };
+	uint8_t image[2 * RANDOM_OUTPUTS] = { 0 };
+	uint64_t cycle = 1;
+	unsigned times = 0;
+
+	start_random(&prng);
+	for (unsigned n = 0; n < RANDOM_CYCLES; n++) {
+		unsigned expected = 0;
+		unsigned timed_out;
+
+		act(&prng, &live);
+		cycle += prng_below(&prng, 10) == 0 ? 1 + prng_below(&prng, 4) : 1;
+		timed_out = outputs_choose(&outputs, image, &live, cycle);
+		for (unsigned i = 0; i < RANDOM_OUTPUTS; i++) {
+			uint64_t wanted = reference(i, &live, cycle, &expected);
+
+			CHECK_EQ(image_get_raw(image, &random_channels[i]), wanted);
+		}
+		CHECK_EQ(timed_out, expected);
+		times += timed_out > 0;
+	}
+	CHECK(times > RANDOM_CYCLES / 50 && times < RANDOM_CYCLES);
 }
 
 /* --- answers --- */

@@ -111,6 +111,7 @@ static int receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadline, 
 static int is_up(void *ctx)
 {
 	(void)ctx;
+	fake_bus.link_queries++;
 	return fake_bus.is_link_up;
 }
 
@@ -186,6 +187,11 @@ int bus_compare(const struct bus *bus, char *error)
 	return step(FAKE_COMPARE, "compare", error);
 }
 
+void bus_config_follow(struct bus *bus)
+{
+	(void)bus;
+}
+
 int bus_map(struct bus *bus, char *error)
 {
 	(void)bus;
@@ -228,11 +234,11 @@ int bus_request_state(struct bus *bus, enum al_state state, span_t timeout, char
 	return state == AL_OP ? step(FAKE_OP, "op", error) : step(FAKE_SAFEOP, "safeop", error);
 }
 
-int bus_slave_al_request(struct bus *bus, size_t pos, uint16_t state, char *error)
+int bus_slave_al_request(struct bus *bus, size_t pos, uint16_t request, char *error)
 {
 	(void)bus;
 	(void)pos;
-	(void)state;
+	(void)request;
 	(void)error;
 	return 0;
 }
@@ -262,11 +268,42 @@ int bus_slave_mailbox_program(struct bus *bus, size_t pos, uint16_t state, char 
 	return 0;
 }
 
+int bus_slave_set_up(struct bus *bus, size_t pos, uint16_t state, char *error)
+{
+	(void)bus;
+	(void)pos;
+	(void)state;
+	(void)error;
+	return 0;
+}
+
 void bus_slave_mailbox_follow(struct bus *bus, size_t pos, uint16_t state)
 {
 	(void)bus;
 	(void)pos;
 	(void)state;
+}
+
+int bus_startup(struct bus *bus, enum config_transition transition, char *error)
+{
+	(void)bus;
+	(void)transition;
+	(void)error;
+	return 0;
+}
+
+int bus_has_startup(const struct bus *bus, enum config_transition transition)
+{
+	(void)bus;
+	(void)transition;
+	return 0;
+}
+
+int bus_startup_down(struct bus *bus, char *error)
+{
+	(void)bus;
+	(void)error;
+	return 0;
 }
 
 int bus_stop_outputs(struct bus *bus, char *error)
@@ -319,6 +356,15 @@ const struct slave_info *bus_slaves(const struct bus *bus, size_t *ret_count)
 	(void)bus;
 	*ret_count = 1;
 	return slaves;
+}
+
+size_t bus_startup_list(const struct bus *bus, size_t pos, uint8_t *buf, size_t buf_len)
+{
+	(void)bus;
+	(void)pos;
+	(void)buf;
+	(void)buf_len;
+	return 0;
 }
 
 const struct channel *bus_channels(const struct bus *bus, size_t *ret_count)

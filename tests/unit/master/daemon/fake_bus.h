@@ -36,6 +36,7 @@ struct fake_bus {
 	char steps[512];     /* what was called, in order, with a blank behind each */
 	unsigned transports; /* open ones */
 	int is_link_up;
+	unsigned link_queries;
 	uint64_t exchanges;
 	void (*led_back)(void *ctx); /* called by bus_lead_back(); NULL: none */
 	void *led_back_ctx;

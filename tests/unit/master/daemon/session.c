@@ -176,6 +176,21 @@ TEST(session, it_reaches_op_in_order_and_leaves_it_in_order)
 	bench_close(&b);
 }
 
+TEST(session, the_next_cycle_is_known_while_the_cycle_sleeps_and_not_without_one)
+{
+	static struct bench b;
+	struct failure failure;
+
+	bench_open(&b);
+	CHECK_EQ(session_next_cycle(b.session).ns, 0);
+	CHECK_EQ(session_bring_up(b.session, &failure), 0);
+	CHECK(session_next_cycle(b.session).ns > fake_bus.mono_ns);
+	CHECK(session_next_cycle(b.session).ns <= fake_bus.mono_ns + 2 * b.cfg.cycle_period_ns);
+	CHECK_EQ(session_stop(b.session, &failure), 0);
+	CHECK_EQ(session_next_cycle(b.session).ns, 0);
+	bench_close(&b);
+}
+
 TEST(session, each_step_of_bring_up_fails_with_its_code_its_line_and_nothing_left_behind)
 {
 	static const struct {
@@ -513,6 +528,32 @@ TEST(session, an_output_set_through_the_socket_is_on_the_wire_and_safe_at_the_en
 	CHECK_EQ(session_stop(b.session, &failure), 0);
 	CHECK_EQ(fake_bus.led, 0);
 	close(fd);
+	bench_close(&b);
+}
+
+TEST(session, the_link_is_asked_for_where_frames_are_missing_and_nowhere_else)
+{
+	static struct bench b;
+	struct failure failure;
+	unsigned queries;
+
+	bench_open(&b);
+	CHECK_EQ(session_bring_up(b.session, &failure), 0);
+	CHECK_EQ(run(&b, 500, &failure), SESSION_GOES_ON);
+	queries = fake_bus.link_queries;
+	CHECK_EQ(run(&b, 1000, &failure), SESSION_GOES_ON);
+	CHECK_EQ(fake_bus.link_queries, queries);
+	fake_bus.lost_every = 10;
+	fake_bus.is_link_up = 0;
+	CHECK_EQ(run(&b, 200, &failure), SESSION_GOES_ON);
+	CHECK(fake_bus.link_queries > queries);
+	CHECK_EQ(atomic_load(&session_page(b.session)->link), STATUS_LINK_DOWN);
+	/* And until it is up again. */
+	fake_bus.lost_every = 0;
+	CHECK_EQ(run(&b, 500, &failure), SESSION_GOES_ON);
+	fake_bus.is_link_up = 1;
+	CHECK_EQ(run(&b, 200, &failure), SESSION_GOES_ON);
+	CHECK_EQ(atomic_load(&session_page(b.session)->link), STATUS_LINK_UP);
 	bench_close(&b);
 }
 

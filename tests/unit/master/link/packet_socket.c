@@ -10,10 +10,13 @@
 #include <fcntl.h>
 #include <linux/if_tun.h>
 #include <net/if.h>
+#include <poll.h>
 #include <sched.h>
+#include <signal.h>
 #include <string.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include "harness/test.h"
@@ -44,6 +47,17 @@ TEST(packet_socket, invalid_name_is_rejected)
 				    error, sizeof(error)),
 		 -ENODEV);
 	CHECK(transport.send == NULL);
+}
+
+/* Counts the waits of the socket under test, which are as they were. */
+static unsigned waits;
+
+int ppoll(struct pollfd *fds, nfds_t nfds, const struct timespec *timeout, const sigset_t *mask)
+{
+	struct timespec left = *timeout; /* the kernel writes what is left of it */
+
+	waits++;
+	return (int)syscall(SYS_ppoll, fds, nfds, &left, mask, (size_t)_NSIG / 8);
 }
 
 static void move_to_own_network(void)
@@ -124,6 +138,28 @@ TEST(packet_socket, frame_comes_back_once_when_spinning)
 TEST(packet_socket, frame_comes_back_once_when_sleeping)
 {
 	check_echo(PACKET_WAIT_SLEEP);
+}
+
+/* Even where the answer is there at once: a look behind each send would find nothing on a wire. */
+TEST(packet_socket, a_frame_is_waited_for_before_the_first_look_behind_a_send)
+{
+	struct transport transport = open_loopback(PACKET_WAIT_SLEEP);
+	mono_t soon = mono_add(platform_posix().now(NULL), (span_t){ NS_PER_S });
+	uint8_t frame[ECAT_FRAME_MAX_BYTES];
+	uint8_t got[ECAT_FRAME_MAX_BYTES];
+	size_t len = make_frame(frame, 1);
+	unsigned before;
+
+	CHECK_EQ(transport.send(transport.ctx, frame, len), 0);
+	before = waits;
+	CHECK_EQ(transport.receive(transport.ctx, got, sizeof(got), soon, NULL), len);
+	CHECK_EQ(waits - before, 1);
+	/* Nothing is waited for behind the deadline. */
+	CHECK_EQ(transport.send(transport.ctx, frame, len), 0);
+	before = waits;
+	transport.receive(transport.ctx, got, sizeof(got), (mono_t){ 1 }, NULL);
+	CHECK_EQ(waits - before, 0);
+	transport.destroy(transport.ctx);
 }
 
 /* Not before the deadline, and not ticks behind it as a socket's own time-out (T01); generous for a

@@ -2,6 +2,7 @@
 #include "record/layout.h"
 
 #include <errno.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -10,6 +11,9 @@
 #include "record/ros2msg.h"
 
 enum { SLAVES = 3, CHANNELS = 9, IMAGE_BYTES = 32 };
+enum { HEAD_FIELDS = 3 + 4 }; /* those of the header; cycle, dc_time_ns, flags, good */
+
+#define UTC_NS UINT64_C(1767225600000000123)
 
 struct meta {
 	struct sample_meta head;
@@ -55,14 +59,19 @@ static void fill(struct meta *m)
 	};
 }
 
-static int create(const struct meta *m, struct layout **l)
+static int create_with(const struct meta *m, enum config_record_values values, struct layout **l)
 {
 	static struct channel_table *table; /* the newest layout's */
 
 	channel_table_destroy(table);
 	table = NULL;
 	CHECK_EQ(channel_table_create(m, sizeof(*m), &table), 0);
-	return layout_create(table, l);
+	return layout_create(table, values, l);
+}
+
+static int create(const struct meta *m, struct layout **l)
+{
+	return create_with(m, CONFIG_RECORD_BOTH, l);
 }
 
 TEST(layout, each_slave_with_channels_is_a_topic_with_its_fields)
@@ -150,28 +159,149 @@ TEST(layout, values_are_what_the_image_holds_with_their_sign)
 	memset(image + 4, 0xff, 5); /* -1 in 40 bits */
 	memcpy(image + 9, &real, 4);
 	memcpy(image + 13, &wide, 8);
-	len = layout_encode(&t[0], &header, image, buf, sizeof(buf));
+	len = layout_encode(&t[0], &header, image, UTC_NS, buf, sizeof(buf));
 	CHECK_EQ(len, t[0].message_bytes);
 	text = layout_ros2msg(&t[0]);
 	CHECK(text != NULL);
 	CHECK_EQ(ros2msg_parse(text, strlen(text), &msg), 0);
-	CHECK_EQ(msg.count, 4 + 6);
+	CHECK_EQ(msg.count, HEAD_FIELDS + 6);
 	CHECK_EQ(ros2msg_decode(&msg, buf, len, v), 0);
-	CHECK_EQ(v[0].raw, 77);
-	CHECK_EQ((int64_t)v[1].raw, -3);
-	CHECK_EQ(v[2].raw, 9);
-	CHECK_EQ(v[3].raw, 1);
-	CHECK_EQ(v[4].raw, 1);
-	CHECK_EQ((int64_t)v[5].raw, -1);
-	CHECK_EQ(v[6].raw, 0x1234);
-	CHECK_EQ((int64_t)v[7].raw, -1);
-	CHECK(ros2msg_number(&msg.field[8], &v[8]) == -1.5);
-	CHECK(ros2msg_number(&msg.field[9], &v[9]) == 1e300);
+	CHECK_STR(msg.field[0].name, "header.stamp.sec");
+	CHECK_EQ(v[0].raw, 1767225600);
+	CHECK_STR(msg.field[1].name, "header.stamp.nanosec");
+	CHECK_EQ(v[1].raw, 123);
+	CHECK_EQ(v[2].raw, 0); /* frame_id */
+	CHECK_EQ(v[3].raw, 77);
+	CHECK_EQ((int64_t)v[4].raw, -3);
+	CHECK_EQ(v[5].raw, 9);
+	CHECK_EQ(v[6].raw, 1);
+	CHECK_EQ(v[7].raw, 1);
+	CHECK_EQ((int64_t)v[8].raw, -1);
+	CHECK_EQ(v[9].raw, 0x1234);
+	CHECK_EQ((int64_t)v[10].raw, -1);
+	CHECK(ros2msg_number(&msg.field[11], &v[11]) == -1.5);
+	CHECK(ros2msg_number(&msg.field[12], &v[12]) == 1e300);
 	for (size_t cut = 0; cut < len; cut++) {
 		CHECK_EQ(ros2msg_decode(&msg, buf, cut, v), -EBADMSG);
 	}
 	free(text);
 	ros2msg_done(&msg);
+	layout_destroy(l);
+}
+
+/* A slave with a scaled channel, one without a scale, and one that has the name of the raw field.
+ */
+static void fill_scaled(struct meta *m)
+{
+	fill(m);
+	m->channel[6] = make_channel("cycle.volts", 2, CHANNEL_INT, 16, 0);
+	m->channel[6].scale = 0.5;
+	m->channel[6].offset = 1;
+	m->channel[7] = make_channel("cycle.count", 2, CHANNEL_UINT, 8, 16);
+	m->channel[8] = make_channel("cycle.volts raw", 2, CHANNEL_UINT, 8, 24);
+}
+
+struct decoded {
+	struct ros2msg msg;
+	struct ros2msg_value value[32];
+};
+
+static void decode_slave_2(const struct meta *m, enum config_record_values values,
+			   const struct sample_header *header, struct decoded *d)
+{
+	const uint8_t image[IMAGE_BYTES] = { 0xfc, 0xff, 7, 9 }; /* -4 */
+	struct layout *l;
+	size_t count;
+	const struct layout_topic *t;
+	uint8_t buf[256];
+	size_t len;
+	char *text;
+
+	CHECK_EQ(create_with(m, values, &l), 0);
+	t = layout_topics(l, &count);
+	len = layout_encode(&t[1], header, image, UTC_NS, buf, sizeof(buf));
+	CHECK_EQ(len, t[1].message_bytes);
+	text = layout_ros2msg(&t[1]);
+	CHECK_EQ(ros2msg_parse(text, strlen(text), &d->msg), 0);
+	CHECK_EQ(ros2msg_decode(&d->msg, buf, len, d->value), 0);
+	free(text);
+	layout_destroy(l);
+}
+
+static double decoded_number(const struct decoded *d, const char *name)
+{
+	int i = ros2msg_find(&d->msg, name);
+
+	CHECK(i >= 0);
+	return ros2msg_number(&d->msg.field[i], &d->value[i]);
+}
+
+TEST(layout, a_scaled_channel_is_recorded_as_its_unit_with_the_raw_value_beside_it)
+{
+	struct sample_header header = { .cycle = 1 };
+	struct decoded d;
+	struct meta m;
+
+	fill_scaled(&m);
+	decode_slave_2(&m, CONFIG_RECORD_BOTH, &header, &d);
+	CHECK_EQ(d.msg.count, HEAD_FIELDS + 4);
+	CHECK(decoded_number(&d, "volts") == -4 * 0.5 + 1);
+	CHECK_EQ(d.msg.field[ros2msg_find(&d.msg, "volts")].type, ROS2MSG_FLOAT);
+	CHECK(decoded_number(&d, "volts_raw") == -4);
+	CHECK(decoded_number(&d, "count") == 7);
+	CHECK(decoded_number(&d, "volts_raw_2") == 9); /* a channel that has this name */
+	ros2msg_done(&d.msg);
+}
+
+TEST(layout, only_physical_or_only_raw_values_are_recorded_where_asked_for)
+{
+	struct sample_header header = { .cycle = 1 };
+	struct decoded d;
+	struct meta m;
+
+	fill_scaled(&m);
+	decode_slave_2(&m, CONFIG_RECORD_PHYSICAL, &header, &d);
+	CHECK_EQ(d.msg.count, HEAD_FIELDS + 3);
+	CHECK(decoded_number(&d, "volts") == -1);
+	CHECK(decoded_number(&d, "volts_raw") == 9);
+	ros2msg_done(&d.msg);
+	decode_slave_2(&m, CONFIG_RECORD_RAW, &header, &d);
+	CHECK_EQ(d.msg.count, HEAD_FIELDS + 3);
+	CHECK(decoded_number(&d, "volts") == -4);
+	ros2msg_done(&d.msg);
+}
+
+TEST(layout, a_physical_value_of_a_bad_sample_is_not_a_number)
+{
+	struct sample_header header = { .slaves_bad = { { 1u << 2 } } };
+	struct decoded d;
+	struct meta m;
+
+	fill_scaled(&m);
+	decode_slave_2(&m, CONFIG_RECORD_BOTH, &header, &d);
+	CHECK(isnan(decoded_number(&d, "volts")));
+	CHECK(decoded_number(&d, "volts_raw") == -4); /* what the process image had */
+	ros2msg_done(&d.msg);
+}
+
+TEST(layout, the_list_of_channels_has_each_once_with_both_fields)
+{
+	struct layout *l;
+	struct meta m;
+	char *text;
+
+	fill_scaled(&m);
+	CHECK_EQ(create_with(&m, CONFIG_RECORD_BOTH, &l), 0);
+	text = layout_json(l);
+	CHECK(strstr(text, "\"field\":\"volts\",\"raw_field\":\"volts_raw\"") != NULL);
+	CHECK(strstr(text, "\"field\":\"count\",\"raw_field\":\"count\"") != NULL);
+	CHECK(strstr(text, "\"field\":\"volts_raw\"") == NULL);
+	free(text);
+	layout_destroy(l);
+	CHECK_EQ(create_with(&m, CONFIG_RECORD_PHYSICAL, &l), 0);
+	text = layout_json(l);
+	CHECK(strstr(text, "\"field\":\"volts\",\"raw_field\":null") != NULL);
+	free(text);
 	layout_destroy(l);
 }
 
@@ -188,10 +318,10 @@ TEST(layout, a_bad_sample_is_said_in_the_message_of_its_slave_only)
 	fill(&m);
 	CHECK_EQ(create(&m, &l), 0);
 	t = layout_topics(l, &count);
-	layout_encode(&t[0], &header, image, buf, sizeof(buf));
-	CHECK_EQ(buf[4 + 20], 1);
-	layout_encode(&t[1], &header, image, buf, sizeof(buf));
-	CHECK_EQ(buf[4 + 20], 0);
+	layout_encode(&t[0], &header, image, UTC_NS, buf, sizeof(buf));
+	CHECK_EQ(buf[4 + 36], 1);
+	layout_encode(&t[1], &header, image, UTC_NS, buf, sizeof(buf));
+	CHECK_EQ(buf[4 + 36], 0);
 	layout_destroy(l);
 }
 
@@ -209,10 +339,10 @@ TEST(layout, a_low_working_counter_does_not_make_the_other_slaves_samples_bad)
 	fill(&m);
 	CHECK_EQ(create(&m, &l), 0);
 	t = layout_topics(l, &count);
-	layout_encode(&t[0], &header, image, buf, sizeof(buf));
-	CHECK_EQ(buf[4 + 20], 1);
-	layout_encode(&t[1], &header, image, buf, sizeof(buf));
-	CHECK_EQ(buf[4 + 20], 0);
+	layout_encode(&t[0], &header, image, UTC_NS, buf, sizeof(buf));
+	CHECK_EQ(buf[4 + 36], 1);
+	layout_encode(&t[1], &header, image, UTC_NS, buf, sizeof(buf));
+	CHECK_EQ(buf[4 + 36], 0);
 	layout_destroy(l);
 }
 
@@ -234,7 +364,7 @@ TEST(layout, texts_survive_names_from_a_hostile_eeprom)
 	t = layout_topics(l, &count);
 	text = layout_ros2msg(&t[0]);
 	CHECK_EQ(ros2msg_parse(text, strlen(text), &msg), 0);
-	CHECK_EQ(msg.count, 4 + 6);
+	CHECK_EQ(msg.count, HEAD_FIELDS + 6);
 	ros2msg_done(&msg);
 	free(text);
 	text = layout_json(l);
@@ -291,7 +421,11 @@ TEST(ros2msg, flat_definitions_are_read_and_others_are_refused)
 	CHECK_EQ(parse("uint8"), -EBADMSG);
 	CHECK_EQ(parse("uint8 # a"), -EBADMSG);
 	CHECK_EQ(parse("uint8[4] a"), -ENOTSUP);
-	CHECK_EQ(parse("std_msgs/Header h"), -ENOTSUP);
+	CHECK_EQ(parse("std_msgs/Header h"), 3);
+	CHECK_EQ(parse("std_msgs/Header h\nuint8 a\n===\nMSG: std_msgs/Header\nTime x"), 4);
+	CHECK_EQ(parse("std_msgs/Header"), -EBADMSG);
+	CHECK_EQ(parse("std_msgs/Header h=1"), -ENOTSUP);
+	CHECK_EQ(parse("std_msgs/String s"), -ENOTSUP);
 	CHECK_EQ(parse("uint8 A=3"), -ENOTSUP);
 	CHECK_EQ(parse("uint8 a 3"), -ENOTSUP);
 }

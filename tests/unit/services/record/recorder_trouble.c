@@ -330,13 +330,13 @@ TEST(recorder_trouble, a_copy_that_fails_leaves_no_file)
 	CHECK_EQ(sigaction(SIGXFSZ, &ignore, &before), 0);
 	CHECK_EQ(getrlimit(RLIMIT_FSIZE, &usual), 0);
 	CHECK_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
-	CHECK_EQ(recover_copy(path, output, &outcome), -EFBIG);
+	CHECK_EQ(recover_copy(path, output, NULL, &outcome), -EFBIG);
 	CHECK_EQ(setrlimit(RLIMIT_FSIZE, &usual), 0);
 	CHECK_EQ(sigaction(SIGXFSZ, &before, NULL), 0);
 	CHECK(access(output, F_OK) < 0);
-	CHECK_EQ(recover_copy(path, output, &outcome), 0);
+	CHECK_EQ(recover_copy(path, output, NULL, &outcome), 0);
 	CHECK_EQ(outcome.result, RECOVER_COPIED);
-	CHECK_EQ(recover_copy(path, output, &outcome), -EEXIST);
+	CHECK_EQ(recover_copy(path, output, NULL, &outcome), -EEXIST);
 	CHECK_EQ(unlink(output), 0);
 	free(entries);
 	bench_done(&b);

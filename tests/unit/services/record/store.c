@@ -3,10 +3,14 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <poll.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include "base/clock.h"
 #include "harness/test.h"
 
 enum { PATH_BYTES = 256 };
@@ -101,6 +105,33 @@ TEST(store, foreign_names_are_left_alone)
 	CHECK_EQ(is_part, 7);
 }
 
+TEST(store, a_name_of_a_request_is_never_a_path)
+{
+	static const char *const names[] = {
+		"ecdaq-/../x-1.mcap", "../ecdaq-x-1.mcap",  "ecdaq-..\\x-1.mcap",
+		"ecdaq-x-1.mcap/",    "ecdaq-%2f-1.mcap",   "ecdaq-x-1.keep",
+		"ecdaq-x-1.csv",      ".ecdaq-record.lock", ""
+	};
+
+	for (size_t i = 0; i < sizeof(names) / sizeof(names[0]); i++) {
+		CHECK_EQ(store_is_name(names[i]), 0);
+	}
+	CHECK_EQ(store_is_name("ecdaq-20250101T000000Z-0a-000002.mcap"), 1);
+	CHECK_EQ(store_is_name("ecdaq-20250101T000000Z-0a-000002.part"), 1);
+	CHECK_EQ(store_is_name("ecdaq-20250101T000000Z-0a-000002.damaged"), 1);
+}
+
+TEST(store, a_name_has_the_time_at_which_the_file_was_begun)
+{
+	char name[STORE_NAME_BYTES];
+
+	store_make_name(name, INT64_C(1766000000) * NS_PER_S + 999, 7, 1);
+	CHECK_EQ(store_name_utc_s(name), 1766000000);
+	CHECK_EQ(store_name_utc_s("ecdaq-unknown-00000000-000001.mcap"), 0);
+	CHECK_EQ(store_name_utc_s("ecdaq-20250101T000000Z"), 0);
+	CHECK_EQ(store_name_utc_s("other-20250101T000000Z-1-2.mcap"), 0);
+}
+
 TEST(store, list_is_in_order_of_sequence_whatever_the_clock_said)
 {
 	char dir[PATH_BYTES];
@@ -173,6 +204,36 @@ TEST(store, only_one_recorder_holds_a_directory)
 	CHECK_EQ(store_open(dir, &s, &pid), 0);
 	close_all(s, dir);
 	CHECK(!store_is_locked(dir));
+}
+
+TEST(store, who_looks_at_the_lock_does_not_keep_a_recorder_out)
+{
+	char dir[PATH_BYTES];
+	char path[PATH_BYTES + STORE_NAME_BYTES];
+	struct store *s = open_new(dir);
+	int64_t pid = 0;
+	int ready[2];
+	char byte = 0;
+	pid_t child;
+
+	CHECK_EQ(store_path(dir, ".ecdaq-record.lock", path, sizeof(path)), 0);
+	store_close(s);
+	CHECK_EQ(pipe2(ready, O_CLOEXEC), 0);
+	child = fork();
+	if (child == 0) {
+		int fd = open(path, O_RDONLY | O_CLOEXEC);
+		int is_held = flock(fd, LOCK_SH | LOCK_NB) == 0;
+		int is_told = write(ready[1], &byte, 1) == 1;
+
+		poll(NULL, 0, 10);
+		_exit(is_held && is_told ? 0 : 1);
+	}
+	CHECK_EQ(read(ready[0], &byte, 1), 1);
+	CHECK_EQ(store_open(dir, &s, &pid), 0);
+	CHECK_EQ(waitpid(child, &(int){ 0 }, 0), child);
+	close(ready[0]);
+	close(ready[1]);
+	close_all(s, dir);
 }
 
 TEST(store, a_directory_that_cannot_be_made_is_an_error)

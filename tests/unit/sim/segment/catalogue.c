@@ -137,6 +137,7 @@ TEST(catalogue, a_wrong_line_is_named_with_what_is_wrong_in_it)
 	refused("sm 0x10000 1 0 1 inputs\n",
 		"t.txt:1: start: '0x10000' is not a number from 0 to 65535");
 	refused("mailbox 0x1000 128 0x1080 128 coe xoe\n", "t.txt:1: unknown word 'xoe'");
+	refused("unit 0xfd260000\n", "t.txt:1: a unit comes after the entry that it belongs to");
 	refused("0123456789012345678901234567890123456789012345678901234567890123\n",
 		"t.txt:1: a word has more than 63 bytes");
 }

@@ -23,6 +23,7 @@ from ecdaq.errors import (
 )
 
 if TYPE_CHECKING:
+    from ecdaq.aligned import Aligned, align
     from ecdaq.link import Channel, Channels, Link, connect
     from ecdaq.recording import Recording, read
     from ecdaq.series import Gaps, Series
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from ecdaq.table import Gap
 
 __all__ = [
+    "Aligned",
     "Channel",
     "Channels",
     "Gap",
@@ -45,6 +47,7 @@ __all__ = [
     "Series",
     "Signal",
     "SineFit",
+    "align",
     "connect",
     "fit_sine",
     "read",
@@ -53,6 +56,7 @@ __version__ = "0.1.0"
 
 # Imported when first used: reading needs no DDS, and DDS no numpy.
 _MODULES = {
+    "aligned": ("Aligned", "align"),
     "link": ("Channel", "Channels", "Link", "connect"),
     "recording": ("Recording", "read"),
     "series": ("Gaps", "Series"),

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import re
 import socket
@@ -24,6 +25,7 @@ from cyclonedds.core import (
     WaitSet,
 )
 from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.internal import DDS
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
@@ -50,6 +52,13 @@ ANY = ViewState.Any | InstanceState.Any | SampleState.Any
 TAKE_AT_ONCE = 4096
 # Below the lifespan of a command, which is 1 s.
 REPEAT_S = 0.5
+
+
+def _matched(what: str, entity: DataWriter | DataReader) -> int:
+    """How many subscriptions of a writer, publications of a reader: 0.10 has no method for it."""
+    count = DDS._dll_handle[f"dds_get_matched_{what}"]
+    count.argtypes = [ctypes.c_int32, ctypes.c_void_p, ctypes.c_size_t]
+    return count(entity._ref, None, 0)
 
 
 @dataclass(frozen=True)
@@ -323,7 +332,7 @@ class Link:
 
     def _wait_for_match(self, writer: DataWriter, replies: DataReader, seconds: float = 10) -> None:
         end = time.monotonic() + seconds
-        while not (writer.get_matched_subscriptions() and replies.get_matched_publications()):
+        while not (_matched("subscriptions", writer) and _matched("publications", replies)):
             if time.monotonic() > end:
                 raise NoAnswerError("no ecdaq-dds accepts commands in this domain")
             time.sleep(0.01)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import datetime
 import json
+import math
 import re
 import struct
 from collections.abc import Iterable
@@ -67,6 +68,13 @@ int64 step_ns  # size of the newest step of the host's clock
 uint64 steps  # number of steps so far
 int32 tai_offset_s  # TAI minus UTC; 0: unset, CLOCK_TAI is taken for UTC
 """
+SEPARATOR = "=" * 80 + "\n"
+HEADER_DEFINITIONS = (
+    f"{SEPARATOR}MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n"
+    f"{SEPARATOR}MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
+)
+# stamp, an empty frame_id, padding; cycle, dc_time_ns, flags, good
+HEAD = "<4sIIIB3xQqIB"
 CYCLE_BYTES = struct.Struct("<4sQqqqqiiiiIHHI")  # and the octets of slaves_bad
 TIMEMAP_BYTES = struct.Struct("<4sqqqqqQi")
 EVENT_BYTES = struct.Struct("<4sqqQQqiiiH")
@@ -86,17 +94,24 @@ def field_name(name: str) -> str:
     return f"n_{plain}" if plain[:1].isdigit() else plain or "unnamed"
 
 
-class Field:
-    """One channel in a slave's message."""
+def is_scaled(channel: Channel) -> bool:
+    return (channel.scale, channel.offset) != (1, 0)
 
-    def __init__(self, channel: Channel, name: str) -> None:
+
+class Field:
+    """One number in a slave's message: a channel's raw value, or its physical one."""
+
+    def __init__(self, channel: Channel, name: str, raw_name: str | None = None) -> None:
         kind, bits = re.fullmatch(r"([A-Z]+)(\d*)", channel.type).groups()  # type: ignore[union-attr]
         self.channel = channel
         self.name = name
+        self.raw_name = raw_name  # of the raw field beside a physical one; None: it is raw
         self.bits = int(bits or 1)
         self.is_signed = kind == "INT"
         size = size_of(self.bits)
-        if kind == "BOOL":
+        if raw_name is not None:
+            self.ros_type, self.letter, size = "float64", "d", 3
+        elif kind == "BOOL":
             self.ros_type, self.letter = "bool", "B"
         elif kind == "FLOAT":  # its bits, as they are
             self.ros_type, self.letter = f"float{self.bits}", UNSIGNED[size][1]
@@ -104,9 +119,32 @@ class Field:
             self.ros_type, self.letter = (SIGNED if self.is_signed else UNSIGNED)[size]
         self.bytes = 1 << size
 
-    def value(self, raw: int) -> int:
-        """The value of the field for the zero-extended bits."""
+    def value(self, sample: Any) -> int | float:
+        """What the message has; a physical value of a sample that is not good is NaN."""
+        if self.raw_name is not None:
+            return sample.values[self.channel.place] if sample.is_good else math.nan
+        raw: int = sample.raw[self.channel.place]
         return raw - (1 << self.bits) if self.is_signed and raw >> (self.bits - 1) else raw
+
+    def comment(self) -> str:
+        c = self.channel
+        found = f"{c.name}, {'output' if c.is_output else 'input'}, {self.bits} bit"
+        if self.raw_name is not None:
+            return f"{found}; {c.unit or 'physical'}"
+        if c.unit or is_scaled(c):
+            found += f"; {c.unit or 'value'} = raw * {c.scale!r} + {c.offset!r}"
+        return found
+
+    def metadata(self) -> dict[str, str]:
+        c = self.channel
+        scale, offset = (c.scale, c.offset) if self.raw_name is None else (1.0, 0.0)
+        found = {
+            f"{self.name}.channel": c.name, f"{self.name}.unit": c.unit,
+            f"{self.name}.scale": f"{scale:.17g}", f"{self.name}.offset": f"{offset:.17g}",
+        }  # fmt: skip
+        if self.raw_name is not None:
+            found[f"{self.name}.raw"] = self.raw_name
+        return found
 
 
 class SlaveTopic:
@@ -119,56 +157,54 @@ class SlaveTopic:
         self.position = position
         self.device = device
         self.fields: list[Field] = []
-        taken = {"cycle", "dc_time_ns", "flags", "good"}
-        layout, at = "<4sQqIB", 21  # bytes behind the header
+        self._taken = {"header", "cycle", "dc_time_ns", "flags", "good"}
         for channel in channels:
-            plain = unique = field_name(channel.entry)
-            number = 2
-            while unique in taken:
-                unique, number = f"{plain}_{number}", number + 1
-            taken.add(unique)
-            field = Field(channel, unique)
+            plain = field_name(channel.entry)
+            if is_scaled(channel):
+                physical, raw = self._unique(plain), self._unique(f"{plain}_raw")
+                self.fields += [Field(channel, physical, raw), Field(channel, raw)]
+            else:
+                self.fields.append(Field(channel, self._unique(plain)))
+        layout, at = HEAD, struct.calcsize(HEAD) - len(CDR_LE)
+        for field in self.fields:
             pad = -at % field.bytes
             layout += f"{pad}x{field.letter}"
             at += pad + field.bytes
-            self.fields.append(field)
         self.struct = struct.Struct(layout)
+
+    def _unique(self, name: str) -> str:
+        found, number = name, 2
+        while found in self._taken:
+            found, number = f"{name}_{number}", number + 1
+        self._taken.add(found)
+        return found
 
     def schema(self) -> str:
         lines = [
-            f"# Slave {self.name} at position {self.position}: {self.device}. Values are raw.",
+            f"# Slave {self.name} at position {self.position}: {self.device}.",
+            "std_msgs/Header header  # stamp: UTC of that edge, as the log time",
             "uint64 cycle  # index of the SYNC0 edge, one more in every message",
             "int64 dc_time_ns  # DC time of that edge, ns since 2000-01-01",
             f"uint32 flags  # as in {PACKAGE}/Cycle",
             "bool good  # fresh, and the slave's own checks hold",
+            *(f"{field.ros_type} {field.name}  # {field.comment()}" for field in self.fields),
         ]
-        for field in self.fields:
-            c = field.channel
-            way = "output" if c.is_output else "input"
-            unit = f"; {c.unit} = raw * {c.scale!r} + {c.offset!r}" if c.unit else ""
-            lines.append(
-                f"{field.ros_type} {field.name}  # {c.name}, {way}, {field.bits} bit{unit}"
-            )
-        return "\n".join(lines) + "\n"
+        return "\n".join(lines) + "\n" + HEADER_DEFINITIONS
 
     def metadata(self) -> dict[str, str]:
         found = {
             "offered_qos_profiles": "", "slave": self.name, "position": str(self.position)
         }  # fmt: skip
         for field in self.fields:
-            c = field.channel
-            found |= {
-                f"{field.name}.channel": c.name, f"{field.name}.unit": c.unit,
-                f"{field.name}.scale": f"{c.scale:.17g}",
-                f"{field.name}.offset": f"{c.offset:.17g}",
-            }  # fmt: skip
+            found |= field.metadata()
         return found
 
     def encode(self, sample: Any) -> bytes:
-        values = [f.value(r) for f, r in zip(self.fields, sample.raw, strict=True)]
+        seconds, ns = divmod(max(0, sample.utc_ns), 10**9)
         return self.struct.pack(
-            CDR_LE, sample.cycle, sample.dc_time_ns, sample.flags, sample.is_good, *values
-        )
+            CDR_LE, seconds & 0xFFFFFFFF, ns, 1, 0, sample.cycle, sample.dc_time_ns, sample.flags,
+            sample.is_good, *(field.value(sample) for field in self.fields),
+        )  # fmt: skip
 
 
 def put_string(data: bytes, text: str) -> bytes:
@@ -243,13 +279,14 @@ class McapFile:
     def _put_channels(self) -> None:
         listed = [
             {
-                "name": f.channel.name, "topic": s.topic, "field": f.name, "slave": s.position,
-                "type": f.channel.type, "direction": "output" if f.channel.is_output else "input",
-                "bit_len": f.bits, "unit": f.channel.unit, "scale": f.channel.scale,
-                "offset": f.channel.offset,
+                "name": f.channel.name, "topic": s.topic, "field": f.name,
+                "raw_field": f.raw_name or f.name, "slave": s.position, "type": f.channel.type,
+                "direction": "output" if f.channel.is_output else "input", "bit_len": f.bits,
+                "unit": f.channel.unit, "scale": f.channel.scale, "offset": f.channel.offset,
             }
             for s in self.slaves
             for f in s.fields
+            if f.raw_name is not None or not is_scaled(f.channel)
         ]  # fmt: skip
         slaves = [{"name": s.name, "device": s.device, "position": s.position} for s in self.slaves]
         fields = {"period_ns": self.channels.period_ns, "slaves": slaves, "channels": listed}

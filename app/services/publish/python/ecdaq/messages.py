@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -35,7 +35,8 @@ class Channel:
     unit: str
     scale: float  # value = field * scale + offset
     offset: float
-    raw_field: str  # with the bits of the process image: another one where the field is physical
+    # With the bits of the process image: another one where the field is physical; None: not there.
+    raw_field: str | None
 
     @property
     def is_integer(self) -> bool:
@@ -110,7 +111,8 @@ class RecordedFile(McapFile):
             raise RecordingError(self.name, f"{topic.name} {field}: {error}") from error
         unit = of_field(f"{field}.unit", "")
         name = of_field(f"{field}.channel", field)
-        return Channel(name, slave, field, kind, unit, scale, offset, field)
+        raw = of_field(f"{field}.raw", field) or None
+        return Channel(name, slave, field, kind, unit, scale, offset, raw)
 
     def topic_of(self, slave: str) -> Topic | None:
         """The topic of a slave's samples."""
@@ -177,17 +179,12 @@ class RecordedFile(McapFile):
 
 
 def physical(channels: list[Channel]) -> list[Channel]:
-    """Each channel once: of two fields of one channel the floating point number is its value, and
-    the other one is raw."""
-    by_name: dict[str, list[Channel]] = {}
+    """Each channel once. Of two fields of one channel the physical one is first and names the raw
+    one."""
+    found: dict[str, Channel] = {}
     for channel in channels:
-        by_name.setdefault(channel.name, []).append(channel)
-    found = []
-    for same in by_name.values():
-        value = next((c for c in same if c.type.startswith("float")), same[0])
-        raw = next((c for c in same if c is not value), value)
-        found.append(replace(value, raw_field=raw.field))
-    return found
+        found.setdefault(channel.name, channel)
+    return list(found.values())
 
 
 def native(column: np.ndarray) -> np.ndarray:

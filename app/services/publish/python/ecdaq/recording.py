@@ -261,9 +261,19 @@ class Recording:
             topic = file.topic_of(slave)
             if topic is not None:
                 chosen = [c for c in file.channels if c.slave == slave and c.name in names]
-                fields = [c.raw_field if self._raw else c.field for c in chosen]
+                fields = [self._field(file, c) for c in chosen]
                 found[topic.id] = [f for f in COMMON if f != "flags"] + fields
         return found
+
+    def _field(self, file: RecordedFile, channel: Channel) -> str:
+        """The field of the message that has the values asked for."""
+        if not self._raw:
+            return channel.field
+        if channel.raw_field is None:
+            raise RecordingError(
+                file.name, f"{channel.name} was recorded as physical values only (record.values)"
+            )
+        return channel.raw_field
 
     def _selected(self, file: RecordedFile) -> tuple[int, int]:
         """From which chunk of @file to before which there may be what is selected."""
@@ -334,8 +344,10 @@ class Recording:
         """The channels of @part by their names, as physical values."""
         found = {name: part[name] for name in (TIME, "cycle", "dc_time_ns", "good")}
         for channel in file.channels:
-            field = channel.raw_field if self._raw else channel.field
-            if channel.slave == slave and field in part and channel.name in self.units:
+            if channel.slave != slave or channel.name not in self.units:
+                continue
+            field = self._field(file, channel)
+            if field in part:
                 found[channel.name] = part[field] if self._raw else channel.value(part[field])
         return found
 

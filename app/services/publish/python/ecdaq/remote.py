@@ -81,7 +81,7 @@ def with_progress(link: Link, seconds: float | None) -> Iterator[SampleV1]:
 
 
 def header(channels: Channels, slave: int) -> list[str]:
-    names = [c.entry for c in channels.of_slave(slave)]
+    names = [f"{c.entry} [{c.unit}]" if c.unit else c.entry for c in channels.of_slave(slave)]
     return ["cycle", "dc_time_ns", "utc_ns", "flags", "is_good", *names]
 
 
@@ -107,7 +107,10 @@ def record_csv(link: Link, options: argparse.Namespace) -> int:
     finally:
         for file, count in zip(files, rows, strict=True):
             file.close()
-            print(f"{file.name}: {count} samples, {count * period_s:.1f} s", flush=True)
+            size = Path(file.name).stat().st_size
+            print(
+                f"{file.name}: {count} samples, {count * period_s:.1f} s, {size} bytes", flush=True
+            )
     return report_gaps(link)
 
 

@@ -4,32 +4,7 @@
 #include <inttypes.h>
 
 #include "../description.h"
-
-void fb1111_piccolo_esi_text(FILE *out, const char *text)
-{
-	for (; *text != '\0'; text++) {
-		switch (*text) {
-		case '&':
-			fputs("&amp;", out);
-			break;
-		case '<':
-			fputs("&lt;", out);
-			break;
-		case '>':
-			fputs("&gt;", out);
-			break;
-		case '"':
-			fputs("&quot;", out);
-			break;
-		case '\'':
-			fputs("&apos;", out);
-			break;
-		default:
-			fputc(*text, out);
-			break;
-		}
-	}
-}
+#include "base/xml_text.h"
 
 const char *fb1111_piccolo_esi_type(unsigned type)
 {
@@ -55,7 +30,7 @@ const char *fb1111_piccolo_esi_type(unsigned type)
 static void element(FILE *out, const char *indent, const char *name, const char *text)
 {
 	fprintf(out, "%s<%s>", indent, name);
-	fb1111_piccolo_esi_text(out, text);
+	xml_text_put(out, text);
 	fprintf(out, "</%s>\n", name);
 }
 
@@ -158,9 +133,9 @@ static void put_device(FILE *out)
 	fprintf(out,
 		"        <Type ProductCode=\"#x%08" PRIX32 "\" RevisionNo=\"#x%08" PRIX32 "\">",
 		PICCOLO_PRODUCT_CODE, PICCOLO_REVISION);
-	fb1111_piccolo_esi_text(out, d->order);
+	xml_text_put(out, d->order);
 	fputs("</Type>\n        <Name LcId=\"1033\">", out);
-	fb1111_piccolo_esi_text(out, d->name);
+	xml_text_put(out, d->name);
 	fputs("</Name>\n", out);
 	element(out, "        ", "GroupType", d->group);
 	fputs("        <Profile>\n          <ProfileNo>5001</ProfileNo>\n", out);

@@ -11,9 +11,6 @@ void fb1111_piccolo_esi(FILE *out);
 /** The <Dictionary> element of it. */
 void fb1111_piccolo_esi_dictionary(FILE *out);
 
-/** @text with the five characters of XML escaped. */
-void fb1111_piccolo_esi_text(FILE *out, const char *text);
-
 /** "UINT" and so on; "" for padding. */
 const char *fb1111_piccolo_esi_type(unsigned type);
 

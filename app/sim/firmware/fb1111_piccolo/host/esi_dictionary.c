@@ -3,6 +3,7 @@
 #include <inttypes.h>
 
 #include "../objects.h"
+#include "base/xml_text.h"
 #include "esi.h"
 
 /* Objects are read from a firmware that was just powered on, so defaults are what it really
@@ -86,7 +87,7 @@ static void put_record_type(FILE *out, const struct piccolo_object *first, unsig
 			"                <SubItem>\n                  <SubIdx>%u</SubIdx>\n"
 			"                  <Name>",
 			(unsigned)first[i].subindex);
-		fb1111_piccolo_esi_text(out, i == 0 ? "SubIndex 000" : first[i].name);
+		xml_text_put(out, i == 0 ? "SubIndex 000" : first[i].name);
 		fputs("</Name>\n                  <Type>", out);
 		put_type(out, &first[i]);
 		fprintf(out,
@@ -146,7 +147,7 @@ static void put_object(FILE *out, const struct piccolo_object *first, unsigned c
 		"              <Object>\n                <Index>#x%04X</Index>\n"
 		"                <Name>",
 		(unsigned)first->index);
-	fb1111_piccolo_esi_text(out, first->name);
+	xml_text_put(out, first->name);
 	fputs("</Name>\n                <Type>", out);
 	if (count > 1) {
 		fprintf(out, "DT%04X</Type>\n                <BitSize>%u</BitSize>\n",
@@ -154,7 +155,7 @@ static void put_object(FILE *out, const struct piccolo_object *first, unsigned c
 		fputs("                <Info>\n", out);
 		for (unsigned i = 0; i < count; i++) {
 			fputs("                  <SubItem><Name>", out);
-			fb1111_piccolo_esi_text(out, i == 0 ? "SubIndex 000" : first[i].name);
+			xml_text_put(out, i == 0 ? "SubIndex 000" : first[i].name);
 			fputs("</Name>", out);
 			put_default(out, &first[i]);
 			fputs("</SubItem>\n", out);

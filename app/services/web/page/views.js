@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+// The views State and Channels.
+import { format } from "./picture.js";
+import { button, row, set_level, set_text } from "./table.js";
+
+const by_id = (id) => document.getElementById(id);
+
+export class StateView {
+  show(state) {
+    set_text(by_id("word"), state.word);
+    set_level(by_id("word"), state.level);
+    set_text(by_id("sentence"), state.sentence);
+    const rows = by_id("rows");
+    while (rows.children.length > state.rows.length) {
+      rows.lastChild.remove();
+    }
+    state.rows.forEach(({ name, value, level }, i) => {
+      const line = rows.children[i] ?? rows.appendChild(row("", ""));
+      set_text(line.children[0], name);
+      set_text(line.children[1], value);
+      set_level(line.children[1], level);
+    });
+  }
+}
+
+export class ChannelsView {
+  constructor(on_scope) {
+    this.on_scope = on_scope;
+    this.lines = [];
+    by_id("channel-filter").addEventListener("input", () => this.filter());
+  }
+
+  set_table(table) {
+    this.lines = table.channels.map((channel, i) => {
+      const line = row(channel.name, "", channel.unit, "", button("+", `${channel.name} in the scope`, () => this.on_scope(i)));
+      line.children[1].className = "number";
+      return line;
+    });
+    this.names = table.channels.map((channel) => channel.name.toLowerCase());
+    by_id("channel-rows").replaceChildren(...this.lines);
+    this.filter();
+  }
+
+  filter() {
+    const wanted = by_id("channel-filter").value.toLowerCase();
+    this.lines.forEach((line, i) => {
+      line.hidden = !this.names[i].includes(wanted);
+    });
+  }
+
+  show({ cycle, values }) {
+    set_text(by_id("channel-cycle"), `cycle ${cycle}`);
+    values.forEach((value, i) => {
+      const cells = this.lines[i]?.children;
+      if (cells) {
+        set_text(cells[1], format(value));
+        set_text(cells[3], value === null ? "not good" : "good");
+        set_level(cells[3], value === null ? "bad" : "good");
+      }
+    });
+  }
+}

@@ -1,0 +1,148 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""Measure ecdaq beside other masters, on this machine, and write app/doc/results/peers.md.
+
+Called by `build.sh bench`, which has built everything.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NoReturn
+
+ROOT = Path(__file__).resolve().parents[2]
+SLAVES_MOST = 128  # what the loops have room for
+CYCLES_MOST = 50000  # what the sample ring holds
+
+HELP = """\
+Runs ecdaq, SOEM, pysoem and EtherCrab in turns on a simulated segment in a network namespace of
+its own, beside cyclictest and the echo of a raw packet, and writes what it found to
+app/doc/results/peers.md: wake latency, interval, round trip, cycles lost per lost frame, rate,
+SYNC0 spread, time to OP, instructions and system calls a cycle. Masters that cannot take part and
+figures that cannot be had are listed there with the reason. The masters come from their
+registries, once, into ~/.cache/ecdaq/. About 15 minutes; run it on an idle machine.
+
+Instructions of the cycle and of a recorded sample, and DDS: cycle, record and dds of
+./build.sh help measure.
+"""
+
+
+class Parser(argparse.ArgumentParser):
+    """One line for a wrong call."""
+
+    def error(self, message: str) -> NoReturn:
+        print(f"build.sh: bench: {message}", file=sys.stderr)
+        sys.exit(2)
+
+
+def number(least: int, most: int) -> object:
+    def read(text: str) -> int:
+        if not text.isascii() or not text.isdigit() or not least <= int(text) <= most:
+            raise argparse.ArgumentTypeError(f"'{text}' is not a number from {least} to {most}")
+        return int(text)
+
+    return read
+
+
+def numbers(text: str) -> list[int]:
+    read = number(1, SLAVES_MOST)
+    return [read(word) for word in text.split(",")]  # type: ignore[operator]
+
+
+def interface(text: str) -> str:
+    if not (Path("/sys/class/net") / text).exists() or "/" in text or not text:
+        raise argparse.ArgumentTypeError(f"'{text}': no such network interface")
+    return text
+
+
+def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
+    parser = Parser(
+        prog="./build.sh bench",
+        usage="./build.sh bench peers [OPTION...]",
+        description=HELP,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("what", metavar="peers", nargs="?", help="what to measure")
+    parser.add_argument(
+        "--slaves", type=numbers, metavar="N,...", help="FB1111-Piccolos (default: 2,16,64)"
+    )
+    parser.add_argument(
+        "--cycles", type=number(100, CYCLES_MOST), default=4000, metavar="N",
+        help="of 1 ms in each run (default: 4000)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--rounds", type=number(1, 100), default=2, metavar="N",
+        help="how often each master has its turn (default: 2)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--interface", type=interface, metavar="IF",
+        help="a network interface of this machine with real slaves on it, instead of the simulated "
+        "segment. They are led to OP, with all outputs 0; as root",
+    )  # fmt: skip
+    parser.add_argument("--json", type=Path, metavar="FILE", help="the same for programs")
+    parser.add_argument(
+        "--page", type=Path, metavar="FILE", help="write the page there, and no list of pages"
+    )
+    # build.sh calls this before it prepares anything.
+    parser.add_argument("--check", action="store_true", help=argparse.SUPPRESS)
+    options = parser.parse_args(arguments)
+    if options.what != "peers":
+        parser.error("name what to measure: peers" if options.what is None
+                     else f"no subject '{options.what}'; there are: peers")  # fmt: skip
+    if options.interface and options.slaves:
+        parser.error("--interface and --slaves exclude each other")
+    if options.interface and os.geteuid() != 0:
+        parser.error("--interface: only as root")
+    return options
+
+
+def measure(options: argparse.Namespace, arguments: Sequence[str]) -> int:
+    from bench.page import lines_of
+    from bench.rounds import Bench, Plan, write_json
+    from bench.running import programs_are_there
+    from foreign import Unavailable
+    from measure.page import NotMeasuredError, commit, machine, write_index, write_page
+    from measure.subjects import PAGES, PEERS
+
+    slaves = [0] if options.interface else options.slaves or [2, 16, 64]
+    try:
+        programs_are_there()
+        bench = Bench(Plan(slaves, options.cycles, options.rounds, options.interface))
+    except (Unavailable, PermissionError) as why:
+        print(f"build.sh: bench: {why}", file=sys.stderr)
+        return 1
+    command = " ".join(["./build.sh bench", *arguments])
+
+    def run(_: Path) -> list[str]:
+        at = commit(ROOT)
+        bench.run()
+        if options.json:
+            head = {"command": command, "commit": at, "machine": machine()}
+            write_json(options.json, bench, head)
+        return lines_of(bench)
+
+    try:
+        # The page has the commit from before the run.
+        subject = replace(PEERS, commands=(command,), measure=run)
+        page = write_page(ROOT, subject, options.page)
+    except NotMeasuredError as why:
+        print(f"build.sh: bench: {why}; {bench.first_reason()}", file=sys.stderr)
+        return 1
+    if not options.page:
+        write_index(ROOT, PAGES)
+    print(f"peers: wrote {page}", flush=True)
+    return 0
+
+
+def main(arguments: Sequence[str]) -> int:
+    options = parse_arguments(arguments)
+    return 0 if options.check else measure(options, arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
