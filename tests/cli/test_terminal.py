@@ -212,17 +212,15 @@ SLOW_VIEW = """#!{python}
 import os, signal, sys, time
 if sys.argv[1] != "top":
     os.execv("{ecdaq}", ["ecdaq", *sys.argv[1:]])
-def suspend(number, frame):
-    signal.signal(signal.SIGTSTP, signal.SIG_IGN)
+KEYS = {{signal.SIGTSTP, signal.SIGINT}}
+# Blocked: a key between two statements waits for sigwait(), where a handler would miss it.
+signal.pthread_sigmask(signal.SIG_BLOCK, KEYS)
+print("view runs", flush=True)
+while signal.sigwait(KEYS) == signal.SIGTSTP:
     time.sleep(1)
     print("view stops", flush=True)
     os.kill(os.getpid(), signal.SIGSTOP)
-    signal.signal(signal.SIGTSTP, suspend)
     print("view continues", flush=True)
-signal.signal(signal.SIGTSTP, suspend)
-print("view runs", flush=True)
-while True:
-    signal.pause()
 """
 
 
