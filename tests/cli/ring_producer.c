@@ -7,12 +7,13 @@
  *
  * usage: test_ring_producer RUN_DIR --cycles N [--pace] [--first N] [--skip FROM:COUNT] [--depth N]
  *        [--no-close] [--wait] [--events N] [--bad N] [--lost N] [--losses N] [--tai NS]
+ *        [--session N]
  * --pace: one sample each millisecond; otherwise at once. --skip: cycle numbers with no sample.
  * --no-close: leave the ring open, as after a crash. --wait: end when standard input does. --bad:
  * in every Nth cycle, from 0, the sample of the last slave is bad. --lost: in every Nth the frame
  * is lost. --events: so many, each 100 cycles after the one before. --losses: then so many of lost
  * frames, 100 ms apart. --tai: CLOCK_TAI
- * of the first sample's edge; otherwise now.
+ * of the first sample's edge; otherwise now. --session: its number; otherwise CLOCK_TAI now.
  */
 #include <errno.h>
 #include <inttypes.h>
@@ -53,7 +54,8 @@ struct arguments {
 	uint64_t depth;
 	uint64_t events;
 	uint64_t bad_every;
-	uint64_t tai_ns; /* 0: now */
+	uint64_t tai_ns;  /* 0: now */
+	uint64_t session; /* 0: now */
 	uint64_t lost_every;
 	uint64_t losses;
 	int has_pace;
@@ -91,6 +93,8 @@ static int parse_arguments(int argc, char **argv, struct arguments *a)
 			a->bad_every = strtoull(argv[++i] != NULL ? value : "", NULL, 10);
 		} else if (strcmp(argv[i], "--tai") == 0) {
 			a->tai_ns = strtoull(argv[++i] != NULL ? value : "", NULL, 10);
+		} else if (strcmp(argv[i], "--session") == 0) {
+			a->session = strtoull(argv[++i] != NULL ? value : "", NULL, 10);
 		} else if (strcmp(argv[i], "--losses") == 0) {
 			a->losses = strtoull(argv[++i] != NULL ? value : "", NULL, 10);
 		} else if (strcmp(argv[i], "--lost") == 0) {
@@ -130,7 +134,7 @@ static void add_channel(struct meta *m, unsigned n, const char *name, unsigned s
 	}
 }
 
-static void describe(struct meta *m, int64_t tai_ns)
+static void describe(struct meta *m, uint64_t session)
 {
 	unsigned n = 0;
 
@@ -141,7 +145,7 @@ static void describe(struct meta *m, int64_t tai_ns)
 				      .output_bytes = 1,
 				      .tai_offset_s = 0,
 				      .period_ns = PERIOD_NS,
-				      .session = (uint64_t)tai_ns } };
+				      .session = session } };
 	for (unsigned s = 0; s < SLAVES; s++) {
 		struct slave_info *info = &m->slave[s];
 		unsigned base = 8 * (1 + s * SLAVE_BYTES);
@@ -271,7 +275,7 @@ int main(int argc, char **argv)
 		fprintf(stderr, "test_ring_producer: see the top of ring_producer.c\n");
 		return 2;
 	}
-	describe(&meta, platform_posix().tai_ns(NULL));
+	describe(&meta, a.session != 0 ? a.session : (uint64_t)platform_posix().tai_ns(NULL));
 	if (make_ring(a.run_dir, CONFIG_RUN_EVENTS,
 		      (struct ring_spec){ .kind = "event",
 					  .payload_bytes = sizeof(struct event),

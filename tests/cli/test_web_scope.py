@@ -310,7 +310,7 @@ def test_a_channel_is_drawn_with_its_scale_and_offset_and_measured_without(
     browser = open_scope(bench, web, make_browser)
     browser.value(f"location.hash = '#scope?c={ADC},{ADC1}&w=2&y=0.1:2,1:0'")
     browser.wait_for("document.querySelectorAll('#scope-rows tr').length === 2")
-    # Until the next picture the canvas shows the one before, in which the sine takes all of the height.
+    # Until the next picture the canvas shows the one before: there the sine takes all of it.
     span = f"""(() => {{
       const rows = {CURVE}.filter((row) => row !== null);
       const height = document.querySelector('#scope-canvas').height - 32;

@@ -55,7 +55,7 @@ MODULES: dict[str, dict[str, set[str]]] = {
         "sync0": READERS,
         "web": READERS
         | {"record/layout.h", "record/messages.h"}
-        | {"record/file_io.h", "record/overview.h", "record/store.h"}
+        | {"record/envelope.h", "record/file_io.h", "record/overview.h", "record/store.h"}
         | {"wire/al.h"},
         "stream": READERS
         | {"record/layout.h", "record/messages.h"}

@@ -391,8 +391,7 @@ uint64_t columns_row_cycle(const struct columns *c)
 	return c->row.cycle;
 }
 
-/* As RFC 4180 has it. */
-static void put_csv_text(FILE *out, const char *text)
+void columns_put_csv_text(FILE *out, const char *text)
 {
 	if (strpbrk(text, ",\"\r\n") == NULL) {
 		fputs(text, out);
@@ -418,7 +417,7 @@ void columns_put_header(const struct columns *c, FILE *out)
 		snprintf(title, sizeof(title), col->unit[0] != '\0' ? "%s [%s]" : "%s", col->name,
 			 col->unit);
 		fputc(',', out);
-		put_csv_text(out, title);
+		columns_put_csv_text(out, title);
 	}
 	fputc('\n', out);
 }
@@ -435,17 +434,28 @@ static void put_real(const struct columns *c, double value, FILE *out)
 	}
 }
 
+/* The value is the number of its field: it has no scale and no offset. */
+static int is_plain(const struct columns *c, const struct column *col)
+{
+	return c->is_raw || (col->scale == 1 && col->offset == 0);
+}
+
+static double number_of(const struct columns *c, const struct column *col)
+{
+	const struct topic *t = &c->topic[col->topic];
+	double number = ros2msg_number(&t->msg.field[col->field], &t->value[col->field]);
+
+	return is_plain(c, col) ? number : number * col->scale + col->offset;
+}
+
 static void put_value(const struct columns *c, const struct column *col, FILE *out)
 {
 	const struct topic *t = &c->topic[col->topic];
 	const struct ros2msg_field *field = &t->msg.field[col->field];
 	const struct ros2msg_value *value = &t->value[col->field];
-	int is_plain = c->is_raw || (col->scale == 1 && col->offset == 0);
 
-	if (!is_plain || field->type == ROS2MSG_FLOAT) {
-		double number = ros2msg_number(field, value);
-
-		put_real(c, is_plain ? number : number * col->scale + col->offset, out);
+	if (!is_plain(c, col) || field->type == ROS2MSG_FLOAT) {
+		put_real(c, number_of(c, col), out);
 	} else if (field->type == ROS2MSG_INT) {
 		fprintf(out, "%" PRId64, (int64_t)value->raw);
 	} else if (field->type == ROS2MSG_BOOL && c->format == LOG_JSON) {
@@ -462,6 +472,35 @@ static int has_value(const struct columns *c, const struct column *col)
 
 	return t->is_fresh &&
 	       (c->is_raw || col->field == t->good_field || t->value[t->good_field].raw != 0);
+}
+
+size_t columns_count(const struct columns *c)
+{
+	return c->column_count;
+}
+
+const char *columns_name(const struct columns *c, size_t i)
+{
+	return c->column[i].name;
+}
+
+const char *columns_unit(const struct columns *c, size_t i)
+{
+	return c->column[i].unit;
+}
+
+int columns_is_channel(const struct columns *c, size_t i)
+{
+	return c->column[i].field != c->topic[c->column[i].topic].good_field;
+}
+
+int columns_number(const struct columns *c, size_t i, double *ret)
+{
+	if (!has_value(c, &c->column[i])) {
+		return 0;
+	}
+	*ret = number_of(c, &c->column[i]);
+	return 1;
 }
 
 static void put_json_row(const struct columns *c, FILE *out)

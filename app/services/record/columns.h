@@ -39,6 +39,17 @@ int columns_take(struct columns *c, const struct mcap_item *item);
 int columns_has_row(const struct columns *c);
 uint64_t columns_row_cycle(const struct columns *c);
 
+/** How many there are, once they are frozen; name and unit ("" without one) of each; whether it is
+ * of a channel, or says if the slave's sample is good. */
+size_t columns_count(const struct columns *c);
+const char *columns_name(const struct columns *c, size_t i);
+const char *columns_unit(const struct columns *c, size_t i);
+int columns_is_channel(const struct columns *c, size_t i);
+/** The value of column @i in the row, as it is put. 0: the cell is empty. */
+int columns_number(const struct columns *c, size_t i, double *ret);
+
+/** @text as a field of a CSV line (RFC 4180). */
+void columns_put_csv_text(FILE *out, const char *text);
 /** The names as one CSV line, "piccolo0.adc [V]"; the row gathered, as a CSV line or a JSON object.
  */
 void columns_put_header(const struct columns *c, FILE *out);

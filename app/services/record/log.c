@@ -19,6 +19,8 @@ struct arguments {
 	const char *run_dir; /* a global option of ecdaq: accepted, not used */
 	const char *output;
 	struct log_export_options export;
+	uint64_t session;
+	uint64_t rows;
 	int is_json;
 	int is_progress;
 };
@@ -28,10 +30,12 @@ enum {
 	TAKES_ALL = 0,
 	TAKES_DIR = 1 << 0,
 	TAKES_OUTPUT = 1 << 1,
-	TAKES_EXPORT = 1 << 2,
+	TAKES_CHANNELS = 1 << 2,
+	TAKES_RAW = 1 << 3,
+	TAKES_ENVELOPE = 1 << 4,
 };
 
-enum { OPTIONS = 10 };
+enum { OPTIONS = 12 };
 
 static const char program[] = "ecdaq: log";
 
@@ -44,6 +48,8 @@ static void help(FILE *out)
 	      "       ecdaq log export [--dir DIR | FILE-OR-DIR...] [--channels NAME,...] [--from "
 	      "CYCLE]\n"
 	      "                        [--to CYCLE] [--raw] [--output FILE] [--json]\n"
+	      "       ecdaq log envelope [--dir DIR] [--session NUMBER] [--channels NAME,...]\n"
+	      "                        [--from CYCLE] [--to CYCLE] [--rows N] [--json]\n"
 	      "       ecdaq log ros2pkg FILE... [--output DIR]\n"
 	      "\n"
 	      "  list     the recordings: start, duration, cycles, size, state\n"
@@ -56,6 +62,9 @@ static void help(FILE *out)
 	      "  export   a table with one row per cycle, as CSV (pandas.read_csv reads it); "
 	      "columns as\n"
 	      "           NAME [UNIT]\n"
+	      "  envelope least, greatest, mean and RMS value of each channel in each of N parts "
+	      "of a\n"
+	      "           session: a day in a moment\n"
 	      "  ros2pkg  the ROS 2 package with the recording's message types, for ros2 bag "
 	      "play\n"
 	      "\n"
@@ -63,6 +72,8 @@ static void help(FILE *out)
 	      "  --config FILE    ecdaq.yaml, for record.dir\n"
 	      "  --channels LIST  only these, as `ecdaq channels` names them\n"
 	      "  --from, --to     first and last cycle\n"
+	      "  --session NUMBER of the recordings (ecdaq log info; default: the newest one)\n"
+	      "  --rows N         parts, 1 to 65536 (default: 1000)\n"
 	      "  --raw            raw values (default: physical)\n"
 	      "  --output FILE    file to write (export: default is standard output; ros2pkg: the "
 	      "new\n"
@@ -96,10 +107,12 @@ static size_t select_options(unsigned takes, struct arguments *a, struct args_op
 		{ TAKES_ALL, { "progress", 0, args_flag, &a->is_progress, NULL, NULL } },
 		{ TAKES_DIR, { "dir", 0, args_text, &a->dir, "DIR", NULL } },
 		{ TAKES_OUTPUT, { "output", 0, args_text, &a->output, "FILE", NULL } },
-		{ TAKES_EXPORT, { "channels", 0, args_text, &a->export.channels, "LIST", NULL } },
-		{ TAKES_EXPORT, { "from", 0, args_cycle, &a->export.from, "CYCLE", NULL } },
-		{ TAKES_EXPORT, { "to", 0, args_cycle, &a->export.to, "CYCLE", NULL } },
-		{ TAKES_EXPORT, { "raw", 0, args_flag, &a->export.is_raw, NULL, NULL } },
+		{ TAKES_CHANNELS, { "channels", 0, args_text, &a->export.channels, "LIST", NULL } },
+		{ TAKES_CHANNELS, { "from", 0, args_cycle, &a->export.from, "CYCLE", NULL } },
+		{ TAKES_CHANNELS, { "to", 0, args_cycle, &a->export.to, "CYCLE", NULL } },
+		{ TAKES_RAW, { "raw", 0, args_flag, &a->export.is_raw, NULL, NULL } },
+		{ TAKES_ENVELOPE, { "session", 0, args_cycle, &a->session, "NUMBER", NULL } },
+		{ TAKES_ENVELOPE, { "rows", 0, args_cycle, &a->rows, "N", NULL } },
 	};
 	size_t count = 0;
 
@@ -218,6 +231,27 @@ static int run_export(const struct arguments *a, char **operands, int count)
 	return r;
 }
 
+static int run_envelope(const struct arguments *a, char **operands, int count)
+{
+	char dir[PATH_MAX];
+	const struct log_envelope_options options = { .dir = dir,
+						      .channels = a->export.channels,
+						      .session = a->session,
+						      .from = a->export.from,
+						      .to = a->export.to,
+						      .rows = a->rows,
+						      .format = format_of(a) };
+	int r;
+
+	(void)operands;
+	(void)count;
+	if (a->rows < 1 || a->rows > LOG_ENVELOPE_ROWS) {
+		return usage("--rows: is not 1 to 65536");
+	}
+	r = find_dir(a, dir, sizeof(dir));
+	return r != EXIT_CODE_OK ? r : log_envelope(&options, stdout, stderr);
+}
+
 static int run_ros2pkg(const struct arguments *a, char **operands, int count)
 {
 	return log_ros2pkg((const char *const *)operands, (size_t)count,
@@ -236,7 +270,9 @@ static const struct command {
 	{ "info", 0, 1, 1, "FILE", run_info },
 	{ "check", TAKES_DIR, 0, INT_MAX, "", run_check },
 	{ "recover", TAKES_OUTPUT, 1, 1, "FILE", run_recover },
-	{ "export", TAKES_DIR | TAKES_OUTPUT | TAKES_EXPORT, 0, INT_MAX, "", run_export },
+	{ "export", TAKES_DIR | TAKES_OUTPUT | TAKES_CHANNELS | TAKES_RAW, 0, INT_MAX, "",
+	  run_export },
+	{ "envelope", TAKES_DIR | TAKES_CHANNELS | TAKES_ENVELOPE, 0, 0, "", run_envelope },
 	{ "ros2pkg", TAKES_OUTPUT, 1, INT_MAX, "FILE", run_ros2pkg },
 };
 
@@ -264,14 +300,16 @@ static int run_command(const struct command *command, struct arguments *a, const
 
 int log_main(int argc, char **argv)
 {
-	struct arguments a = { .export = { .to = UINT64_MAX } };
+	struct arguments a = { .export = { .to = UINT64_MAX }, .rows = 1000 };
 	struct args_option options[OPTIONS];
-	struct args args = { .options = options,
-			     .option_count = select_options(TAKES_ALL, &a, options),
-			     .operands_min = 1,
-			     .operands_usage =
-				     "command: list, info, check, recover, export or ros2pkg",
-			     .ends_at_operand = 1 };
+	struct args args = {
+		.options = options,
+		.option_count = select_options(TAKES_ALL, &a, options),
+		.operands_min = 1,
+		.operands_usage =
+			"command: list, info, check, recover, export, envelope or ros2pkg",
+		.ends_at_operand = 1
+	};
 	char error[ARGS_ERROR_BYTES];
 	int code;
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What people do with recordings: `ecdaq log list|info|check|recover|export|ros2pkg`. Context:
- * blocking.
+ * What people do with recordings: `ecdaq log list|info|check|recover|export|envelope|ros2pkg`.
+ * Context: blocking.
  */
 #ifndef RECORD_LOG_H
 #define RECORD_LOG_H
@@ -46,6 +46,27 @@ struct log_export_options {
 	int is_raw;             /* values as on the wire; else physical */
 	enum log_format format; /* CSV, or a JSON object a line */
 };
+
+struct log_envelope_options {
+	const char *dir;
+	const char *channels; /* as above */
+	uint64_t session;     /* 0: the newest one */
+	uint64_t from;        /* cycles, both included */
+	uint64_t to;          /* UINT64_MAX: what there is */
+	uint64_t rows;        /* 1 to LOG_ENVELOPE_ROWS */
+	enum log_format format;
+};
+
+enum {
+	LOG_ENVELOPE_ROWS = 65536,
+	LOG_ENVELOPE_CELLS = 1 << 23, /* rows times channels */
+};
+#define LOG_ENVELOPE_CYCLES (UINT64_C(1) << 48) /* so many times so many rows are a number */
+
+/** A table with so many rows for the samples of a session: least, greatest, mean and RMS value of
+ * each channel in each. Rows of a second or more are made of whole seconds, which were counted when
+ * they were recorded (record/envelope.h). */
+int log_envelope(const struct log_envelope_options *options, FILE *out, FILE *err);
 
 /** The samples of @options->paths as a table, a row a cycle. */
 int log_export(const struct log_export_options *options, FILE *out, FILE *err);

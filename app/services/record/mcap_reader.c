@@ -446,6 +446,17 @@ int mcap_reader_next(struct mcap_reader *r, struct mcap_item *ret_item)
 	return 1;
 }
 
+void mcap_reader_seek(struct mcap_reader *r, uint64_t offset)
+{
+	r->offset = offset;
+	r->sound_end = offset;
+	r->inner = NULL;
+	r->has_ended = 0;
+	r->has_pending_end = 0;
+	r->has_bad_magic = 0;
+	r->has_damage = 1; /* r->data_crc is of something else now */
+}
+
 uint32_t mcap_reader_data_crc(const struct mcap_reader *r)
 {
 	return r->data_crc;

@@ -28,6 +28,10 @@ void mcap_reader_destroy(struct mcap_reader *r);
 /** The next item: 1; 0 at the end of the section or of the file; -errno of the I/O, -ENOMEM. */
 int mcap_reader_next(struct mcap_reader *r, struct mcap_item *ret_item);
 
+/** The next item is the record at @offset, where one must begin. The CRC of the whole section is
+ * not checked after that. */
+void mcap_reader_seek(struct mcap_reader *r, uint64_t offset);
+
 /** CRC of all bytes from the start of the file to the end of the newest top-level record (a data
  * end is not counted in). Meaningful as long as there was no damage. */
 uint32_t mcap_reader_data_crc(const struct mcap_reader *r);

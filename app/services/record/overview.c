@@ -7,11 +7,9 @@
 
 #include "base/bytes.h"
 #include "record/mcap_parse.h"
+#include "record/mcap_places.h"
 
 enum {
-	TAIL_BYTES = MCAP_FOOTER_BYTES + MCAP_MAGIC_BYTES,
-	OFFSET_BYTES = MCAP_HEAD_BYTES + 1 + 8 + 8,     /* of a summary offset */
-	OFFSETS_LIMIT_BYTES = 4096,                     /* of them; there are seven kinds */
 	TIMES_AT = MCAP_HEAD_BYTES + 8 + 2 + 4 * 4,     /* in the statistics */
 	STATISTICS_BYTES = TIMES_AT + 16,               /* that are read of them */
 	INDEX_HEAD_BYTES = MCAP_HEAD_BYTES + 8 + 8 + 4, /* of a metadata index, before its name */
@@ -22,95 +20,8 @@ enum {
 
 static const char notes_name[] = "ecdaq.end";
 
-/* A part of the file. */
-struct range {
-	uint64_t at;
-	uint64_t bytes;
-};
-
-struct ends {
-	struct range statistics;
-	struct range metadata; /* index of it */
-};
-
-static int is_within(const struct range *part, const struct range *whole)
-{
-	return part->at >= whole->at && part->bytes <= whole->bytes &&
-	       part->at - whole->at <= whole->bytes - part->bytes;
-}
-
-/* @part as memory: free() it. NULL with *@ret_error. */
-static uint8_t *read_part(const struct mcap_source *source, const struct range *part,
-			  uint64_t limit, int *ret_error)
-{
-	const struct range file = { 0, source->bytes };
-	uint8_t *data = NULL;
-
-	*ret_error = -EBADMSG;
-	if (part->bytes > 0 && part->bytes <= limit && is_within(part, &file)) {
-		data = malloc(part->bytes);
-		*ret_error = data == NULL ? -ENOMEM
-					  : source->read_at(source->ctx, part->at, data,
-							    (size_t)part->bytes);
-	}
-	if (*ret_error < 0) {
-		free(data);
-		return NULL;
-	}
-	return data;
-}
-
-/* Where the summary's parts are, by the footer and the summary offsets. */
-static int find_ends(const struct mcap_source *source, struct ends *ret)
-{
-	uint8_t tail[TAIL_BYTES];
-	struct range summary;
-	struct range offsets;
-	uint8_t *data;
-	int r;
-
-	if (source->bytes < MCAP_MAGIC_BYTES + TAIL_BYTES) {
-		return -ENODATA;
-	}
-	offsets.bytes = source->bytes - TAIL_BYTES; /* where the footer is */
-	r = source->read_at(source->ctx, offsets.bytes, tail, sizeof(tail));
-	if (r < 0) {
-		return r;
-	}
-	if (memcmp(tail + MCAP_FOOTER_BYTES, MCAP_MAGIC, MCAP_MAGIC_BYTES) != 0) {
-		return -ENODATA;
-	}
-	summary.at = get_le64(tail + MCAP_HEAD_BYTES);
-	offsets.at = get_le64(tail + MCAP_HEAD_BYTES + 8);
-	if (tail[0] != MCAP_OP_FOOTER || summary.at < MCAP_MAGIC_BYTES || summary.at > offsets.at ||
-	    offsets.at > offsets.bytes) {
-		return -EBADMSG;
-	}
-	offsets.bytes -= offsets.at;
-	summary.bytes = offsets.at - summary.at;
-	data = read_part(source, &offsets, OFFSETS_LIMIT_BYTES, &r);
-	*ret = (struct ends){ .statistics = { 0, 0 } };
-	for (uint64_t at = 0; r == 0 && at + OFFSET_BYTES <= offsets.bytes; at += OFFSET_BYTES) {
-		const uint8_t *p = data + at;
-		struct range group = { get_le64(p + MCAP_HEAD_BYTES + 1),
-				       get_le64(p + MCAP_HEAD_BYTES + 9) };
-
-		if (p[0] != MCAP_OP_SUMMARY_OFFSET ||
-		    get_le64(p + 1) != OFFSET_BYTES - MCAP_HEAD_BYTES ||
-		    !is_within(&group, &summary)) {
-			r = -EBADMSG;
-		} else if (p[MCAP_HEAD_BYTES] == MCAP_OP_STATISTICS) {
-			ret->statistics = group;
-		} else if (p[MCAP_HEAD_BYTES] == MCAP_OP_METADATA_INDEX) {
-			ret->metadata = group;
-		}
-	}
-	free(data);
-	return r;
-}
-
 /* The last metadata with the name of the closing notes. 0, -ENOENT. */
-static int find_notes(const uint8_t *index, uint64_t bytes, struct range *ret)
+static int find_notes(const uint8_t *index, uint64_t bytes, struct mcap_range *ret)
 {
 	int r = -ENOENT;
 	uint64_t len;
@@ -127,8 +38,8 @@ static int find_notes(const uint8_t *index, uint64_t bytes, struct range *ret)
 		}
 		if (name_len == strlen(notes_name) &&
 		    memcmp(p + INDEX_HEAD_BYTES, notes_name, name_len) == 0) {
-			*ret = (struct range){ get_le64(p + MCAP_HEAD_BYTES),
-					       get_le64(p + MCAP_HEAD_BYTES + 8) };
+			*ret = (struct mcap_range){ get_le64(p + MCAP_HEAD_BYTES),
+						    get_le64(p + MCAP_HEAD_BYTES + 8) };
 			r = 0;
 		}
 	}
@@ -150,23 +61,21 @@ static int get_number(const struct mcap_item *notes, const char *key, uint64_t *
 	return r;
 }
 
-static int read_notes(const struct mcap_source *source, const struct range *metadata,
+static int read_notes(const struct mcap_source *source, const struct mcap_range *metadata,
 		      struct overview *overview)
 {
-	struct range part = { 0, 0 };
+	struct mcap_range part = { 0, 0 };
 	struct mcap_item notes = { .offset = 0 };
-	uint64_t first = 0;
-	uint64_t last = 0;
 	uint8_t *data;
 	int r;
 
-	data = read_part(source, metadata, GROUP_LIMIT_BYTES, &r);
+	data = mcap_range_read(source, metadata, GROUP_LIMIT_BYTES, &r);
 	r = r < 0 ? r : find_notes(data, metadata->bytes, &part);
 	free(data);
 	if (r < 0) {
 		return r;
 	}
-	data = read_part(source, &part, NOTES_LIMIT_BYTES, &r);
+	data = mcap_range_read(source, &part, NOTES_LIMIT_BYTES, &r);
 	if (r < 0) {
 		return r;
 	}
@@ -177,14 +86,17 @@ static int read_notes(const struct mcap_source *source, const struct range *meta
 		    ? -EBADMSG
 		    : mcap_parse_record(&notes);
 	r = r < 0 ? r : get_number(&notes, "cycles", &overview->cycles);
-	r = r < 0 ? r : get_number(&notes, "first_cycle", &first);
-	r = r < 0 ? r : get_number(&notes, "last_cycle", &last);
+	r = r < 0 ? r : get_number(&notes, "first_cycle", &overview->first_cycle);
+	r = r < 0 ? r : get_number(&notes, "last_cycle", &overview->last_cycle);
 	free(data);
 	if (r == 0 && overview->cycles > 0) {
-		if (last < first || last - first < overview->cycles - 1) {
+		uint64_t between = overview->last_cycle - overview->first_cycle;
+
+		if (overview->last_cycle < overview->first_cycle ||
+		    between < overview->cycles - 1) {
 			return -EBADMSG;
 		}
-		overview->missing = last - first - (overview->cycles - 1);
+		overview->missing = between - (overview->cycles - 1);
 	}
 	return r;
 }
@@ -192,18 +104,20 @@ static int read_notes(const struct mcap_source *source, const struct range *meta
 int overview_read(const struct mcap_source *source, struct overview *ret)
 {
 	struct overview found = { .start_ns = 0 };
-	struct ends ends;
+	struct mcap_groups groups;
+	struct mcap_range *statistics = &groups.kind[MCAP_OP_STATISTICS];
+	const struct mcap_range *metadata = &groups.kind[MCAP_OP_METADATA_INDEX];
 	uint8_t *data;
-	int r = find_ends(source, &ends);
+	int r = mcap_groups_find(source, &groups);
 
 	if (r < 0) {
 		return r;
 	}
-	if (ends.statistics.bytes < STATISTICS_BYTES) {
+	if (statistics->bytes < STATISTICS_BYTES) {
 		return -EBADMSG;
 	}
-	ends.statistics.bytes = STATISTICS_BYTES;
-	data = read_part(source, &ends.statistics, STATISTICS_BYTES, &r);
+	statistics->bytes = STATISTICS_BYTES;
+	data = mcap_range_read(source, statistics, STATISTICS_BYTES, &r);
 	if (r < 0) {
 		return r;
 	}
@@ -211,8 +125,8 @@ int overview_read(const struct mcap_source *source, struct overview *ret)
 	found.start_ns = get_le64(data + TIMES_AT);
 	found.end_ns = get_le64(data + TIMES_AT + 8);
 	free(data);
-	if (r == 0 && ends.metadata.bytes > 0) {
-		r = read_notes(source, &ends.metadata, &found);
+	if (r == 0 && metadata->bytes > 0) {
+		r = read_notes(source, metadata, &found);
 		found.has_counts = r == 0;
 		r = r == -ENOENT ? 0 : r;
 	}

@@ -13,8 +13,10 @@
 struct overview {
 	uint64_t start_ns; /* Unix time of the first message and of the last one */
 	uint64_t end_ns;
-	int has_counts;   /* the closing notes are there: a repaired file has none */
-	uint64_t cycles;  /* samples in the file */
+	int has_counts;       /* the closing notes are there: a repaired file has none */
+	uint64_t cycles;      /* samples in the file */
+	uint64_t first_cycle; /* of those, if there are any */
+	uint64_t last_cycle;
 	uint64_t missing; /* cycles between the first and the last one that are not in it */
 };
 

@@ -9,6 +9,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "record/envelope.h"
 #include "record/file_io.h"
 #include "record/mcap_writer.h"
 #include "record/record_head.h"
@@ -16,6 +17,7 @@
 struct record_file {
 	struct mcap_writer *w;
 	const struct layout *layout;
+	struct envelope *envelope;
 	const struct layout_topic *topic;
 	size_t topic_count;
 	size_t cycle_cost; /* room that one cycle takes in a chunk */
@@ -76,6 +78,7 @@ int record_file_create(const struct record_file_spec *spec, struct record_file *
 	f->cycle_cost = layout_cycle_bytes(spec->layout) + MESSAGES_LARGEST_BYTES +
 			(f->topic_count + 1) * MCAP_MESSAGE_COST_BYTES;
 	r = f->buf == NULL ? -ENOMEM : set_paths(f, spec);
+	r = r < 0 ? r : envelope_create(spec->layout, &f->envelope);
 	if (r < 0) {
 		record_file_destroy(f);
 		return r;
@@ -101,6 +104,7 @@ void record_file_destroy(struct record_file *f)
 		return;
 	}
 	mcap_writer_destroy(f->w);
+	envelope_destroy(f->envelope);
 	if (f->fd >= 0) {
 		close(f->fd);
 	}
@@ -111,6 +115,20 @@ void record_file_destroy(struct record_file *f)
 static int make_room(struct record_file *f, size_t bytes)
 {
 	return mcap_writer_room(f->w) < bytes ? record_file_close_chunk(f) : 0;
+}
+
+/* The seconds since the last one that was written. */
+static int put_envelope(struct record_file *f)
+{
+	size_t len = envelope_size(f->envelope);
+	int r = len == 0 ? 0
+			 : mcap_writer_attachment(f->w, ENVELOPE_NAME, ENVELOPE_MEDIA_TYPE,
+						  f->last_utc_ns, envelope_bytes(f->envelope), len);
+
+	if (r == 0) {
+		envelope_clear(f->envelope);
+	}
+	return r;
 }
 
 static int put(struct record_file *f, unsigned channel, uint32_t sequence, size_t data_len)
@@ -134,6 +152,7 @@ int record_file_sample(struct record_file *f, const struct sample_header *header
 	uint32_t sequence = (uint32_t)header->cycle;
 	int r = make_room(f, f->cycle_cost);
 
+	r = r == 0 && envelope_is_full(f->envelope) ? put_envelope(f) : r;
 	if (r < 0) {
 		return r;
 	}
@@ -148,6 +167,7 @@ int record_file_sample(struct record_file *f, const struct sample_header *header
 	if (r < 0) {
 		return r;
 	}
+	envelope_add(f->envelope, header, image);
 	if (f->cycles++ == 0) {
 		f->first_cycle = header->cycle;
 	}
@@ -218,6 +238,7 @@ int record_file_finish(struct record_file *f, const struct record_file_end *end)
 						   .cycles = f->cycles };
 	int r = record_file_close_chunk(f);
 
+	r = r < 0 ? r : put_envelope(f);
 	if (r == 0 && !f->has_end) { /* a second try does not note it twice */
 		r = record_head_put_end(f->w, &counts, end);
 		f->has_end = r == 0;
@@ -250,7 +271,8 @@ uint64_t record_file_bytes(const struct record_file *f)
 
 uint64_t record_file_final_bytes(const struct record_file *f)
 {
-	return mcap_writer_bytes(f->w) + mcap_writer_summary_bytes(f->w);
+	return mcap_writer_bytes(f->w) + envelope_size(f->envelope) +
+	       mcap_writer_summary_bytes(f->w);
 }
 
 int record_file_is_full(const struct record_file *f)

@@ -162,6 +162,12 @@ int store_path(const char *dir, const char *name, char *buf, size_t buf_len)
 	return snprintf(buf, buf_len, "%s/%s", dir, name) >= (int)buf_len ? -ENAMETOOLONG : 0;
 }
 
+/* Its milliseconds: two runs of the master differ in them. */
+static uint32_t name_of_session(uint64_t session)
+{
+	return (uint32_t)(session / (uint64_t)NS_PER_MS);
+}
+
 void store_make_name(char buf[STORE_NAME_BYTES], int64_t utc_ns, uint64_t session,
 		     uint64_t sequence)
 {
@@ -172,9 +178,16 @@ void store_make_name(char buf[STORE_NAME_BYTES], int64_t utc_ns, uint64_t sessio
 	if (gmtime_r(&s, &tm) == NULL || strftime(when, sizeof(when), "%Y%m%dT%H%M%SZ", &tm) == 0) {
 		snprintf(when, sizeof(when), "unknown");
 	}
-	/* The session's milliseconds: two runs of the master differ in them. */
 	snprintf(buf, STORE_NAME_BYTES, "ecdaq-%s-%08" PRIx32 "-%06" PRIu64, when,
-		 (uint32_t)(session / (uint64_t)NS_PER_MS), sequence);
+		 name_of_session(session), sequence);
+}
+
+int store_name_is_of(const char *name, uint64_t session)
+{
+	char part[16];
+
+	snprintf(part, sizeof(part), "-%08" PRIx32 "-", name_of_session(session));
+	return strstr(name, part) != NULL;
 }
 
 int store_parse_name(const char *name, uint64_t *ret_sequence, int *ret_is_part)

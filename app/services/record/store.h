@@ -66,6 +66,8 @@ void store_make_name(char buf[STORE_NAME_BYTES], int64_t utc_ns, uint64_t sessio
 int store_parse_name(const char *name, uint64_t *ret_sequence, int *ret_is_part);
 /** 1 if @name is one that a file of store_list_all() can have; never a path. */
 int store_is_name(const char *name);
+/** 1 if a file with this name can be of @session. */
+int store_name_is_of(const char *name, uint64_t session);
 /** Unix time at which the file with this name was begun, s; 0: its name does not have it. */
 int64_t store_name_utc_s(const char *name);
 

@@ -15,7 +15,7 @@
 enum {
 	HISTORY_CHANNELS = 8, /* in a picture */
 	HISTORY_PIXELS = 4096,
-	HISTORY_CYCLES = 1 << 22,        /* that a picture may span: an hour at 1 kHz */
+	HISTORY_CYCLES = 1 << 27,        /* that a picture may span: a day at 1 kHz */
 	HISTORY_PERIOD_CYCLES = 1 << 17, /* longer pictures have no period */
 };
 

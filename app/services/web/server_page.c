@@ -9,6 +9,7 @@
 #include "web/bus_view.h"
 #include "web/folds.h"
 #include "web/page.h"
+#include "web/past.h"
 #include "web/recordings.h"
 #include "web/server_private.h"
 #include "web/text.h"
@@ -26,6 +27,8 @@ enum {
 struct server_pages {
 	struct history *history;
 	struct event_log *events;
+	struct past *past;
+	int64_t past_ns; /* when it began */
 	struct recordings *recordings;
 	uint32_t recordings_wanted; /* by so many pages */
 	uint32_t bus_wanted;
@@ -91,6 +94,7 @@ int server_pages_create(struct server *s)
 	r = r < 0 ? r : history_create(path, &p->history);
 	r = r < 0 ? r : config_run_path(s->cfg, CONFIG_RUN_EVENTS, path, sizeof(path));
 	r = r < 0 ? r : event_log_create(path, &p->events);
+	r = r < 0 ? r : past_create(s->cfg->record_dir, &p->past);
 	r = r < 0 ? r : recordings_create(s->cfg->record_dir, &p->recordings);
 	r = r < 0 ? r
 		  : config_run_path(s->cfg, CONFIG_RUN_STATUS, p->status_path,
@@ -112,6 +116,7 @@ void server_pages_destroy(struct server *s)
 
 	if (p != NULL) {
 		history_destroy(p->history);
+		past_destroy(p->past);
 		event_log_destroy(p->events);
 		recordings_destroy(p->recordings);
 		free(p->value);
@@ -219,7 +224,8 @@ static void take_request(struct server_pages *p, struct page_client *c)
 		want(&c->wants_folds, request.is_on, &p->folds_wanted);
 		break;
 	case PAGE_DRAW:
-		c->draw = request; /* one that was not answered yet is not needed any more */
+		past_stop(p->past, c); /* one that was not answered yet is not needed any more */
+		c->draw = request;
 		c->has_draw = 1;
 		break;
 	}
@@ -259,27 +265,89 @@ static int send_made(struct lws *wsi, char *text)
 	return r;
 }
 
+/* For a while nothing is drawn after something that took since @start_ns. */
+static void pause_drawing(struct server *s, int64_t start_ns)
+{
+	int64_t now_ns = s->platform.now(s->platform.ctx).ns;
+
+	s->pages->draw_after_ns = now_ns + DRAW_PAUSE * (now_ns - start_ns);
+}
+
+/* What the client asked for from the ring, and whether it begins before that. 0 or -errno of
+ * history_draw(). */
+static int draw_ring(struct server *s, struct page_client *c, int *ret_is_older)
+{
+	struct server_pages *p = s->pages;
+	struct history_request request;
+	uint64_t oldest;
+	uint64_t newest;
+	int64_t start_ns = s->platform.now(s->platform.ctx).ns;
+	int r = history_range(p->history, &oldest, &newest);
+
+	if (r < 0) {
+		return r;
+	}
+	page_add_events(&c->draw, p->events, p->event_cycle);
+	request = c->draw.draw;
+	request.end = past_end(&request, newest, newest - oldest + 1);
+	r = history_draw(p->history, &request, &p->picture);
+	*ret_is_older = r == 0 && request.count > 0 && p->picture.first < oldest;
+	pause_drawing(s, start_ns);
+	return r;
+}
+
+/* 1: @picture is complete; 0: later. */
+static int draw_past(struct server *s, struct page_client *c)
+{
+	struct server_pages *p = s->pages;
+	int is_running = past_is_for(p->past, c);
+	const struct channel_table *table = history_table(p->history);
+	uint64_t oldest;
+	uint64_t newest;
+
+	if (table == NULL || history_range(p->history, &oldest, &newest) < 0) {
+		past_stop(p->past, c);
+		return 1;
+	}
+	if (!is_running) {
+		p->past_ns = s->platform.now(s->platform.ctx).ns;
+	}
+	if (past_complete(p->past, c, &c->draw.draw, table, oldest, &p->picture) < 0) {
+		return 0;
+	}
+	if (is_running) {
+		pause_drawing(s, p->past_ns);
+	}
+	return 1;
+}
+
 static int send_picture(struct server *s, struct page_client *c)
 {
 	struct server_pages *p = s->pages;
-	int64_t start_ns = s->platform.now(s->platform.ctx).ns;
-	int64_t took_ns;
+	const struct history_picture *picture = &p->picture;
+	int is_older = past_is_for(p->past, c);
 	size_t bytes;
-	int r;
+	int r = 0;
 
-	if (start_ns < p->draw_after_ns) {
-		c->link.is_waiting = 1;
-		return 0;
+	if (!is_older) {
+		if (s->platform.now(s->platform.ctx).ns < p->draw_after_ns) {
+			c->link.is_waiting = 1;
+			return 0;
+		}
+		r = draw_ring(s, c, &is_older);
+	}
+	if (r == 0 && is_older) {
+		if (!draw_past(s, c)) {
+			c->link.is_waiting = 1;
+			return 0;
+		}
+		picture = past_picture(p->past);
 	}
 	c->has_draw = 0;
-	page_add_events(&c->draw, p->events, p->event_cycle);
-	r = history_draw(p->history, &c->draw.draw, &p->picture);
-	took_ns = s->platform.now(s->platform.ctx).ns - start_ns;
-	p->draw_after_ns = start_ns + (1 + DRAW_PAUSE) * took_ns;
 	if (r < 0) {
 		return send_made(c->link.wsi, page_no_picture(c->draw.id, r));
 	}
-	bytes = page_picture(&c->draw.draw, &p->picture, c->draw.id, s->scratch + LWS_PRE,
+	bytes = page_picture(&c->draw.draw, picture, c->draw.id, s->scratch + LWS_PRE,
 			     SOURCE_LARGEST_BYTES);
 	if (bytes == 0) {
 		return -1;
@@ -377,6 +445,7 @@ static void closed(struct server_pages *p, struct page_client *c)
 	want(&c->wants_recordings, 0, &p->recordings_wanted);
 	want(&c->wants_bus, 0, &p->bus_wanted);
 	want(&c->wants_folds, 0, &p->folds_wanted);
+	past_stop(p->past, c);
 }
 
 int server_page(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len)

@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "record/columns.h"
+#include "record/mcap_places.h"
 #include "record/mcap_recover.h"
 #include "record/overview.h"
 #include "record/track.h"
@@ -101,6 +102,28 @@ static void print_table(struct bytes *b, FILE *nowhere)
 	columns_destroy(c);
 }
 
+/* Each place that is found can be gone to, whatever is there. */
+static void go_to_places(struct bytes *b, enum mcap_opcode kind)
+{
+	const struct mcap_source source = source_of(b);
+	struct mcap_places places;
+	struct mcap_reader *reader;
+	struct mcap_item item;
+	int r = mcap_places_read(&source, kind, &places);
+
+	assert(r == 0);
+	if (mcap_reader_create(&source, &reader) == 0) {
+		for (size_t i = 0; i < places.count; i++) {
+			assert(i == 0 || places.at[i] >= places.at[i - 1]);
+			mcap_reader_seek(reader, places.at[i]);
+			(void)mcap_reader_next(reader, &item);
+			(void)mcap_reader_next(reader, &item);
+		}
+		mcap_reader_destroy(reader);
+	}
+	mcap_places_done(&places);
+}
+
 /* @b must be a whole file with @messages messages. */
 static void check_whole(struct bytes *b, uint64_t messages)
 {
@@ -176,6 +199,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 		assert(!overview.has_counts ||
 		       overview.missing + overview.cycles >= overview.missing);
 	}
+	go_to_places(&b, MCAP_OP_CHUNK);
+	go_to_places(&b, MCAP_OP_ATTACHMENT);
 	print_table(&b, nowhere);
 	repair(&b);
 	free(b.data);

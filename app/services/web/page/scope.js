@@ -10,11 +10,12 @@ import { set_text } from "./table.js";
 import { Trigger } from "./trigger.js";
 
 const CHANNELS = 8; // the server's limit
-const WINDOWS_S = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1200, 1800, 3600];
+const WINDOWS_S = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1200, 1800, 3600, 7200,
+  21600, 43200, 86400];
 const REDRAW_MS = 40;
 const ANALYSIS_MS = 400;
 const EVENTS = 500; // as many as the server keeps
-const CYCLES = 2 ** 22; // the server's limit
+const CYCLES = 2 ** 27; // the server's limit
 const PIXELS = 2000;
 
 const by_id = (id) => document.getElementById(id);
@@ -44,7 +45,8 @@ export class Scope {
     this.analysis = new Analysis(() => this.restart());
     this.gestures = new Gestures(this, this.canvas);
     for (const seconds of WINDOWS_S) {
-      by_id("scope-window").append(new Option(format_seconds(seconds), seconds));
+      const name = seconds < 3600 ? format_seconds(seconds) : `${seconds / 3600} h`;
+      by_id("scope-window").append(new Option(name, seconds));
     }
     this.read_hash();
     this.listen();

@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * A recording that is open at any place: its head was read, and its chunks can be found by their
+ * cycles. Context: blocking.
+ */
+#ifndef RECORD_RECORDING_H
+#define RECORD_RECORDING_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "record/columns.h"
+#include "record/log_common.h"
+#include "record/mcap_places.h"
+#include "record/mcap_reader.h"
+
+struct recording {
+	const char *path;
+	struct log_file file;
+	struct mcap_reader *reader;
+	struct columns *columns; /* learned from the head */
+	uint64_t session;        /* 0: unknown */
+	uint64_t period_ns;
+	int cycle_channel; /* -1: none */
+};
+
+/** Open the file at @path and read what is before its first chunk; @channels as columns_create()
+ * has them. @path and @rec stay where they are. 0 or -errno. */
+int recording_open(struct recording *rec, const char *path, const char *channels);
+void recording_close(struct recording *rec);
+
+/** The last of @chunks that begins at cycle @wanted or before it; 0 if none does. 0 or -errno. */
+int recording_find_chunk(struct recording *rec, const struct mcap_places *chunks, uint64_t wanted,
+			 size_t *ret_chunk);
+/** First and last cycle of the recording. 1; 0: it has none; -errno. */
+int recording_find_range(struct recording *rec, uint64_t *ret_first, uint64_t *ret_last);
+
+#endif
