@@ -142,6 +142,14 @@ ALL = (
         ),
     ),
     subject(
+        "history",
+        "Pictures of a day of recordings",
+        (
+            "python tests/cli/history_figures.py",
+            partial(run, [sys.executable, "tests/cli/history_figures.py"], "."),
+        ),
+    ),
+    subject(
         "cycle",
         "Instructions of a cycle, counted by callgrind",
         (
