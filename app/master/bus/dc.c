@@ -243,7 +243,7 @@ static int burst(struct bus *bus, uint32_t frames, struct burst_end end)
 	unsigned silent = 0;
 
 	for (uint32_t i = 0; i < frames; i++) {
-		memset(diff, 0, sizeof(diff)); /* a BRD is ORed into what is sent */
+		memset(diff, 0, sizeof(diff)); /* of a frame that no slave answers */
 		if (registers_run(bus, access, sizeof(access) / sizeof(access[0])) < 0) {
 			if (++silent < SILENT_FRAMES_MAX) {
 				continue;

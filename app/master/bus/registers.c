@@ -17,6 +17,13 @@ static int is_reading(enum ecat_cmd cmd)
 	       cmd != ECAT_CMD_LWR && cmd != ECAT_CMD_NOP;
 }
 
+/* Sent as zeros: it carries nothing to a slave, and a broadcast is ORed into what is sent. */
+static int is_only_reading(enum ecat_cmd cmd)
+{
+	return cmd == ECAT_CMD_APRD || cmd == ECAT_CMD_FPRD || cmd == ECAT_CMD_BRD ||
+	       cmd == ECAT_CMD_LRD;
+}
+
 /* One slave answers to an address; what several OR together is no data. */
 static int is_single(enum ecat_cmd cmd)
 {
@@ -42,7 +49,7 @@ static size_t pack(struct ecat_frame_builder *fb, uint8_t *buf, size_t limit,
 		if (data == NULL) {
 			break;
 		}
-		if (ac->data != NULL) {
+		if (ac->data != NULL && !is_only_reading(ac->cmd)) {
 			memcpy(data, ac->data, ac->len);
 		}
 	}
