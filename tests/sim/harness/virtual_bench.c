@@ -23,9 +23,13 @@ static int64_t slot_of(const struct virtual_scope *sc, int64_t system_time_ns)
 
 static void on_edge(void *ctx, unsigned slave, int64_t t_ns, uint64_t system_time_ns)
 {
-	struct virtual_scope *sc = ctx;
+	struct virtual_bench *b = ctx;
+	struct virtual_scope *sc = &b->scope;
 	int64_t slot = slot_of(sc, (int64_t)system_time_ns);
 
+	if (b->each_edge != NULL) {
+		b->each_edge(b->user, slave, t_ns, system_time_ns);
+	}
 	sc->slot[slave] = slot;
 	sc->edge_ns[slave] = t_ns;
 	sc->system_ns[slave] = system_time_ns;
@@ -64,7 +68,7 @@ static void make_segment(struct virtual_bench *b)
 		slaves[n].clock_start_ns = prng_below(&prng, UINT64_C(1) << 52);
 	}
 	CHECK_EQ(segment_create(slaves, b->spec.slaves, 0, &b->segment), 0);
-	segment_sync0_to(b->segment, on_edge, &b->scope);
+	segment_sync0_to(b->segment, on_edge, b);
 }
 
 void virtual_bench_init(struct virtual_bench *bench, const struct virtual_spec *spec)

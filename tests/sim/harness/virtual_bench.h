@@ -55,6 +55,9 @@ struct virtual_bench {
 	struct in_process *host;
 	struct fault_plan *faults;
 	struct virtual_scope scope;
+	/* Every SYNC0 edge; NULL: none looks. */
+	void (*each_edge)(void *user, unsigned slave, int64_t t_ns, uint64_t system_time_ns);
+	void *user; /* of that */
 };
 
 /** Ends the test if it cannot be built. Free with virtual_bench_done(). */

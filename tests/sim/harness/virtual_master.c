@@ -73,8 +73,12 @@ static int door_send(void *ctx, const uint8_t *frame, size_t frame_len)
 	struct virtual_master *vm = ctx;
 	struct transport tr = in_process_transport(vm->bench->host);
 	int was_armed = open_door();
-	int r = tr.send(tr.ctx, frame, frame_len);
+	int r;
 
+	if (vm->each_sent != NULL) {
+		vm->each_sent(vm, frame, frame_len);
+	}
+	r = tr.send(tr.ctx, frame, frame_len);
 	close_door(was_armed);
 	return r;
 }

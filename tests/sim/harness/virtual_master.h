@@ -56,6 +56,8 @@ struct virtual_master {
 	void (*each_sample)(struct virtual_master *vm);
 	/* Every frame that comes back to the master; NULL: none looks. */
 	void (*each_frame)(struct virtual_master *vm, const uint8_t *frame, size_t frame_len);
+	/* The same of every frame that the master sends. */
+	void (*each_sent)(struct virtual_master *vm, const uint8_t *frame, size_t frame_len);
 	void *user; /* of those */
 	struct sample_header newest_header;
 	_Alignas(8) uint8_t newest[sizeof(struct sample_header) + LIMIT_IMAGE_BYTES];
