@@ -21,31 +21,52 @@ static int64_t slot_of(const struct virtual_scope *sc, int64_t system_time_ns)
 	return (system_time_ns + sc->period_ns / 2) / sc->period_ns;
 }
 
+/* With the edges of other slaves in its slot, of which the first and the last are enough. */
+static void compare(struct virtual_scope *sc, const struct virtual_slot *with, int64_t t_ns)
+{
+	int64_t before_ns = t_ns - with->first_ns;
+	int64_t after_ns = with->last_ns - t_ns;
+	int64_t spread_ns = before_ns > after_ns ? before_ns : after_ns;
+
+	sc->compared += with->slaves;
+	if (spread_ns > sc->spread_max_ns) {
+		sc->spread_max_ns = spread_ns;
+	}
+}
+
+static void take_edge(struct virtual_scope *sc, int64_t slot, int64_t t_ns)
+{
+	struct virtual_slot *s = &sc->newest[slot % VIRTUAL_EDGES];
+
+	if (s->slot != slot) {
+		*s = (struct virtual_slot){ .slot = slot, .first_ns = t_ns, .last_ns = t_ns };
+	} else if (sc->is_measuring && s->slaves > 0) {
+		compare(sc, s, t_ns);
+	}
+	s->first_ns = t_ns < s->first_ns ? t_ns : s->first_ns;
+	s->last_ns = t_ns > s->last_ns ? t_ns : s->last_ns;
+	s->slaves++;
+}
+
 static void on_edge(void *ctx, unsigned slave, int64_t t_ns, uint64_t system_time_ns)
 {
 	struct virtual_bench *b = ctx;
 	struct virtual_scope *sc = &b->scope;
 	int64_t slot = slot_of(sc, (int64_t)system_time_ns);
+	int64_t *past_slot = &sc->past_slot[slave][slot % VIRTUAL_EDGES];
 
 	if (b->each_edge != NULL) {
 		b->each_edge(b->user, slave, t_ns, system_time_ns);
 	}
-	sc->slot[slave] = slot;
 	sc->edge_ns[slave] = t_ns;
 	sc->system_ns[slave] = system_time_ns;
 	sc->edges[slave]++;
-	sc->past_slot[slave][slot % VIRTUAL_EDGES] = slot;
-	sc->past_ns[slave][slot % VIRTUAL_EDGES] = t_ns;
-	for (unsigned other = 0; sc->is_measuring && other < LIMIT_SLAVES; other++) {
-		if (other != slave && sc->edges[other] > 0 && sc->slot[other] == slot) {
-			int64_t spread_ns = llabs(t_ns - sc->edge_ns[other]);
-
-			sc->compared++;
-			if (spread_ns > sc->spread_max_ns) {
-				sc->spread_max_ns = spread_ns;
-			}
-		}
+	/* A slave that has two edges in one slot is not compared with itself. */
+	if (*past_slot != slot) {
+		take_edge(sc, slot, t_ns);
 	}
+	*past_slot = slot;
+	sc->past_ns[slave][slot % VIRTUAL_EDGES] = t_ns;
 }
 
 int virtual_bench_slave(const char *name, int position, struct segment_slave_spec *ret_spec)

@@ -35,14 +35,22 @@ struct virtual_spec {
 	uint32_t spikes_per_million;
 };
 
+/* The edges of one slot of the grid, in true time. */
+struct virtual_slot {
+	int64_t slot;
+	int64_t first_ns;
+	int64_t last_ns;
+	unsigned slaves; /* that had an edge in it */
+};
+
 /* The oscilloscope: edges of one slot of the grid, compared between slaves. */
 struct virtual_scope {
 	int64_t period_ns;
 	int is_measuring;
-	int64_t slot[LIMIT_SLAVES];       /* of the newest edge, by its system time */
-	int64_t edge_ns[LIMIT_SLAVES];    /* its true time */
+	int64_t edge_ns[LIMIT_SLAVES];    /* of the newest edge, its true time */
 	uint64_t system_ns[LIMIT_SLAVES]; /* its system time */
 	uint64_t edges[LIMIT_SLAVES];
+	struct virtual_slot newest[VIRTUAL_EDGES]; /* slots, by their number */
 	int64_t spread_max_ns; /* largest distance between two slaves, while measuring */
 	uint64_t compared;
 	int64_t past_slot[LIMIT_SLAVES][VIRTUAL_EDGES]; /* of the newest edges, by slot */
