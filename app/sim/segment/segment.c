@@ -11,7 +11,7 @@ enum { WANDER_STEP_NS = 50000000, WANDER_STEPS = 40 };
 
 /* --- events --- */
 
-void segment_plan(struct node *n)
+static void plan(struct node *n)
 {
 	int64_t next = esc_next_event_ns(&n->esc);
 
@@ -25,6 +25,17 @@ void segment_plan(struct node *n)
 		next = wake < next ? wake : next;
 	}
 	n->next_ns = n->next_wander_ns < next ? n->next_wander_ns : next;
+}
+
+static void enqueue(const struct node *n)
+{
+	event_queue_set(&n->segment->queue, (size_t)(n - n->segment->node), n->next_ns);
+}
+
+void segment_plan(struct node *n)
+{
+	plan(n);
+	enqueue(n);
 }
 
 /* A bounded random walk: the crystal in the draught. */
@@ -41,35 +52,33 @@ static void wander(struct node *n)
 	n->next_wander_ns += WANDER_STEP_NS;
 }
 
+static void run_next(struct node *n)
+{
+	int64_t at = n->next_ns;
+
+	if (at >= n->next_wander_ns) {
+		wander(n);
+	}
+	esc_advance(&n->esc, at);
+	if (n->device != NULL && n->device->ops->next_wake_ns(n->device) <= at) {
+		n->device->ops->run(n->device, at);
+	}
+	if (esc_take_reset(&n->esc)) {
+		segment_start_node(n, at, 0);
+	}
+	plan(n);
+}
+
 void segment_run_node(struct node *n, int64_t t_ns)
 {
 	while (n->next_ns <= t_ns) {
-		int64_t at = n->next_ns;
-
-		if (at >= n->next_wander_ns) {
-			wander(n);
-		}
-		esc_advance(&n->esc, at);
-		if (n->device != NULL && n->device->ops->next_wake_ns(n->device) <= at) {
-			n->device->ops->run(n->device, at);
-		}
-		if (esc_take_reset(&n->esc)) {
-			segment_start_node(n, at, 0);
-		}
-		segment_plan(n);
+		run_next(n);
 	}
 }
 
 static struct node *earliest(const struct segment *seg)
 {
-	struct node *best = &seg->node[0];
-
-	for (size_t i = 1; i < seg->count; i++) {
-		if (seg->node[i].next_ns < best->next_ns) {
-			best = &seg->node[i];
-		}
-	}
-	return best;
+	return &seg->node[event_queue_first(&seg->queue)];
 }
 
 int64_t segment_next_event_ns(const struct segment *segment)
@@ -77,10 +86,17 @@ int64_t segment_next_event_ns(const struct segment *segment)
 	return earliest(segment)->next_ns;
 }
 
+/*
+ * Of what slaves do by themselves only the SYNC0 edges, which go to the sink, are in order among
+ * slaves. So one runs on until its next edge.
+ */
 void segment_advance(struct segment *segment, int64_t t_ns)
 {
 	for (struct node *n = earliest(segment); n->next_ns <= t_ns; n = earliest(segment)) {
-		segment_run_node(n, n->next_ns);
+		do {
+			run_next(n);
+		} while (n->next_ns <= t_ns && n->next_ns < n->esc.sync.next_true_ns);
+		enqueue(n);
 	}
 	if (t_ns > segment->now_ns) {
 		segment->now_ns = t_ns;
@@ -300,7 +316,7 @@ static struct segment *allocate(size_t count)
 	}
 	seg->node = calloc(count, sizeof(*seg->node));
 	seg->wiring = calloc(count, sizeof(*seg->wiring));
-	if (seg->node == NULL || seg->wiring == NULL) {
+	if (seg->node == NULL || seg->wiring == NULL || event_queue_init(&seg->queue, count) < 0) {
 		segment_destroy(seg);
 		return NULL;
 	}
@@ -355,6 +371,7 @@ void segment_destroy(struct segment *segment)
 	}
 	free(segment->node);
 	free(segment->wiring);
+	event_queue_done(&segment->queue);
 	free(segment);
 }
 

@@ -4,6 +4,7 @@
 #define SIM_SEGMENT_SEGMENT_INTERNAL_H
 
 #include "base/prng.h"
+#include "segment/event_queue.h"
 #include "segment/frame_path.h"
 #include "segment/segment.h"
 
@@ -34,6 +35,7 @@ struct node {
 struct segment {
 	struct node *node;
 	size_t count;
+	struct event_queue queue; /* next_ns of each */
 	struct path_node *wiring;
 	struct frame_path path[SEGMENT_PORTS];
 	int first;      /* the slave at the primary port */
