@@ -64,9 +64,9 @@ static void hal_deselect(void *ctx)
 	pdi_spi_deselect(&((struct board *)ctx)->spi);
 }
 
-static uint8_t hal_transfer(void *ctx, uint8_t out)
+static void hal_exchange(void *ctx, const uint8_t *out, uint8_t *in, uint16_t len)
 {
-	return pdi_spi_transfer(&((struct board *)ctx)->spi, out);
+	pdi_spi_exchange(&((struct board *)ctx)->spi, out, in, len);
 }
 
 static int hal_eeprom_loaded(void *ctx)
@@ -179,7 +179,7 @@ static void start_firmware(struct board *b)
 		.ctx = b,
 		.spi_select = hal_select,
 		.spi_deselect = hal_deselect,
-		.spi_transfer = hal_transfer,
+		.spi_exchange = hal_exchange,
 		.eeprom_loaded = hal_eeprom_loaded,
 		.adc_start = hal_adc_start,
 		.adc_read = hal_adc_read,

@@ -75,8 +75,7 @@ static void post(struct pdi_spi *spi)
 void pdi_spi_select(struct pdi_spi *spi)
 {
 	pdi_spi_settle(spi, spi->now_ns); /* what came before is in order before this */
-	esc_pdi_read(spi->esc, spi->now_ns, ESC_REG_AL_EVENT_REQUEST, spi->al_event,
-		     sizeof(spi->al_event));
+	esc_pdi_read_al_event(spi->esc, spi->now_ns, spi->al_event);
 	spi->is_broken = spi->is_selected;
 	spi->is_selected = 1;
 	spi->pos = 0;
@@ -176,11 +175,20 @@ static int is_header(const struct pdi_spi *spi)
 	return spi->pos < ADDRESS_OCTETS || (spi->pos == ADDRESS_OCTETS && spi->data_pos == 0);
 }
 
-uint8_t pdi_spi_transfer(struct pdi_spi *spi, uint8_t out)
+static void clock_octets(struct pdi_spi *spi, size_t count)
+{
+	uint64_t tenths = spi->tenths + (uint64_t)count * PDI_SPI_OCTET_TENTH_NS;
+
+	spi->octets += count;
+	spi->pos += (unsigned)count;
+	spi->now_ns += (int64_t)(tenths / 10);
+	spi->tenths = (uint32_t)(tenths % 10);
+}
+
+static uint8_t transfer(struct pdi_spi *spi, uint8_t out)
 {
 	uint8_t in = 0;
 
-	spi->octets++;
 	if (!spi->is_selected || spi->is_broken) {
 		in = 0xff; /* MISO is pulled up */
 	} else if (is_header(spi)) {
@@ -188,11 +196,90 @@ uint8_t pdi_spi_transfer(struct pdi_spi *spi, uint8_t out)
 	} else if (spi->pos >= spi->data_pos) {
 		in = take_data(spi, out);
 	}
-	spi->pos++;
-	spi->tenths += PDI_SPI_OCTET_TENTH_NS;
-	spi->now_ns += spi->tenths / 10;
-	spi->tenths %= 10;
+	clock_octets(spi, 1);
 	return in;
+}
+
+/* --- data in one piece, where that is the same as octet by octet --- */
+
+static size_t write_piece(struct pdi_spi *spi, const uint8_t *out, uint8_t *in, size_t len)
+{
+	struct pdi_spi_write *w = &spi->write;
+	size_t room;
+
+	if (w->len == PDI_SPI_BURST) {
+		post(spi);
+	}
+	room = (size_t)PDI_SPI_BURST - w->len;
+	len = len < room ? len : room;
+	memcpy(w->data + w->len, out, len);
+	w->len = (uint8_t)(w->len + len);
+	if (in != NULL) {
+		memset(in, 0, len);
+	}
+	clock_octets(spi, len);
+	return len;
+}
+
+/* RAM is the same at all octets, and the ESC's watchdog is fed by the last one. */
+static size_t read_piece(struct pdi_spi *spi, const uint8_t *out, uint8_t *in, size_t len)
+{
+	size_t n = spi->pos - spi->data_pos;
+	size_t address = spi->address + n;
+
+	if (in == NULL || spi->is_terminated || memchr(out, SPI_TERMINATION, len - 1) != NULL) {
+		return 0;
+	}
+	if (n == 0) {
+		latch(spi);
+	}
+	if (n + len > spi->latched_len &&
+	    (spi->latched_len > 0 || address < ESC_REG_PROCESS_RAM || address + len > UINT16_MAX)) {
+		return 0;
+	}
+	spi->is_terminated = out[len - 1] == SPI_TERMINATION;
+	clock_octets(spi, len - 1);
+	if (spi->latched_len > 0) {
+		memcpy(in, spi->latched + n, len);
+	} else {
+		esc_pdi_read(spi->esc, spi->now_ns, (uint16_t)address, in, len);
+	}
+	clock_octets(spi, 1);
+	return len;
+}
+
+/* How many octets were exchanged; 0: they have to go one by one. */
+static size_t exchange_piece(struct pdi_spi *spi, const uint8_t *out, uint8_t *in, size_t len)
+{
+	if (!spi->is_selected || spi->is_broken || is_header(spi) || spi->pos < spi->data_pos) {
+		return 0;
+	}
+	switch (spi->command) {
+	case SPI_WRITE:
+		return write_piece(spi, out, in, len);
+	case SPI_READ:
+	case SPI_READ_WAIT_STATE:
+		return read_piece(spi, out, in, len);
+	default:
+		return 0;
+	}
+}
+
+void pdi_spi_exchange(struct pdi_spi *spi, const uint8_t *out, uint8_t *in, size_t len)
+{
+	size_t done;
+
+	for (size_t i = 0; i < len; i += done) {
+		done = exchange_piece(spi, out + i, in != NULL ? in + i : NULL, len - i);
+		if (done == 0) {
+			uint8_t got = transfer(spi, out[i]);
+
+			if (in != NULL) {
+				in[i] = got;
+			}
+			done = 1;
+		}
+	}
 }
 
 /* A read that is not terminated has already fetched the next octet, with all that reading it does.

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The ET1100's SPI slave pins (data sheet, section III): chip select and one octet at a time, each
- * taking PDI_SPI_OCTET of time. The CPU's clock is kept here: it runs ahead of the segment while a
+ * The ET1100's SPI slave pins (data sheet, section III): chip select and octets, each taking
+ * PDI_SPI_OCTET of time. The CPU's clock is kept here: it runs ahead of the segment while a
  * burst of octets is exchanged in one call. A read looks at the ESC when its octet is clocked. A
  * write is posted, and reaches the ESC when the segment has come to the end of its last octet, so
  * that a frame in between sees the old data.
@@ -11,6 +11,7 @@
 #ifndef SIM_DEVICES_PDI_SPI_H
 #define SIM_DEVICES_PDI_SPI_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 #include "segment/esc.h"
@@ -59,7 +60,11 @@ void pdi_spi_init(struct pdi_spi *spi, struct esc *esc, int64_t t_ns);
 void pdi_spi_idle_until(struct pdi_spi *spi, int64_t t_ns);
 
 void pdi_spi_select(struct pdi_spi *spi);
-uint8_t pdi_spi_transfer(struct pdi_spi *spi, uint8_t out);
+/**
+ * Octets out and in, one behind the other. @in may be @out, or NULL. What the ESC and the CPU see
+ * is the same, to the ns, however they are divided into calls.
+ */
+void pdi_spi_exchange(struct pdi_spi *spi, const uint8_t *out, uint8_t *in, size_t len);
 /** Ends the access. A breach of the protocol is counted in 0x030d. */
 void pdi_spi_deselect(struct pdi_spi *spi);
 

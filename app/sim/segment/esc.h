@@ -260,6 +260,8 @@ uint64_t esc_system_time(const struct esc *esc, int64_t t_ns);
  */
 void esc_pdi_read(struct esc *esc, int64_t t_ns, uint16_t addr, void *buf, size_t len);
 void esc_pdi_write(struct esc *esc, int64_t t_ns, uint16_t addr, const void *buf, size_t len);
+/** The lower three octets of 0x0220, which come with the address of each SPI access. */
+void esc_pdi_read_al_event(struct esc *esc, int64_t t_ns, uint8_t ret_octets[3]);
 int esc_eeprom_loaded(const struct esc *esc);
 /** 1 if the EEPROM makes the SYNC0 pin an output (0x0151 bit 2). */
 int esc_has_sync0_pin(const struct esc *esc);

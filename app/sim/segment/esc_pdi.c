@@ -72,6 +72,18 @@ void esc_pdi_read(struct esc *esc, int64_t t_ns, uint16_t addr, void *buf, size_
 	acknowledge(esc, addr, len);
 }
 
+void esc_pdi_read_al_event(struct esc *esc, int64_t t_ns, uint8_t ret_octets[3])
+{
+	uint32_t event = esc->is_eeprom_loaded ? esc->al_event : 0;
+
+	ret_octets[0] = (uint8_t)event;
+	ret_octets[1] = (uint8_t)(event >> 8);
+	ret_octets[2] = (uint8_t)(event >> 16);
+	if (esc->is_eeprom_loaded) {
+		esc_pdi_watchdog_trigger(esc, t_ns);
+	}
+}
+
 /* What the data sheet lets the PDI write, of what is modelled. */
 static int is_writable(const struct esc *esc, unsigned addr)
 {

@@ -13,7 +13,8 @@
 struct event_queue {
 	size_t places;    /* a power of two */
 	int64_t *due_ns;  /* of each place; INT64_MAX: nothing, or no slave */
-	uint16_t *winner; /* of match n between matches 2 n and 2 n + 1; from @places on each place */
+	uint16_t *winner; /* of match n between matches 2 n and 2 n + 1; from @places on each place
+			   */
 };
 
 /** For @count slaves, at most 65536, all without an event. 0 or -ENOMEM. */

@@ -16,8 +16,11 @@ struct piccolo_hal {
 	/** Chip select of the ET1100 low, high. */
 	void (*spi_select)(void *ctx);
 	void (*spi_deselect)(void *ctx);
-	/** Clock one octet out and one in, MSB first. */
-	octet_t (*spi_transfer)(void *ctx, octet_t out);
+	/**
+	 * Clock @len octets out and in, each MSB first, one behind the other. @in may be @out;
+	 * NULL: what comes in is not wanted.
+	 */
+	void (*spi_exchange)(void *ctx, const octet_t *out, octet_t *in, uint16_t len);
 	/** Level of EEPROM_LOADED: 0 means that the ET1100's PDI does not answer yet. */
 	int (*eeprom_loaded)(void *ctx);
 

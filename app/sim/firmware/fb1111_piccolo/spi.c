@@ -10,51 +10,40 @@ enum spi_command {
 
 enum { SPI_WAIT_STATE = 0xff, SPI_MORE = 0x00, SPI_LAST = 0xff };
 
-static octet_t transfer(struct piccolo *p, unsigned out)
-{
-	return OCTET(p->hal.spi_transfer(p->hal.ctx, OCTET(out)));
-}
-
 /* The first two address octets bring 0x0220:0x0221 back. */
 static void begin(struct piccolo *p, uint16_t address, enum spi_command command)
 {
-	unsigned event;
+	octet_t octets[3];
 
+	octets[0] = OCTET((unsigned)address >> 5);
+	octets[1] = OCTET(((unsigned)address & 0x1fu) << 3 |
+			  (unsigned)(command == SPI_NOP ? SPI_NOP : SPI_ADDRESS_EXTENSION));
+	octets[2] = OCTET(((unsigned)address >> 13) << 5 | (unsigned)command << 2);
 	p->hal.spi_select(p->hal.ctx);
-	event = transfer(p, (unsigned)address >> 5);
-	event |=
-		(unsigned)transfer(
-			p, ((unsigned)address & 0x1fu) << 3 |
-				   (unsigned)(command == SPI_NOP ? SPI_NOP : SPI_ADDRESS_EXTENSION))
-		<< 8;
-	if (command != SPI_NOP) {
-		(void)transfer(p, ((unsigned)address >> 13) << 5 | (unsigned)command << 2);
-	}
-	p->al_event = (uint16_t)event;
+	p->hal.spi_exchange(p->hal.ctx, octets, octets, command == SPI_NOP ? 2 : 3);
+	p->al_event = octets_get16(octets);
 	p->accessed_us = p->hal.time_us(p->hal.ctx);
 }
 
 /* The master's 0xff with the last octet keeps the ET1100 from fetching one more. */
 void piccolo_spi_read(struct piccolo *p, uint16_t address, octet_t *data, uint16_t len)
 {
+	static const octet_t wait_state[1] = { SPI_WAIT_STATE };
 	uint16_t i;
 
-	begin(p, address, SPI_READ_WAIT_STATE);
-	(void)transfer(p, SPI_WAIT_STATE);
 	for (i = 0; i < len; i++) {
-		data[i] = transfer(p, i + 1u == len ? SPI_LAST : SPI_MORE);
+		data[i] = i + 1u == len ? SPI_LAST : SPI_MORE;
 	}
+	begin(p, address, SPI_READ_WAIT_STATE);
+	p->hal.spi_exchange(p->hal.ctx, wait_state, 0, 1);
+	p->hal.spi_exchange(p->hal.ctx, data, data, len);
 	p->hal.spi_deselect(p->hal.ctx);
 }
 
 void piccolo_spi_write(struct piccolo *p, uint16_t address, const octet_t *data, uint16_t len)
 {
-	uint16_t i;
-
 	begin(p, address, SPI_WRITE);
-	for (i = 0; i < len; i++) {
-		(void)transfer(p, data[i]);
-	}
+	p->hal.spi_exchange(p->hal.ctx, data, 0, len);
 	p->hal.spi_deselect(p->hal.ctx);
 }
 

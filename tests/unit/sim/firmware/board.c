@@ -97,9 +97,8 @@ static uint8_t address_octet(struct board *b, uint8_t out)
 	return (uint8_t)(b->pos == 0 ? b->al_event & 0xff : b->pos == 1 ? b->al_event >> 8 : 0);
 }
 
-static uint8_t spi_transfer(void *ctx, uint8_t out)
+static uint8_t spi_transfer(struct board *b, uint8_t out)
 {
-	struct board *b = ctx;
 	uint8_t in = 0;
 
 	b->octets++;
@@ -118,6 +117,17 @@ static uint8_t spi_transfer(void *ctx, uint8_t out)
 	}
 	b->pos++;
 	return in;
+}
+
+static void spi_exchange(void *ctx, const uint8_t *out, uint8_t *in, uint16_t len)
+{
+	for (unsigned i = 0; i < len; i++) {
+		uint8_t got = spi_transfer(ctx, out[i]);
+
+		if (in != NULL) {
+			in[i] = got;
+		}
+	}
 }
 
 /* --- the rest of the board --- */
@@ -235,7 +245,7 @@ void board_init(struct board *b)
 		.ctx = b,
 		.spi_select = spi_select,
 		.spi_deselect = spi_deselect,
-		.spi_transfer = spi_transfer,
+		.spi_exchange = spi_exchange,
 		.eeprom_loaded = eeprom_loaded,
 		.adc_start = adc_start,
 		.adc_read = adc_read,

@@ -4,8 +4,10 @@
 #include "devices/pdi_spi.h"
 
 #include "base/bytes.h"
+#include "base/prng.h"
 #include "firmware/fb1111_piccolo/host/sii.h"
 #include "harness/test.h"
+#include "wire/datagram.h"
 #include "wire/esc_reg.h"
 
 enum { LOADED_NS = 5000000 };
@@ -28,9 +30,7 @@ static void begin(struct pins *p)
 static void octets(struct pins *p, const uint8_t *out, uint8_t *in, size_t len)
 {
 	pdi_spi_select(&p->spi);
-	for (size_t i = 0; i < len; i++) {
-		in[i] = pdi_spi_transfer(&p->spi, out[i]);
-	}
+	pdi_spi_exchange(&p->spi, out, in, len);
 	pdi_spi_deselect(&p->spi);
 }
 
@@ -167,7 +167,8 @@ TEST(pdi_spi, breaches_of_the_protocol_are_counted_and_change_nothing)
 	pdi_spi_select(&p.spi);
 	octets(&p, beyond, in, 0);
 	CHECK_EQ(errors(&p), 6);
-	CHECK_EQ(pdi_spi_transfer(&p.spi, 0x12), 0xff); /* not selected */
+	pdi_spi_exchange(&p.spi, short_one, in, 1);
+	CHECK_EQ(in[0], 0xff); /* not selected */
 	pdi_spi_settle(&p.spi, INT64_MAX);
 	CHECK_EQ(p.esc.ram[0], 0);
 	for (unsigned i = 0; i < 300; i++) {
@@ -191,4 +192,108 @@ TEST(pdi_spi, a_dc_time_is_read_as_one_moment)
 	time = get_le64(in + 4);
 	CHECK(time > UINT64_C(0x00ffffffffffffff) - 4000);
 	CHECK(time < UINT64_C(0x00ffffffffffffff));
+}
+
+/* --- in blocks, and octet by octet --- */
+
+/* The master sets SyncManager 2 (written by it) and 3 (read by it) up. */
+static void add_sync_managers(struct pins *p)
+{
+	static const uint8_t sm[16] = { 0x00, 0x18, 9,  0, 0x24, 0, 1, 0,
+					0x00, 0x1c, 13, 0, 0x20, 0, 1, 0 };
+	static const uint8_t source[6] = { 0x10 };
+	uint8_t bytes[ECAT_FRAME_MAX_BYTES];
+	struct esc_frame frame = { .pu_ns = LOADED_NS };
+	struct ecat_frame_builder fb;
+	struct ecat_datagram dg;
+	size_t pos = 0;
+
+	ecat_frame_begin(&fb, bytes, source);
+	memcpy(ecat_frame_add(&fb, ECAT_CMD_APWR, 0, 0, ESC_REG_SM + 2 * ESC_SM_BYTES, sizeof(sm)),
+	       sm, sizeof(sm));
+	CHECK_EQ(ecat_frame_next(bytes, ecat_frame_end(&fb), &pos, &dg), 1);
+	esc_frame_begin(&p->esc);
+	esc_datagram(&p->esc, &frame, &dg);
+	CHECK_EQ(get_le16(dg.wkc), 1);
+}
+
+/* An access as firmware makes them, and now and then one as it should not. */
+static size_t random_access(struct prng *prng, uint8_t *out, size_t room)
+{
+	static const uint16_t places[] = { 0x0120, 0x0220, 0x0910, 0x0990, 0x098e, 0x0440,
+					   0x0f80, 0x1000, 0x17ff, 0x1800, 0x1c00, 0x2ff8 };
+	unsigned place = places[prng_below(prng, sizeof(places) / sizeof(places[0]))];
+	unsigned command = prng_below(prng, 3) == 0 ? 4 : 3;
+	size_t len = 4 + (size_t)prng_below(prng, room - 4);
+
+	place += prng_below(prng, 4) == 0 ? (unsigned)prng_below(prng, 16) : 0;
+	command = prng_below(prng, 20) == 0 ? (unsigned)prng_below(prng, 8) : command;
+	out[0] = (uint8_t)(place >> 5);
+	out[1] = (uint8_t)((place & 0x1f) << 3 | 6);
+	out[2] = (uint8_t)((place >> 13) << 5 | command << 2);
+	for (size_t i = 3; i < len; i++) {
+		out[i] = (uint8_t)(command == 4 ? prng_below(prng, 256) : 0);
+	}
+	out[3] = command == 3 ? 0xff : out[3];
+	out[len - 1] = prng_below(prng, 10) != 0 ? 0xff : out[len - 1];
+	if (prng_below(prng, 20) == 0) {
+		out[prng_below(prng, len)] = 0xff;
+	}
+	return prng_below(prng, 20) == 0 ? (size_t)prng_below(prng, len) : len;
+}
+
+static void exchange_in_parts(struct pins *p, struct prng *prng, const uint8_t *out, uint8_t *in,
+			      size_t len)
+{
+	size_t part;
+
+	memcpy(in, out, len);
+	pdi_spi_select(&p->spi);
+	for (size_t i = 0; i < len; i += part) {
+		part = 1 + (size_t)prng_below(prng, len - i);
+		pdi_spi_exchange(&p->spi, in + i, in + i, part);
+	}
+	pdi_spi_deselect(&p->spi);
+}
+
+static void exchange_octets(struct pins *p, const uint8_t *out, uint8_t *in, size_t len)
+{
+	pdi_spi_select(&p->spi);
+	for (size_t i = 0; i < len; i++) {
+		pdi_spi_exchange(&p->spi, out + i, in + i, 1);
+	}
+	pdi_spi_deselect(&p->spi);
+}
+
+TEST(pdi_spi, blocks_are_the_same_as_octets_to_the_last_bit)
+{
+	static struct pins blocks;
+	static struct pins single;
+	struct prng prng = { 3 };
+	uint64_t errors_seen = 0;
+
+	begin(&blocks);
+	add_sync_managers(&blocks);
+	single = blocks;
+	single.esc.sii = blocks.esc.sii; /* neither writes it */
+	single.spi.esc = &single.esc;
+	for (unsigned n = 0; n < 20000; n++) {
+		uint8_t out[60];
+		uint8_t in[2][60];
+		size_t len = random_access(&prng, out, sizeof(out));
+
+		exchange_in_parts(&blocks, &prng, out, in[0], len);
+		exchange_octets(&single, out, in[1], len);
+		CHECK_MEM(in[0], in[1], len);
+		CHECK_EQ(blocks.spi.now_ns, single.spi.now_ns);
+		CHECK_EQ(blocks.spi.tenths, single.spi.tenths);
+		CHECK_EQ(blocks.spi.octets, single.spi.octets);
+		CHECK_EQ(pdi_spi_due_ns(&blocks.spi), pdi_spi_due_ns(&single.spi));
+		CHECK_EQ(errors(&blocks), errors(&single));
+		CHECK_MEM(&blocks.esc, &single.esc, sizeof(blocks.esc));
+		errors_seen += errors(&blocks) > 0;
+		blocks.esc.reg[ESC_REG_PDI_ERROR] = single.esc.reg[ESC_REG_PDI_ERROR] = 0;
+	}
+	CHECK(errors_seen > 100);
+	CHECK(blocks.esc.sm[2].completed + blocks.esc.sm[3].completed > 100);
 }
