@@ -188,8 +188,11 @@ static void do_read(struct esc *esc, const struct esc_frame *frame, struct ecat_
 	if (!read_memory(esc, frame, dg->ado, got, dg->data_len)) {
 		return;
 	}
-	for (size_t i = 0; i < dg->data_len; i++) {
-		dg->data[i] = is_broadcast ? dg->data[i] | got[i] : got[i];
+	if (!is_broadcast) {
+		memcpy(dg->data, got, dg->data_len);
+	}
+	for (size_t i = 0; is_broadcast && i < dg->data_len; i++) {
+		dg->data[i] |= got[i];
 	}
 	add_wkc(dg, 1);
 }

@@ -185,6 +185,9 @@ struct esc {
 	uint8_t ram[ESC_RAM_BYTES];
 	struct esc_sm sm[ESC_LIMIT_SM];
 	struct esc_fmmu fmmu[ESC_LIMIT_FMMU];
+	uint16_t sm_mapped;    /* bit n: SM n minds its area, active or locked */
+	uint16_t fmmu_active;  /* bit n: FMMU n maps something, */
+	uint16_t fmmu_writing; /* and writes */
 	struct esc_clock clock;
 	struct esc_sync sync;
 	uint32_t al_event;

@@ -29,11 +29,39 @@ uint64_t esc_local_time(const struct esc *esc, int64_t t_ns)
 	return local - (local - c->phase_ns) % TICK_NS;
 }
 
-uint64_t esc_system_time(const struct esc *esc, int64_t t_ns)
+static uint64_t system_of(const struct esc *esc, uint64_t local_ns)
 {
-	uint64_t s = esc_local_time(esc, t_ns) + esc->clock.offset_ns;
+	uint64_t s = local_ns + esc->clock.offset_ns;
 
 	return esc->features.dc == ESC_DC_32 ? s & UINT32_MAX : s;
+}
+
+uint64_t esc_system_time(const struct esc *esc, int64_t t_ns)
+{
+	return system_of(esc, esc_local_time(esc, t_ns));
+}
+
+/*
+ * How long it takes to pass @left of 2^-48 ns, rounded up to whole ns of true time: by steps that
+ * each leave the rate's part of the error, since a division of 128 bits takes longer.
+ */
+static int64_t when_passed(const struct esc_clock *c, __int128 left)
+{
+	__int128 speed = RATE_ONE + c->rate;
+	int64_t dt = (int64_t)(left >> RATE_BITS);
+	int64_t step;
+
+	do {
+		step = (int64_t)((left - dt * speed) >> RATE_BITS);
+		dt += step;
+	} while (step > 1 || step < -1);
+	while (dt * speed < left) {
+		dt++;
+	}
+	while ((dt - 1) * speed >= left) {
+		dt--;
+	}
+	return dt;
 }
 
 /* First true time at which the tick is at or past @local_ns. */
@@ -43,19 +71,13 @@ static int64_t when_local(const struct esc_clock *c, uint64_t local_ns)
 	uint64_t tick = past == 0 ? local_ns : local_ns + (TICK_NS - past);
 	__int128 left = ((__int128)(int64_t)(tick - c->base_local_ns) << RATE_BITS) -
 			(__int128)c->base_fraction;
-	__int128 speed = RATE_ONE + c->rate;
-	__int128 dt = left / speed;
-
-	/* Rounded up to whole ns of true time. */
-	if (left > 0 && left % speed != 0) {
-		dt++;
-	}
-	return c->base_true_ns + (int64_t)dt;
+	return c->base_true_ns + when_passed(c, left);
 }
 
 int64_t esc_clock_when(const struct esc *esc, int64_t t_ns, uint64_t system_ns)
 {
-	uint64_t left = system_ns - esc_system_time(esc, t_ns);
+	uint64_t local = esc_local_time(esc, t_ns);
+	uint64_t left = system_ns - system_of(esc, local);
 	int64_t at_ns;
 
 	/* The tick that is on now has not passed. */
@@ -70,7 +92,7 @@ int64_t esc_clock_when(const struct esc *esc, int64_t t_ns, uint64_t system_ns)
 	if (left > INT64_MAX / 4) {
 		return INT64_MAX;
 	}
-	at_ns = when_local(&esc->clock, esc_local_time(esc, t_ns) + left);
+	at_ns = when_local(&esc->clock, local + left);
 	return at_ns > t_ns ? at_ns : t_ns;
 }
 

@@ -29,7 +29,7 @@ static int64_t rate_of_speed(const struct esc_clock *c, int64_t d)
 	int64_t s = (int64_t)c->speed_start + 2;
 	int64_t divisor = 5 * (s + d) * (s - d);
 
-	return (int64_t)(((__int128)d * ((__int128)1 << RATE_SCALE_BITS)) / divisor);
+	return d * ((int64_t)1 << RATE_SCALE_BITS) / divisor; /* |d| < 2^15 */
 }
 
 /* The D whose rate is nearest to @wanted: the positive root of 5 w D^2 + D - 5 w S^2 = 0. */
@@ -74,14 +74,18 @@ static void regulate(struct esc *esc, int64_t t_ns, double behind_ns)
 				: 1.0;
 	double limit = (double)rate_of_speed(c, speed_limit(c)) * 0x1p-48;
 	double proportional = 2.0 * gain * behind_ns / c->interval_ns;
+	int64_t speed_diff;
 
 	/* Driven to its limit it learns nothing about the crystals. */
 	if (fabs(proportional) < limit) {
 		c->integral += gain * gain * slower * behind_ns / c->interval_ns;
 		c->integral = fmax(-limit, fmin(limit, c->integral));
 	}
-	c->speed_diff = speed_of_rate(c, c->integral + proportional);
-	esc_clock_correct(esc, t_ns, rate_of_speed(c, c->speed_diff));
+	speed_diff = speed_of_rate(c, c->integral + proportional);
+	if (speed_diff != c->speed_diff) {
+		c->speed_diff = speed_diff;
+		esc_clock_correct(esc, t_ns, rate_of_speed(c, speed_diff));
+	}
 }
 
 void esc_dc_compare(struct esc *esc, int64_t t_ns, uint64_t received_ns)

@@ -5,7 +5,7 @@
 
 #include <string.h>
 
-enum { FMMU_READ = 1, FMMU_WRITE = 2, LOGICAL_BYTES_MAX = ECAT_DATAGRAM_MAX_BYTES };
+enum { LOGICAL_BYTES_MAX = ECAT_DATAGRAM_MAX_BYTES };
 
 /* Registers can be mapped, too (mailbox status); so a read may do what reading a register does. */
 static int read_physical(struct esc *esc, int64_t t_ns, uint16_t addr, uint8_t *buf, size_t len)
@@ -33,6 +33,13 @@ struct overlap {
 	size_t physical_bit;
 	size_t bits;
 };
+
+/* As most are of a line's: by whole bytes. */
+static int is_elsewhere(const struct esc_fmmu *f, uint32_t start, size_t len)
+{
+	return f->logical_start >= (uint64_t)start + len ||
+	       start >= (uint64_t)f->logical_start + f->len;
+}
 
 static int overlaps(const struct esc_fmmu *f, uint32_t start, size_t len, struct overlap *ret)
 {
@@ -75,12 +82,13 @@ static void copy_bits(uint8_t *to, size_t to_bit, const uint8_t *from, size_t fr
 static int read_mapped(struct esc *esc, int64_t t_ns, const struct esc_fmmu *f,
 		       const struct overlap *o, uint8_t *data)
 {
-	uint8_t physical[LOGICAL_BYTES_MAX + 2] = { 0 };
+	uint8_t physical[LOGICAL_BYTES_MAX + 2];
 
 	if (f->is_bytewise) {
 		return read_physical(esc, t_ns, physical_address(f, o), data + o->datagram_bit / 8,
 				     o->bits / 8);
 	}
+	memset(physical, 0, physical_bytes(o));
 	if (!read_physical(esc, t_ns, physical_address(f, o), physical, physical_bytes(o))) {
 		return 0;
 	}
@@ -121,7 +129,8 @@ static int write_mapped(struct esc *esc, const struct esc_frame *frame, const st
 void esc_fmmu_access(struct esc *esc, const struct esc_frame *frame, struct ecat_datagram *dg)
 {
 	uint32_t start = ecat_logical_address(dg);
-	uint8_t came[LOGICAL_BYTES_MAX];
+	uint8_t copy[LOGICAL_BYTES_MAX];
+	const uint8_t *came = dg->data;
 	int is_read = dg->cmd == ECAT_CMD_LRD || dg->cmd == ECAT_CMD_LRW;
 	int is_write = dg->cmd == ECAT_CMD_LWR || dg->cmd == ECAT_CMD_LRW;
 	int did_read = 0;
@@ -131,18 +140,21 @@ void esc_fmmu_access(struct esc *esc, const struct esc_frame *frame, struct ecat
 	if (dg->cmd == ECAT_CMD_LRW && (esc->features.features & ESC_FEATURE_NO_LRW) != 0) {
 		return;
 	}
-	memcpy(came, dg->data, dg->data_len);
-	for (unsigned n = 0; n < esc->features.fmmu_count; n++) {
-		const struct esc_fmmu *f = &esc->fmmu[n];
+	for (unsigned left = esc->fmmu_active; left != 0;) {
+		const struct esc_fmmu *f = &esc->fmmu[esc_take_lowest(&left)];
 		struct overlap o;
 
-		if (!f->is_active || !overlaps(f, start, dg->data_len, &o)) {
+		if (is_elsewhere(f, start, dg->data_len) || !overlaps(f, start, dg->data_len, &o)) {
 			continue;
 		}
 		if (is_write && (f->type & FMMU_WRITE)) {
 			did_write |= write_mapped(esc, frame, f, &o, came);
 		}
 		if (is_read && (f->type & FMMU_READ)) {
+			if (is_write && came == dg->data && (left & esc->fmmu_writing) != 0) {
+				memcpy(copy, dg->data, dg->data_len);
+				came = copy;
+			}
 			did_read |= read_mapped(esc, frame->pu_ns, f, &o, dg->data);
 		}
 	}

@@ -29,6 +29,8 @@ const uint8_t *esc_ram_last_written(struct esc *esc, uint16_t addr);
 
 /* --- esc_fmmu.c --- */
 
+enum fmmu_type { FMMU_READ = 1, FMMU_WRITE = 2 };
+
 /** A logical datagram; adds to the working counter. */
 void esc_fmmu_access(struct esc *esc, const struct esc_frame *frame, struct ecat_datagram *dg);
 
@@ -102,9 +104,31 @@ void esc_pdi_watchdog_trigger(struct esc *esc, int64_t t_ns);
 void esc_pdi_watchdog_expire(struct esc *esc);
 int esc_pdi_watchdog_is_running(const struct esc *esc);
 
+/** The lowest bit of @set, which is not empty; it is taken out. */
+static inline unsigned esc_take_lowest(unsigned *set)
+{
+	unsigned n = (unsigned)__builtin_ctz(*set);
+
+	*set &= *set - 1;
+	return n;
+}
+
 static inline int esc_bit(const uint8_t *map, unsigned n)
 {
 	return map[n / 8] >> (n % 8) & 1;
+}
+
+/** Are all @len bits from @n on set? At most 16 of them, in a map of ESC_REGISTER_BYTES. */
+static inline int esc_bits(const uint8_t *map, unsigned n, size_t len)
+{
+	unsigned wanted = (1u << len) - 1;
+	uint32_t bits;
+
+	if (n / 8 + sizeof(bits) > ESC_REGISTER_BYTES / 8) {
+		return 0;
+	}
+	bits = get_le32(map + n / 8) >> (n % 8);
+	return (bits & wanted) == wanted;
 }
 
 #endif

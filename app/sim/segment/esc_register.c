@@ -14,6 +14,8 @@ enum register_bits {
 	DL_ENHANCED_LINK = 0x04,
 };
 
+enum { BITS_AT_ONCE = 16 };
+
 /* --- reading --- */
 
 static void refresh_dl_status(struct esc *esc)
@@ -85,18 +87,31 @@ static void acknowledge_ecat(struct esc *esc, uint16_t addr, size_t len)
 	}
 }
 
-int esc_register_read(struct esc *esc, enum esc_side side, int64_t t_ns, uint16_t addr,
-		      uint8_t *buf, size_t len)
+static int copy_readable(const struct esc *esc, uint16_t addr, uint8_t *buf, size_t len)
 {
 	int any = 0;
 
-	refresh(esc, side, t_ns, addr, len);
 	for (size_t i = 0; i < len; i++) {
 		size_t at = addr + i;
 		int is_there = at < ESC_REGISTER_BYTES && esc_bit(esc->readable, (unsigned)at);
 
 		buf[i] = is_there ? esc->reg[at] : 0;
 		any |= is_there;
+	}
+	return any;
+}
+
+int esc_register_read(struct esc *esc, enum esc_side side, int64_t t_ns, uint16_t addr,
+		      uint8_t *buf, size_t len)
+{
+	int any;
+
+	refresh(esc, side, t_ns, addr, len);
+	if (len <= BITS_AT_ONCE && esc_bits(esc->readable, addr, len)) {
+		memcpy(buf, esc->reg + addr, len);
+		any = len > 0;
+	} else {
+		any = copy_readable(esc, addr, buf, len);
 	}
 	if (side == ESC_ECAT) {
 		acknowledge_ecat(esc, addr, len);
@@ -216,6 +231,12 @@ static void configure_fmmu(struct esc *esc, unsigned n)
 	f->type = r[11] & 3;
 	f->is_active = (r[12] & 1) && f->len > 0 &&
 		       (f->len > 1 || f->logical_end_bit >= f->logical_start_bit);
+	esc->fmmu_active &= (uint16_t)~(1u << n);
+	esc->fmmu_writing &= (uint16_t)~(1u << n);
+	if (f->is_active) {
+		esc->fmmu_active |= (uint16_t)(1u << n);
+		esc->fmmu_writing |= (uint16_t)((f->type & FMMU_WRITE ? 1u : 0) << n);
+	}
 	f->is_bytewise =
 		f->logical_start_bit == 0 && f->logical_end_bit == 7 && f->physical_start_bit == 0;
 }
@@ -353,12 +374,23 @@ static int store(struct esc *esc, unsigned at, uint8_t value)
 	return 1;
 }
 
+/* The time that comes with each cycle: it is compared, and nothing is stored. */
+static int is_time_only(const struct esc *esc, uint16_t addr, size_t len)
+{
+	return addr == ESC_REG_DC_SYSTEM_TIME && (len == 4 || len == 8) &&
+	       esc_bits(esc->ecat_writable, addr, len) && !is_protected(esc, addr);
+}
+
 int esc_register_write(struct esc *esc, const struct esc_frame *frame, uint16_t addr,
 		       const uint8_t *buf, size_t len)
 {
 	size_t run = 0; /* bytes stored without a hole, just before @i */
 	int any = 0;
 
+	if (is_time_only(esc, addr, len)) {
+		time_written(esc, frame->pu_ns, buf, len);
+		return 1;
+	}
 	for (size_t i = 0; i <= len; i++) {
 		if (i < len && store(esc, (unsigned)(addr + i), buf[i])) {
 			run++;

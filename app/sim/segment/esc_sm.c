@@ -113,6 +113,10 @@ void esc_sm_configure(struct esc *esc, unsigned n, enum esc_side side)
 	sm->is_ecat_write = (sm->control & 0x0c) == SM_DIRECTION_WRITE;
 	sm->is_active = (r[SM_ACTIVATE] & 1) && !(r[SM_PDI_CONTROL] & 1) && sm->len > 0;
 	sm->is_locked = (r[SM_ACTIVATE] & 1) && (r[SM_PDI_CONTROL] & 1) && sm->len > 0;
+	esc->sm_mapped &= (uint16_t)~(1u << n);
+	if ((sm->is_active || sm->is_locked) && sm->start >= ESC_REG_PROCESS_RAM) {
+		esc->sm_mapped |= (uint16_t)(1u << n);
+	}
 	if (!was_active || !sm->is_active) {
 		reset(esc, sm);
 	}
@@ -230,12 +234,11 @@ static int sm_write(struct esc *esc, struct esc_sm *sm, const struct writer *by,
 
 static struct esc_sm *sm_at(struct esc *esc, size_t addr, size_t *len)
 {
-	for (unsigned i = 0; i < esc->features.sm_count; i++) {
-		struct esc_sm *sm = &esc->sm[i];
+	for (unsigned left = esc->sm_mapped; left != 0;) {
+		struct esc_sm *sm = &esc->sm[esc_take_lowest(&left)];
 		size_t end = (size_t)sm->start + sm->len;
 
-		if ((!sm->is_active && !sm->is_locked) || sm->start < ESC_REG_PROCESS_RAM ||
-		    addr >= end) {
+		if (addr >= end) {
 			continue;
 		}
 		if (addr >= sm->start) {
