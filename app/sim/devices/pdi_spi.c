@@ -248,10 +248,34 @@ static size_t read_piece(struct pdi_spi *spi, const uint8_t *out, uint8_t *in, s
 	return len;
 }
 
+/* The usual address, of three octets. */
+static size_t header_piece(struct pdi_spi *spi, const uint8_t *out, uint8_t *in)
+{
+	uint8_t last = out[2];
+
+	spi->header[0] = out[0];
+	spi->header[1] = out[1];
+	spi->header[2] = last;
+	spi->address = (uint16_t)(out[0] << 5 | out[1] >> 3 | (last >> 5) << 13);
+	spi->is_broken = (last & 3) != 0;
+	begin(spi, last >> 2 & 7u, ADDRESS_OCTETS + 1);
+	if (in != NULL) {
+		memcpy(in, spi->al_event, sizeof(spi->al_event));
+	}
+	clock_octets(spi, sizeof(spi->al_event));
+	return sizeof(spi->al_event);
+}
+
 /* How many octets were exchanged; 0: they have to go one by one. */
 static size_t exchange_piece(struct pdi_spi *spi, const uint8_t *out, uint8_t *in, size_t len)
 {
-	if (!spi->is_selected || spi->is_broken || is_header(spi) || spi->pos < spi->data_pos) {
+	if (!spi->is_selected || spi->is_broken) {
+		return 0;
+	}
+	if (spi->pos == 0 && len >= sizeof(spi->header) && (out[1] & 7) == SPI_ADDRESS_EXTENSION) {
+		return header_piece(spi, out, in);
+	}
+	if (is_header(spi) || spi->pos < spi->data_pos) {
 		return 0;
 	}
 	switch (spi->command) {

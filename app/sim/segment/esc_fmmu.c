@@ -41,7 +41,8 @@ static int is_elsewhere(const struct esc_fmmu *f, uint32_t start, size_t len)
 	       start >= (uint64_t)f->logical_start + f->len;
 }
 
-static int overlaps(const struct esc_fmmu *f, uint32_t start, size_t len, struct overlap *ret)
+static int overlaps_by_bits(const struct esc_fmmu *f, uint32_t start, size_t len,
+			    struct overlap *ret)
 {
 	uint64_t f_first = (uint64_t)f->logical_start * 8 + f->logical_start_bit;
 	uint64_t f_end = ((uint64_t)f->logical_start + f->len - 1) * 8 + f->logical_end_bit + 1u;
@@ -57,6 +58,19 @@ static int overlaps(const struct esc_fmmu *f, uint32_t start, size_t len, struct
 				 .physical_bit = (size_t)(from - f_first) + f->physical_start_bit,
 				 .bits = (size_t)(to - from) };
 	return 1;
+}
+
+static int overlaps(const struct esc_fmmu *f, uint32_t start, size_t len, struct overlap *ret)
+{
+	uint32_t offset = f->logical_start - start;
+
+	/* All of it is there, as usual. */
+	if (f->is_bytewise && f->logical_start >= start && offset + (size_t)f->len <= len) {
+		*ret = (struct overlap){ .datagram_bit = (size_t)offset * 8,
+					 .bits = (size_t)f->len * 8 };
+		return 1;
+	}
+	return overlaps_by_bits(f, start, len, ret);
 }
 
 static uint16_t physical_address(const struct esc_fmmu *f, const struct overlap *o)

@@ -15,6 +15,7 @@ static void plan(struct node *n)
 {
 	int64_t next = esc_next_event_ns(&n->esc);
 
+	n->chip_ns = next;
 	if (!n->has_power) {
 		n->next_ns = INT64_MAX;
 		return;
@@ -58,8 +59,11 @@ static void run_next(struct node *n)
 
 	if (at >= n->next_wander_ns) {
 		wander(n);
+		n->chip_ns = esc_next_event_ns(&n->esc);
 	}
-	esc_advance(&n->esc, at);
+	if (at >= n->chip_ns) {
+		esc_advance(&n->esc, at);
+	}
 	if (n->device != NULL && n->device->ops->next_wake_ns(n->device) <= at) {
 		n->device->ops->run(n->device, at);
 	}

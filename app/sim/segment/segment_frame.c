@@ -2,8 +2,10 @@
 /* A frame passes the segment: slave by slave, each at its own time, datagram by datagram. */
 #include <errno.h>
 
+#include "base/bytes.h"
 #include "segment/segment_internal.h"
 #include "wire/datagram.h"
+#include "wire/esc_reg.h"
 
 enum {
 	DATAGRAMS_MAX = 128,
@@ -50,6 +52,18 @@ static struct esc_frame shift(const struct esc_frame *passing, struct node *n, i
 	return f;
 }
 
+/*
+ * To another station, and with nothing to say in its IRQ field: nothing happens to it here. Most
+ * datagrams of a frame that asks many slaves are that.
+ */
+static int is_for_others(const struct esc *esc, const struct ecat_datagram *dg)
+{
+	return (dg->cmd == ECAT_CMD_FPRD || dg->cmd == ECAT_CMD_FPWR || dg->cmd == ECAT_CMD_FPRW) &&
+	       dg->adp != get_le16(esc->reg + ESC_REG_STATION_ADDRESS) &&
+	       !(esc->reg[ESC_REG_DL_CONTROL + 3] & 1) &&
+	       (esc->ecat_event & get_le16(esc->reg + ESC_REG_ECAT_EVENT_MASK)) == 0;
+}
+
 static void pass(struct node *n, const struct esc_frame *passing, int64_t t_ns,
 		 const uint8_t *frame, struct ecat_datagram *dg, int count)
 {
@@ -62,8 +76,12 @@ static void pass(struct node *n, const struct esc_frame *passing, int64_t t_ns,
 		int64_t offset = (int64_t)(dg[i].wkc - frame) + PREAMBLE_BYTES;
 
 		now_ns = f.pu_ns + offset * NS_A_BYTE;
-		segment_run_node(n, now_ns);
-		esc_datagram(&n->esc, &f, &dg[i]);
+		if (n->next_ns <= now_ns) {
+			segment_run_node(n, now_ns);
+		}
+		if (!is_for_others(&n->esc, &dg[i])) {
+			esc_datagram(&n->esc, &f, &dg[i]);
+		}
 	}
 	if (n->device != NULL && n->device->ops->frame_passed != NULL) {
 		n->device->ops->frame_passed(n->device, now_ns);

@@ -29,6 +29,7 @@ struct node {
 	int is_cut;       /* the cable towards the parent */
 	int is_unplugged; /* out of the line: its neighbours are connected to each other */
 	int64_t next_wander_ns;
+	int64_t chip_ns; /* of those of its slave controller */
 	int64_t next_ns; /* of all of its own events */
 };
 

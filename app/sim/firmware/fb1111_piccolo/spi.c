@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "spi.h"
 
+#include <string.h>
+
 enum spi_command {
 	SPI_NOP = 0,             /* two address octets, no data */
 	SPI_READ_WAIT_STATE = 3, /* one 0xff between address and data */
@@ -29,11 +31,9 @@ static void begin(struct piccolo *p, uint16_t address, enum spi_command command)
 void piccolo_spi_read(struct piccolo *p, uint16_t address, octet_t *data, uint16_t len)
 {
 	static const octet_t wait_state[1] = { SPI_WAIT_STATE };
-	uint16_t i;
 
-	for (i = 0; i < len; i++) {
-		data[i] = i + 1u == len ? SPI_LAST : SPI_MORE;
-	}
+	memset(data, SPI_MORE, len * sizeof(*data));
+	data[len - 1u] = SPI_LAST;
 	begin(p, address, SPI_READ_WAIT_STATE);
 	p->hal.spi_exchange(p->hal.ctx, wait_state, 0, 1);
 	p->hal.spi_exchange(p->hal.ctx, data, data, len);

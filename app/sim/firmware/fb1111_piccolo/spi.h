@@ -11,7 +11,7 @@
 
 enum { SPI_CHUNK = 16 }; /* longest stretch with interrupts off, in data octets */
 
-/* The caller keeps interrupts off, or is the interrupt. */
+/* The caller keeps interrupts off, or is the interrupt. @len is 1 or more. */
 void piccolo_spi_read(struct piccolo *p, uint16_t address, octet_t *data, uint16_t len);
 void piccolo_spi_write(struct piccolo *p, uint16_t address, const octet_t *data, uint16_t len);
 /** No access at all: only the AL events come back. */
