@@ -10,8 +10,9 @@
 
 #include "foreign.h"
 #include "new_file.h"
+#include "run_path.h"
 
-enum { READ_TRIES = 100 };
+enum { READ_TRIES = 100, OWN_MODE = 0644 };
 
 static const char *const bus_names[] = { "DOWN",       "SCANNING", "PREOP",  "SAFEOP", "OP",
 					 "RECOVERING", "STOPPED",  "FAILED", "INIT" };
@@ -70,6 +71,17 @@ void *status_create(const char *path, uint64_t magic, uint32_t bytes, unsigned f
 		return NULL;
 	}
 	return file.map;
+}
+
+void *status_create_own(const char *path, uint64_t magic, uint32_t bytes)
+{
+	int r = run_path_own_folder(path);
+
+	if (r < 0) {
+		errno = -r;
+		return NULL;
+	}
+	return status_create(path, magic, bytes, OWN_MODE);
 }
 
 /* 1: all texts of the copy are whole; 0: one was being written; -EPROTO: the file is too short. */

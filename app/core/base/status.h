@@ -254,6 +254,8 @@ const char *stream_state_to_str(uint32_t state);
  * writing; the caller fills it. NULL with errno. Unmap with status_unmap(). Context: blocking.
  */
 void *status_create(const char *path, uint64_t magic, uint32_t bytes, unsigned file_mode);
+/** The same in a folder of its own (base/run_path.h), for all to read. */
+void *status_create_own(const char *path, uint64_t magic, uint32_t bytes);
 /**
  * Copy the page at @path to @ret_page, which has @bytes; @sequence_offset is the place of its
  * text_sequence, 0: it has none. 0; -ENOENT, ...; -EPROTO: another version, or too short (ret

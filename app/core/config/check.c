@@ -134,7 +134,7 @@ static int check_dds(const struct config *cfg, const struct option_lines *lines,
 
 static int is_token(const char *text)
 {
-	return is_made_of(text, CONFIG_STREAM_TOKEN);
+	return is_made_of(text, CONFIG_TOKEN);
 }
 
 static int check_stream(const struct config *cfg, const struct option_lines *lines,

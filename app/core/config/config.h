@@ -342,8 +342,8 @@ enum { CONFIG_WHY_BYTES = 192 };
  */
 int config_parse_duration(const char *text, int64_t *ret_ns, char *reason);
 
-/* What a token of a NATS subject, and the name of a stream, may be made of here. */
-#define CONFIG_STREAM_TOKEN "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-"
+/* What the name of an appliance, as in NATS subjects and keys of objects, may be made of. */
+#define CONFIG_TOKEN "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-"
 
 /* Files of the run directory, which is ecdaqd's; a service has a folder of its own in it. */
 #define CONFIG_RUN_SAMPLES "samples"                 /* ring of samples */

@@ -4,10 +4,7 @@
 #include <stdio.h>
 #include <unistd.h>
 
-#include "base/run_path.h"
 #include "publish/domain.h"
-
-enum { PAGE_MODE = 0644 };
 
 static void set(_Atomic uint64_t *field, uint64_t value)
 {
@@ -21,10 +18,7 @@ static int have_page(struct own_status *own, const struct config *cfg)
 	if (own->page != NULL) {
 		return 1;
 	}
-	if (run_path_own_folder(own->path) < 0) {
-		return 0;
-	}
-	page = status_create(own->path, DDS_STATUS_MAGIC, sizeof(*page), PAGE_MODE);
+	page = status_create_own(own->path, DDS_STATUS_MAGIC, sizeof(*page));
 	if (page == NULL) {
 		return 0;
 	}

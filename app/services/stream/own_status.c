@@ -4,10 +4,6 @@
 #include <stdio.h>
 #include <unistd.h>
 
-#include "base/run_path.h"
-
-enum { PAGE_MODE = 0644 };
-
 #define COPY(to, from, field)                                                                      \
 	atomic_store_explicit(&(to)->field,                                                        \
 			      atomic_load_explicit(&(from)->field, memory_order_relaxed),          \
@@ -23,9 +19,8 @@ int own_status_init(struct own_status *own, const struct config *cfg, const char
 
 static int have_page(struct own_status *own)
 {
-	if (own->page == NULL && run_path_own_folder(own->path) == 0) {
-		own->page = status_create(own->path, STREAM_STATUS_MAGIC, sizeof(*own->page),
-					  PAGE_MODE);
+	if (own->page == NULL) {
+		own->page = status_create_own(own->path, STREAM_STATUS_MAGIC, sizeof(*own->page));
 		if (own->page != NULL) {
 			own->page->pid = getpid();
 			snprintf(own->page->stream, sizeof(own->page->stream), "%s",

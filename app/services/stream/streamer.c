@@ -5,11 +5,11 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "base/clock.h"
 #include "base/host_clock.h"
-#include "base/prng.h"
+#include "program/appliance.h"
+#include "program/trouble.h"
 #include "reader/feed.h"
 #include "stream/history.h"
 #include "stream/live.h"
@@ -35,10 +35,7 @@ struct streamer {
 	void (*report)(const char *line);
 	struct own_status own;
 	int64_t status_ns;
-	char reported[BROKER_PROBLEM_BYTES]; /* newest problem; "": none */
-	int64_t retry_ns;                    /* when to connect again */
-	int64_t backoff_ns;
-	struct prng prng;
+	struct trouble trouble;
 
 	struct live *live;
 	struct history *history; /* NULL: not reading recordings */
@@ -70,28 +67,9 @@ static void set_state(struct streamer *s, enum stream_state state)
 	atomic_store_explicit(&s->own.now.state, state, memory_order_relaxed);
 }
 
-/* stream.appliance, else the host's name up to its first dot. */
-static int name_appliance(struct streamer *s)
-{
-	char host[SENDER_APPLIANCE_BYTES];
-	const char *name = s->cfg->stream_appliance;
-
-	if (name[0] == '\0') {
-		if (gethostname(host, sizeof(host)) < 0) {
-			return -EINVAL;
-		}
-		host[sizeof(host) - 1] = '\0';
-		name = host;
-	}
-	snprintf(s->sender.appliance, sizeof(s->sender.appliance), "%.*s", (int)strcspn(name, "."),
-		 name);
-	name = s->sender.appliance;
-	return name[0] != '\0' && strspn(name, CONFIG_STREAM_TOKEN) == strlen(name) ? 0 : -EINVAL;
-}
-
 static int prepare(struct streamer *s, char *error, size_t error_bytes)
 {
-	int r = name_appliance(s);
+	int r = appliance_name(s->cfg->stream_appliance, s->sender.appliance);
 
 	if (r < 0) {
 		snprintf(error, error_bytes,
@@ -129,8 +107,7 @@ int streamer_create(const struct config *cfg, void (*report)(const char *line),
 	s->sender.cfg = cfg;
 	s->sender.now = &s->own.now;
 	s->report = report;
-	s->backoff_ns = RETRY_FIRST_NS;
-	s->prng.state = (uint64_t)now_ns() ^ (uint64_t)getpid() << 32;
+	trouble_init(&s->trouble, report, RETRY_FIRST_NS, RETRY_LAST_NS);
 	r = prepare(s, error, error_bytes);
 	if (r < 0) {
 		streamer_destroy(s);
@@ -151,41 +128,26 @@ static void close_sources(struct streamer *s)
 	sender_done(&s->sender);
 }
 
-/* A problem, once; until it is another one, or over. */
-static void tell_problem(struct streamer *s)
-{
-	snprintf(s->own.now.message, sizeof(s->own.now.message), "%s", s->sender.problem);
-	if (strcmp(s->sender.problem, s->reported) != 0) {
-		snprintf(s->reported, sizeof(s->reported), "%s", s->sender.problem);
-		s->report(s->sender.problem);
-	}
-}
-
 static void tell_recovery(struct streamer *s)
 {
 	char line[LINE_BYTES];
 
-	if (s->reported[0] != '\0' || s->own.now.message[0] != '\0') {
+	if (trouble_is_over(&s->trouble)) {
 		snprintf(line, sizeof(line), "%s: stream %s: sending",
 			 broker_server(s->sender.broker), s->cfg->stream_name);
 		s->report(line);
 	}
-	s->reported[0] = '\0';
 	s->own.now.message[0] = '\0';
-	s->backoff_ns = RETRY_FIRST_NS;
 }
 
-/* Something failed: begin again, later each time and not all appliances at once. */
+/* Something failed: begin again. */
 static void back_off(struct streamer *s)
 {
-	uint64_t half = (uint64_t)s->backoff_ns / 2;
-
 	broker_disconnect(s->sender.broker);
 	close_sources(s);
-	tell_problem(s);
+	snprintf(s->own.now.message, sizeof(s->own.now.message), "%s", s->sender.problem);
+	trouble_found(&s->trouble, s->sender.problem);
 	set_state(s, STREAM_CONNECTING);
-	s->retry_ns = now_ns() + (int64_t)(half + prng_below(&s->prng, half));
-	s->backoff_ns = 2 * s->backoff_ns > RETRY_LAST_NS ? RETRY_LAST_NS : 2 * s->backoff_ns;
 }
 
 /* What the stream has of this appliance, and the sources from their beginnings. */
@@ -484,7 +446,7 @@ int64_t streamer_step(struct streamer *s)
 	int r = 0;
 
 	s->sender.problem[0] = '\0';
-	if (!broker_is_connected(s->sender.broker) && now_ns() < s->retry_ns) {
+	if (!broker_is_connected(s->sender.broker) && !trouble_is_due(&s->trouble)) {
 		wait_ns = FOLLOW_NS;
 	} else if (!broker_is_connected(s->sender.broker)) {
 		r = connect_and_begin(s);
