@@ -14,6 +14,7 @@ const char *config_effect_to_str(uint32_t effect)
 		[CONFIG_EFFECT_SYNC0] = "restart of ecdaq-sync0",
 		[CONFIG_EFFECT_WEB] = "restart of ecdaq-web",
 		[CONFIG_EFFECT_STREAM] = "restart of ecdaq-stream",
+		[CONFIG_EFFECT_UPLINK] = "restart of ecdaq-uplink",
 	};
 
 	return effect < CONFIG_EFFECTS ? texts[effect] : "?";

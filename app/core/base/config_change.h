@@ -18,6 +18,7 @@ enum config_effect {
 	CONFIG_EFFECT_SYNC0,   /* ecdaq-sync0 */
 	CONFIG_EFFECT_WEB,     /* ecdaq-web */
 	CONFIG_EFFECT_STREAM,  /* ecdaq-stream */
+	CONFIG_EFFECT_UPLINK,  /* ecdaq-uplink */
 	CONFIG_EFFECTS,
 };
 

@@ -169,6 +169,64 @@ static int check_stream(const struct config *cfg, const struct option_lines *lin
 			   fault);
 }
 
+static int is_prefix(const char *text)
+{
+	size_t len = strlen(text);
+
+	return is_made_of(text, CONFIG_TOKEN "./") && text[0] != '/' &&
+	       (len == 0 || text[len - 1] != '/') && strstr(text, "//") == NULL;
+}
+
+static int is_endpoint(const char *text)
+{
+	const char *host = strncmp(text, "https://", 8) == 0  ? text + 8
+			   : strncmp(text, "http://", 7) == 0 ? text + 7
+							      : "";
+
+	return host[0] != '\0' && is_made_of(host, HOST_CHARS "[]");
+}
+
+static int check_uplink(const struct config *cfg, const struct option_lines *lines,
+			const struct option_faults *faults)
+{
+	const char *key = NULL;
+	const char *fault = "is required while uplink.enable is on";
+	int line;
+
+	if (!cfg->uplink_enable) {
+		return 0;
+	}
+	if (cfg->uplink_endpoint[0] == '\0') {
+		key = "uplink.endpoint";
+	} else if (!is_endpoint(cfg->uplink_endpoint)) {
+		key = "uplink.endpoint";
+		fault = "expected https://HOST or http://HOST, with :PORT or without, and no more";
+	} else if (cfg->uplink_bucket[0] == '\0') {
+		key = "uplink.bucket";
+	} else if (!is_made_of(cfg->uplink_bucket, CONFIG_TOKEN ".")) {
+		key = "uplink.bucket";
+		fault = "must be letters, digits, -, _ and .";
+	} else if (cfg->uplink_region[0] == '\0' || !is_token(cfg->uplink_region)) {
+		key = "uplink.region";
+		fault = "must be letters, digits, - and _";
+	} else if (!is_prefix(cfg->uplink_prefix)) {
+		key = "uplink.prefix";
+		fault = "must be letters, digits, -, _ and . with single / between";
+	} else if (!is_token(cfg->uplink_appliance)) {
+		key = "uplink.appliance";
+		fault = "must be letters, digits, - and _";
+	} else if (cfg->uplink_credentials[0] == '\0') {
+		key = "uplink.credentials";
+	} else if (cfg->uplink_dir[0] == '\0') {
+		key = "uplink.dir";
+	} else {
+		return 0;
+	}
+	line = line_of(lines, key);
+	return faults->add(faults->ctx, key, line != 0 ? line : line_of(lines, "uplink.enable"),
+			   fault);
+}
+
 /* Slave @i against those before it. */
 static const char *slave_fault(const struct config *cfg, size_t i, const char **ret_key,
 			       char *reason)
@@ -351,6 +409,7 @@ int option_cross_check(const struct config *cfg, const struct option_lines *line
 
 	is_over = is_over || check_dds(cfg, lines, &all);
 	is_over = is_over || check_stream(cfg, lines, &all);
+	is_over = is_over || check_uplink(cfg, lines, &all);
 	is_over = is_over || check_slaves(cfg, &all);
 	is_over = is_over || check_channels(cfg, &all);
 	is_over = is_over || check_outputs(cfg, &all);

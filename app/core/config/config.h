@@ -37,6 +37,8 @@ enum config_channel_type {
 };
 
 enum config_when_full { CONFIG_WHEN_FULL_OLDEST, CONFIG_WHEN_FULL_STOP };
+enum config_keep { CONFIG_KEEP_OFF, CONFIG_KEEP_UNTIL_FULL, CONFIG_KEEP_ALWAYS };
+enum config_addressing { CONFIG_ADDRESSING_PATH, CONFIG_ADDRESSING_HOST };
 /* When a start-up SDO is written (slaves[].sdo[].transition). */
 enum config_transition {
 	CONFIG_TRANSITION_IP, /* as soon as the slave is in PRE-OP */
@@ -210,6 +212,7 @@ struct config {
 	int64_t record_rotate_period_ns;
 	uint64_t record_rotate_bytes;
 	enum config_when_full record_when_full;
+	enum config_keep record_keep_until_uploaded;
 	enum config_record_values record_values;
 	uint64_t record_budget_bytes;  /* of all recordings; 0: none, and nothing is deleted */
 	uint64_t record_reserve_bytes; /* stays free */
@@ -245,6 +248,19 @@ struct config {
 	char stream_key[CONFIG_PATH_BYTES];
 	uint32_t stream_block_cycles;
 	uint64_t stream_memory_bytes;
+	/* uplink */
+	uint32_t uplink_enable;
+	char uplink_endpoint[CONFIG_PATH_BYTES]; /* URL */
+	char uplink_region[64];
+	char uplink_bucket[64];
+	enum config_addressing uplink_addressing;
+	char uplink_prefix[CONFIG_PATH_BYTES];      /* of the keys; "" = none */
+	char uplink_appliance[64];                  /* "" = host name */
+	char uplink_credentials[CONFIG_PATH_BYTES]; /* files */
+	char uplink_ca[CONFIG_PATH_BYTES];          /* "" = those of the system */
+	char uplink_dir[CONFIG_PATH_BYTES];         /* marks */
+	uint64_t uplink_part_bytes;
+	uint64_t uplink_rate_limit_bytes; /* in a second; 0: none */
 	/* sync0 */
 	uint32_t sync0_enable;
 	char sync0_edges[CONFIG_PATH_BYTES]; /* edge file of ecdaq-sim instead of lines; "" = lines
@@ -355,6 +371,7 @@ int config_parse_duration(const char *text, int64_t *ret_ns, char *reason);
 #define CONFIG_RUN_RECORD_STATUS "record/status"     /* struct record_status */
 #define CONFIG_RUN_DDS_STATUS "dds/status"           /* struct dds_status */
 #define CONFIG_RUN_STREAM_STATUS "stream/status"     /* struct stream_status */
+#define CONFIG_RUN_UPLINK_STATUS "uplink/status"     /* struct uplink_status */
 #define CONFIG_RUN_SYNC0 "sync0/results"             /* ring of struct sync0_result */
 #define CONFIG_RUN_SYNC0_EVENTS "sync0/events"       /* ring of events of ecdaq-sync0 */
 #define CONFIG_RUN_SYNC0_STATUS "sync0/status"       /* struct sync0_status */

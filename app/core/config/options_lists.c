@@ -18,6 +18,8 @@ const struct option_section option_sections[] = {
 		 "doc/reference/web.md." },
 	{ "stream", "Samples and events into NATS JetStream (ecdaq-stream); "
 		    "doc/reference/stream.md." },
+	{ "uplink", "Finished recordings to an object store (ecdaq-uplink); "
+		    "doc/reference/uplink.md." },
 	{ "sync0", "SYNC0 checked on GPIO lines (ecdaq-sync0); doc/reference/sync0.md." },
 };
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Options of the services: sections record, dds, web, stream and sync0. */
+/* Options of the services: sections record, dds, web, stream, uplink and sync0. */
 #include "config/option_rows.h"
 
 static const struct option rows[] = {
@@ -82,6 +82,16 @@ static const struct option rows[] = {
 		  "except those with a file NAME.keep beside them; recording stops, with an alarm, "
 		  "where that is not enough. stop: recording stops, with an alarm, until there is "
 		  "room." },
+	{ .name = "record.keep_until_uploaded",
+	  .type = OPTION_WORD,
+	  FIELD(record_keep_until_uploaded),
+	  .default_value = "until_full",
+	  .words = "off|until_full|always",
+	  .effect = CONFIG_EFFECT_RECORD,
+	  .prose = "With uplink.enable, recordings that are uploaded are deleted first. off: then "
+		   "the oldest. until_full: others may pass record.budget, and the oldest are "
+		   "deleted only where the disk is full up to record.reserve. always: they are "
+		   "never deleted; recording stops where the disk is full." },
 	{ .name = "record.values",
 	  .type = OPTION_WORD,
 	  FIELD(record_values),
@@ -308,6 +318,95 @@ static const struct option rows[] = {
 	  .unit = "MiB",
 	  .effect = CONFIG_EFFECT_STREAM,
 	  .prose = "Blocks that are being filled take at most this." },
+	/* uplink */
+	{ .name = "uplink.enable",
+	  .type = OPTION_SWITCH,
+	  FIELD(uplink_enable),
+	  .default_value = "off",
+	  .effect = CONFIG_EFFECT_UPLINK,
+	  .prose = "Upload finished recordings to an object store with the interface of S3." },
+	{ .name = "uplink.endpoint",
+	  .type = OPTION_TEXT,
+	  FIELD(uplink_endpoint),
+	  .default_value = "",
+	  .effect = CONFIG_EFFECT_UPLINK,
+	  .prose = "Address of the store: `https://s3.example.net`, with `:PORT` if necessary. "
+		   "Required by ecdaq-uplink." },
+	{ .name = "uplink.region",
+	  .type = OPTION_TEXT,
+	  FIELD(uplink_region),
+	  .default_value = "us-east-1",
+	  .effect = CONFIG_EFFECT_UPLINK,
+	  .prose = "Region of the store; most that are not Amazon's take any." },
+	{ .name = "uplink.bucket",
+	  .type = OPTION_TEXT,
+	  FIELD(uplink_bucket),
+	  .default_value = "",
+	  .effect = CONFIG_EFFECT_UPLINK,
+	  .prose = "Bucket, which must exist. Required by ecdaq-uplink." },
+	{ .name = "uplink.addressing",
+	  .type = OPTION_WORD,
+	  FIELD(uplink_addressing),
+	  .default_value = "path",
+	  .words = "path|host",
+	  .effect = CONFIG_EFFECT_UPLINK,
+	  .prose = "Where the bucket is in an address. path: ENDPOINT/BUCKET. host: before the "
+		   "host's name." },
+	{ .name = "uplink.prefix",
+	  .type = OPTION_TEXT,
+	  FIELD(uplink_prefix),
+	  .default_value = "",
+	  .effect = CONFIG_EFFECT_UPLINK,
+	  .prose = "Keys are PREFIX/APPLIANCE/RECORDING.mcap. Letters, digits, - _ and . with / "
+		   "between. Empty: no PREFIX/." },
+	{ .name = "uplink.appliance",
+	  .type = OPTION_TEXT,
+	  FIELD(uplink_appliance),
+	  .default_value = "",
+	  .effect = CONFIG_EFFECT_UPLINK,
+	  .prose = "Name of this machine in the keys: letters, digits, - and _. No other machine "
+		   "with the same bucket and prefix may have it. Empty: the host name up to its "
+		   "first dot." },
+	{ .name = "uplink.credentials",
+	  .type = OPTION_TEXT,
+	  FIELD(uplink_credentials),
+	  .default_value = "",
+	  .effect = CONFIG_EFFECT_UPLINK,
+	  .prose = "File with `aws_access_key_id = ...` and `aws_secret_access_key = ...`, as AWS "
+		   "tools have it; not readable by others. Required by ecdaq-uplink." },
+	{ .name = "uplink.ca",
+	  .type = OPTION_TEXT,
+	  FIELD(uplink_ca),
+	  .default_value = "",
+	  .effect = CONFIG_EFFECT_UPLINK,
+	  .prose = "File with the certificates that the store is verified by (PEM). Empty: those "
+		   "of the system." },
+	{ .name = "uplink.dir",
+	  .type = OPTION_TEXT,
+	  FIELD(uplink_dir),
+	  .default_value = "/var/lib/ecdaq/uplink",
+	  .effect = CONFIG_EFFECT_UPLINK,
+	  .prose = "Folder for what is known of each recording: NAME.uploading, NAME.uploaded. "
+		   "ecdaq-record reads it." },
+	{ .name = "uplink.part_size",
+	  .type = OPTION_SIZE,
+	  FIELD(uplink_part_bytes),
+	  .default_value = "16MiB",
+	  .min = "5MiB",
+	  .max = "1GiB",
+	  .unit = "MiB",
+	  .effect = CONFIG_EFFECT_UPLINK,
+	  .prose = "A larger recording is sent in parts of this size: what an interruption may "
+		   "send again." },
+	{ .name = "uplink.rate_limit",
+	  .type = OPTION_SIZE,
+	  FIELD(uplink_rate_limit_bytes),
+	  .default_value = "0B",
+	  .min = "0B",
+	  .max = "1GiB",
+	  .unit = "KiB",
+	  .effect = CONFIG_EFFECT_UPLINK,
+	  .prose = "Bytes sent in a second, at most. 0B: no limit." },
 	/* sync0 */
 	{ .name = "sync0.enable",
 	  .type = OPTION_SWITCH,

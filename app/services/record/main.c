@@ -88,6 +88,8 @@ static struct recorder_options recorder_options(const struct recording *pg)
 		.budget_bytes = cfg->record_budget_bytes,
 		.reserve_bytes = cfg->record_reserve_bytes,
 		.when_full = cfg->record_when_full,
+		.marks_dir = cfg->uplink_enable ? cfg->uplink_dir : "",
+		.keep_until_uploaded = cfg->record_keep_until_uploaded,
 		.values = cfg->record_values,
 		.zstd_level = cfg->record_compression,
 		.config_path = cfg->path,

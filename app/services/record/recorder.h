@@ -32,6 +32,8 @@ struct recorder_options {
 	uint64_t budget_bytes;    /* 0: none, and nothing is deleted */
 	uint64_t reserve_bytes;   /* 0: none */
 	enum config_when_full when_full;
+	const char *marks_dir; /* of ecdaq-uplink; NULL or "": there is none */
+	enum config_keep keep_until_uploaded;
 	enum config_record_values values;
 	int zstd_level; /* 0: no compression */
 	const char *config_path;

@@ -2,7 +2,8 @@
 /*
  * Room for recordings: what record.budget allows and what record.reserve leaves free. The oldest
  * files go where record.when_full lets them, damaged ones too; a file NAME.keep pins a recording.
- * Context: blocking.
+ * With ecdaq-uplink those that are uploaded go first, and record.keep_until_uploaded rules the
+ * rest. Context: blocking.
  */
 #ifndef RECORD_SPACE_H
 #define RECORD_SPACE_H
@@ -16,6 +17,7 @@ struct space {
 	const struct recorder_options *opt; /* kept */
 	uint64_t bytes_free;                /* when looked at last */
 	uint64_t bytes_kept;                /* in all recordings but the open one */
+	uint64_t bytes_kept_back;           /* not uploaded, where nothing else can go */
 	uint64_t seen_bytes;                /* of the open file, by space_for_chunk() */
 	uint64_t chunk_bytes;               /* that it grew by */
 };

@@ -20,7 +20,8 @@ struct store_entry {
 	uint64_t sequence;
 	uint64_t bytes;
 	int is_part;
-	int is_pinned; /* by store_list_all(): NAME.keep is beside it */
+	int is_pinned;    /* by store_list_all(): NAME.keep is beside it */
+	int is_kept_back; /* record/space.c: not uploaded yet */
 };
 
 /* Where to resume, and what was recorded of that session. All zero: nothing was recorded yet. */

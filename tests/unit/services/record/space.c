@@ -10,6 +10,7 @@
 #include "base/clock.h"
 #include "harness/test.h"
 #include "record/store.h"
+#include "record/upload_mark.h"
 #include "unit/services/record/bench.h"
 
 enum { PATH_BYTES = 256, CYCLES = 60000 };
@@ -65,6 +66,28 @@ static unsigned there(const char *dir)
 	return bits;
 }
 
+static int given_free(void *ctx, const char *dir, uint64_t *ret_bytes)
+{
+	(void)dir;
+	*ret_bytes = *(uint64_t *)ctx;
+	return 0;
+}
+
+/* A disk of which each file that goes leaves its bytes. */
+struct freed {
+	const char *dir;
+	uint64_t bytes; /* free while all are there */
+};
+
+static int free_by_files(void *ctx, const char *dir, uint64_t *ret_bytes)
+{
+	const struct freed *f = ctx;
+	unsigned bits = there(dir);
+
+	*ret_bytes = f->bytes + (uint64_t)EACH * (FILES - (unsigned)__builtin_popcount(bits));
+	return 0;
+}
+
 static void remove_folder(const char *dir)
 {
 	for (size_t i = 0; i < FILES; i++) {
@@ -102,6 +125,92 @@ TEST(space, the_budget_takes_the_oldest_damaged_too_and_nothing_pinned_open_or_f
 	opt.when_full = CONFIG_WHEN_FULL_STOP;
 	CHECK_EQ(space_make(&space, NULL, 0), -ENOSPC);
 	CHECK_EQ(there(dir), 0x1fc);
+	remove_folder(dir);
+}
+
+static void mark(const char *dir, const char *name, uint64_t bytes)
+{
+	struct upload_mark mark = { .bytes = bytes, .key = "rig1/x.mcap" };
+
+	memset(mark.sha256, 'a', UPLOAD_SHA256_CHARS);
+	CHECK_EQ(upload_mark_save(dir, name, UPLOAD_MARK_DONE, &mark), 0);
+}
+
+static void unmark(const char *dir, const char *name)
+{
+	CHECK_EQ(upload_mark_remove(dir, name, UPLOAD_MARK_DONE), 0);
+}
+
+TEST(space, what_is_uploaded_goes_first_and_the_rest_may_be_beyond_the_budget)
+{
+	char dir[PATH_BYTES];
+	uint64_t left = 1 << 20;
+	struct record_seam seam = { .free_bytes = given_free, .ctx = &left };
+	struct recorder_options opt = { .dir = dir, .marks_dir = dir, .seam = &seam };
+	struct space space = { .opt = &opt };
+
+	make_folder(dir);
+	mark(dir, files[2], EACH);
+	mark(dir, files[0], EACH + 1); /* another one of this name */
+	opt.keep_until_uploaded = CONFIG_KEEP_UNTIL_FULL;
+	opt.budget_bytes = 5 * EACH;
+	CHECK_EQ(space_make(&space, NULL, 0), 0);
+	CHECK_EQ(there(dir), 0x1fd); /* the damaged one is never uploaded */
+	opt.budget_bytes = 2 * EACH;
+	CHECK_EQ(space_make(&space, NULL, 0), -ENOSPC); /* pinned and open ones are too much */
+	CHECK_EQ(there(dir), 0x1fd);
+	opt.budget_bytes = 3 * EACH;
+	CHECK_EQ(space_make(&space, NULL, 0), 0);
+	CHECK_EQ(there(dir), 0x1f9);
+	CHECK_EQ(space.bytes_kept_back, EACH);
+	/* The disk is full. */
+	opt.reserve_bytes = 2000;
+	left = 1000;
+	opt.keep_until_uploaded = CONFIG_KEEP_ALWAYS;
+	CHECK_EQ(space_make(&space, NULL, 0), -ENOSPC);
+	CHECK_EQ(there(dir), 0x1f9);
+	opt.keep_until_uploaded = CONFIG_KEEP_UNTIL_FULL;
+	left = 999; /* one may go, and it would not be enough */
+	CHECK_EQ(space_make(&space, NULL, 0), -ENOSPC);
+	CHECK_EQ(there(dir), 0x1f9);
+	/* Without a service that uploads nothing waits for one. */
+	left = 1 << 20;
+	opt.marks_dir = "";
+	CHECK_EQ(space_make(&space, NULL, 0), 0);
+	CHECK_EQ(there(dir), 0x1f8);
+	unmark(dir, files[0]);
+	unmark(dir, files[2]);
+	remove_folder(dir);
+}
+
+TEST(space, the_oldest_that_is_not_uploaded_goes_where_the_disk_is_full)
+{
+	char dir[PATH_BYTES];
+	struct freed freed = { dir, 500 };
+	struct record_seam seam = { .free_bytes = free_by_files, .ctx = &freed };
+	struct recorder_options opt = { .dir = dir,
+					.marks_dir = dir,
+					.seam = &seam,
+					.budget_bytes = 1 << 20,
+					.reserve_bytes = 1000,
+					.keep_until_uploaded = CONFIG_KEEP_UNTIL_FULL };
+	struct space space = { .opt = &opt };
+
+	make_folder(dir);
+	mark(dir, files[2], EACH);
+	CHECK_EQ(space_make(&space, NULL, 0), 0); /* the damaged one */
+	CHECK_EQ(there(dir), 0x1fd);
+	opt.reserve_bytes = 2000;
+	CHECK_EQ(space_make(&space, NULL, 0), 0); /* what is uploaded, not the oldest */
+	CHECK_EQ(there(dir), 0x1f9);
+	opt.reserve_bytes = 3000;
+	opt.keep_until_uploaded = CONFIG_KEEP_ALWAYS;
+	CHECK_EQ(space_make(&space, NULL, 0), -ENOSPC);
+	CHECK_EQ(there(dir), 0x1f9);
+	opt.keep_until_uploaded = CONFIG_KEEP_UNTIL_FULL;
+	CHECK_EQ(space_make(&space, NULL, 0), 0);
+	CHECK_EQ(there(dir), 0x1f8);
+	unmark(dir, files[2]);
 	remove_folder(dir);
 }
 
