@@ -191,6 +191,7 @@ prepare_build()
 	want_packages dds ecdaq-dds
 	want_packages web ecdaq-web
 	want_packages stream ecdaq-stream
+	want_packages uplink ecdaq-uplink
 	need_sources
 }
 

@@ -30,6 +30,9 @@ struct figure {
 #define STREAM(name, field, help)                                                                  \
 	{ "ecdaq_stream_" name, help, offsetof(struct stream_status, field) }
 
+#define UPLINK(name, field, help)                                                                  \
+	{ "ecdaq_uplink_" name, help, offsetof(struct uplink_status, field) }
+
 static const struct figure of_cycle[] = {
 	CYCLE("cycles_total", cycles, "Exchanges of process data."),
 	CYCLE("frames_sent_total", frames_sent, "Cyclic frames sent."),
@@ -80,6 +83,15 @@ static const struct figure of_stream[] = {
 	STREAM("missing_cycles_total", cycles_missing, "Cycles missing in these gaps."),
 	STREAM("connects_total", connects, "Connections made to the server."),
 	STREAM("lag_cycles", lag_cycles, "Cycles in the ring that are not sent yet."),
+};
+
+static const struct figure of_uplink[] = {
+	UPLINK("recordings_total", uploaded, "Recordings uploaded."),
+	UPLINK("uploaded_bytes_total", uploaded_bytes, "Bytes of these recordings."),
+	UPLINK("waiting_recordings", waiting, "Finished recordings that are not uploaded."),
+	UPLINK("waiting_bytes", waiting_bytes, "Bytes of these recordings."),
+	UPLINK("deleted_recordings_total", deleted, "Recordings deleted before their upload."),
+	UPLINK("failures_total", failures, "Attempts that failed."),
 };
 
 /* Upper bounds of the buckets of a time. */
@@ -289,6 +301,7 @@ static void put_services(FILE *out, const struct report *report)
 	} all[] = { { "recorder", report->is_recorder_running },
 		    { "dds", report->is_dds_running },
 		    { "stream", report->is_stream_running },
+		    { "uplink", report->is_uplink_running },
 		    { "sync0", report->is_sync0_running } };
 
 	put_head(out, "ecdaq_service_up", "gauge", "1: the service runs.");
@@ -307,6 +320,12 @@ static void put_services(FILE *out, const struct report *report)
 	}
 	if (report->stream != NULL) {
 		PUT_FIGURES(out, of_stream, report->stream);
+	}
+	if (report->uplink != NULL) {
+		PUT_FIGURES(out, of_uplink, report->uplink);
+		put_gauge(out, "ecdaq_uplink_uploaded_timestamp_seconds",
+			  "Unix time of the newest upload; 0: none since the start.",
+			  (double)GET(report->uplink->uploaded_utc_s));
 	}
 }
 

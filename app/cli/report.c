@@ -32,6 +32,8 @@ void report_gather(struct cli *cli, const struct status_page *page,
 	report.is_dds_running = report.dds != NULL && page_is_alive(report.dds->pid);
 	report.stream = source_stream(cli);
 	report.is_stream_running = report.stream != NULL && page_is_alive(report.stream->pid);
+	report.uplink = source_uplink(cli);
+	report.is_uplink_running = report.uplink != NULL && page_is_alive(report.uplink->pid);
 	report.sync0 = sync0_source_try(cli);
 	report.is_sync0_running = report.sync0 != NULL && page_is_alive(report.sync0->pid);
 	if (samples_try(cli, &samples) == 0) {
@@ -52,6 +54,7 @@ void report_release(const struct report *report)
 {
 	source_dds_close(report->dds);
 	source_stream_close(report->stream);
+	source_uplink_close(report->uplink);
 	sync0_source_close(report->sync0);
 }
 
@@ -316,6 +319,40 @@ static void write_stream(const struct report *report, FILE *out)
 	}
 }
 
+/* The same. */
+static void write_uplink(const struct report *report, FILE *out)
+{
+	const struct uplink_status *up = report->uplink;
+	char plain[sizeof(up->message)];
+	char bytes[TEXT_BYTES];
+	char total[TEXT_BYTES];
+
+	if (up == NULL) {
+		return;
+	}
+	fprintf(out, "uplink     %s%s, as %s", uplink_state_to_str(GET(up->state)),
+		mark_absent(report, report->is_uplink_running),
+		text_plain(up->appliance, plain, sizeof(plain)));
+	fprintf(out, " in %s", text_plain(up->bucket, plain, sizeof(plain)));
+	fprintf(out, " at %s", text_plain(up->endpoint, plain, sizeof(plain)));
+	fprintf(out, "   %" PRIu64 " uploaded, %s   %" PRIu64 " waiting, %s", GET(up->uploaded),
+		text_bytes(GET(up->uploaded_bytes), bytes), GET(up->waiting),
+		text_bytes(GET(up->waiting_bytes), total));
+	if (GET(up->deleted) > 0) {
+		fprintf(out, "   %" PRIu64 " deleted before", GET(up->deleted));
+	}
+	fputc('\n', out);
+	if (up->file[0] != '\0') {
+		fprintf(out, "           %s: %s of %s\n",
+			text_plain(up->file, plain, sizeof(plain)),
+			text_bytes(GET(up->file_sent), bytes),
+			text_bytes(GET(up->file_bytes), total));
+	}
+	if (up->message[0] != '\0') {
+		fprintf(out, "           %s\n", text_plain(up->message, plain, sizeof(plain)));
+	}
+}
+
 uint32_t report_sync0_verdict(const struct sync0_status *page)
 {
 	uint32_t v = SYNC0_NONE;
@@ -406,6 +443,7 @@ static void write_head_lines(const struct report *report, enum report_detail det
 	write_recorder(report, out);
 	write_dds(report, out);
 	write_stream(report, out);
+	write_uplink(report, out);
 	write_sync0(report, out);
 }
 
@@ -451,6 +489,7 @@ void report_write_summary(const struct report *report, FILE *out)
 	write_recorder(report, out);
 	write_dds(report, out);
 	write_stream(report, out);
+	write_uplink(report, out);
 	write_sync0(report, out);
 	write_message(report->page, out);
 }

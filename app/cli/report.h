@@ -14,11 +14,13 @@ struct report {
 	const struct record_status *record; /* NULL: no recorder was started */
 	const struct dds_status *dds;       /* NULL: no ecdaq-dds was started */
 	const struct stream_status *stream; /* NULL: no ecdaq-stream was started */
+	const struct uplink_status *uplink; /* NULL: no ecdaq-uplink was started */
 	const struct sync0_status *sync0;   /* NULL: no ecdaq-sync0 was started */
 	int is_running;                     /* ecdaqd's process is there */
 	int is_recorder_running;
 	int is_dds_running;
 	int is_stream_running;
+	int is_uplink_running;
 	int is_sync0_running;
 	int has_wkc; /* the newest sample could be read */
 	uint16_t wkc;

@@ -176,6 +176,35 @@ static void write_stream(struct json *js, const struct report *report)
 	json_object_end(js);
 }
 
+static void write_uplink(struct json *js, const struct report *report)
+{
+	const struct uplink_status *up = report->uplink;
+
+	if (up == NULL) {
+		json_null(js, "uplink");
+		return;
+	}
+	json_object_begin(js, "uplink");
+	json_text(js, "state", uplink_state_to_str(GET(up->state)));
+	json_truth(js, "running", report->is_uplink_running);
+	json_i64(js, "pid", up->pid);
+	json_text(js, "endpoint", up->endpoint);
+	json_text(js, "bucket", up->bucket);
+	json_text(js, "appliance", up->appliance);
+	json_text(js, "file", up->file);
+	json_u64(js, "file_bytes", GET(up->file_bytes));
+	json_u64(js, "file_sent", GET(up->file_sent));
+	json_u64(js, "uploaded", GET(up->uploaded));
+	json_u64(js, "uploaded_bytes", GET(up->uploaded_bytes));
+	json_u64(js, "waiting", GET(up->waiting));
+	json_u64(js, "waiting_bytes", GET(up->waiting_bytes));
+	json_u64(js, "deleted", GET(up->deleted));
+	json_u64(js, "failures", GET(up->failures));
+	json_u64(js, "uploaded_utc_s", GET(up->uploaded_utc_s));
+	json_text(js, "message", up->message);
+	json_object_end(js);
+}
+
 static void write_control(struct json *js, const struct status_page *page)
 {
 	const struct control_status *st = &page->control;
@@ -334,6 +363,7 @@ void report_write_json(const struct report *report, struct json *js)
 	write_record(js, report);
 	write_dds(js, report);
 	write_stream(js, report);
+	write_uplink(js, report);
 	write_sync0(report, js);
 	write_degraded(js, page);
 	json_array_begin(js, "slave");

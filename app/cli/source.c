@@ -141,6 +141,24 @@ const struct stream_status *source_stream(struct cli *cli)
 	return stream;
 }
 
+void source_uplink_close(const struct uplink_status *uplink)
+{
+	free((void *)(uintptr_t)uplink);
+}
+
+const struct uplink_status *source_uplink(struct cli *cli)
+{
+	struct uplink_status *uplink = malloc(sizeof(*uplink));
+	char path[CONFIG_PATH_BYTES];
+
+	if (uplink == NULL || cli_path(cli, CONFIG_RUN_UPLINK_STATUS, path) != EXIT_CODE_OK ||
+	    page_read_uplink(path, uplink) < 0) {
+		free(uplink);
+		return NULL;
+	}
+	return uplink;
+}
+
 void samples_take_table(struct samples *samples)
 {
 	samples->table = reader_table(samples->reader);

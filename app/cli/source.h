@@ -31,10 +31,13 @@ const struct record_status *source_record(struct cli *cli);
 const struct dds_status *source_dds(struct cli *cli);
 /** The same of ecdaq-stream. */
 const struct stream_status *source_stream(struct cli *cli);
+/** The same of ecdaq-uplink. */
+const struct uplink_status *source_uplink(struct cli *cli);
 void source_status_close(const struct status_page *page);
 void source_record_close(const struct record_status *record);
 void source_dds_close(const struct dds_status *dds);
 void source_stream_close(const struct stream_status *stream);
+void source_uplink_close(const struct uplink_status *uplink);
 
 /* The sample ring with its own description. */
 struct samples {

@@ -18,6 +18,7 @@ SERVICES = {
     "ecdaq-dds": "dds.enable",
     "ecdaq-stream": "stream.enable",
     "ecdaq-sync0": "sync0.enable",
+    "ecdaq-uplink": "uplink.enable",
     "ecdaq-web": "web.enable",
 }
 PROGRAMS = [*SERVICES, "ecdaq"]
@@ -34,7 +35,8 @@ STANDARD = [
 
 def run(program: str, *words: str) -> Result:
     if not (BIN / program).exists():
-        assert program in ("ecdaq-dds", "ecdaq-stream", "ecdaq-web"), f"{program} was not built"
+        optional = ("ecdaq-dds", "ecdaq-stream", "ecdaq-uplink", "ecdaq-web")
+        assert program in optional, f"{program} was not built"
         pytest.skip(f"{program} was not built")
     return subprocess.run(
         [BIN / program, *words],
@@ -102,7 +104,12 @@ def test_check_reports_a_valid_file(program: str, tmp_path: Path) -> None:
     config.write_text(
         f"record:\n  dir: {tmp_path}\ndds:\n  interface: lo\n  multicast: off\n"
         "stream:\n  servers: nats://127.0.0.1\n"
+        "uplink:\n  endpoint: http://127.0.0.1\n  bucket: b\n"
+        f"  credentials: {tmp_path}/key\n"
     )
+    key = tmp_path / "key"
+    key.touch(mode=0o600)
+    key.write_text("aws_access_key_id = a\naws_secret_access_key = b\n")
     switch = SERVICES[program]
     enable = [] if switch is None else ["--set", f"{switch}=on"]
     result = run(program, "--check", "--config", str(config), *enable)

@@ -57,6 +57,9 @@ MODULES: dict[str, dict[str, set[str]]] = {
         | {"record/layout.h", "record/messages.h"}
         | {"record/envelope.h", "record/file_io.h", "record/overview.h", "record/store.h"}
         | {"wire/al.h"},
+        "uplink": {"base", "config", "program", "xml/xml.h"}
+        | {"record/file_io.h", "record/mcap_recover.h", "record/store.h", "record/track.h"}
+        | {"record/upload_mark.h"},
         "stream": READERS
         | {"record/layout.h", "record/messages.h"}
         | {"record/file_io.h", "record/mcap_reader.h", "record/store.h", "record/track.h"},
@@ -84,7 +87,7 @@ SOEM_HEADER = r"(?:ethercat\w*|nicdrv|oshw|osal|osal_defs|soem/\w+)\.h"
 FOREIGN_HEADERS: list[tuple[str, set[str]]] = [
     (SOEM_HEADER, {"link", "bus"}),
     (r"dds/.*|ddsc/.*", {"publish"}),
-    (r"openssl/.*", {"keystore"}),
+    (r"openssl/.*", {"keystore", "uplink"}),
     (r"gpiod\.h|linux/gpio\.h", {"sync0"}),
     (r"yaml\.h", {"config"}),
     (r"zstd\w*\.h", {"record"}),
@@ -92,6 +95,7 @@ FOREIGN_HEADERS: list[tuple[str, set[str]]] = [
     (r"libwebsockets\.h", {"web"}),
     (r"cjson/.*", {"web", "stream"}),
     (r"nats/.*", {"stream"}),
+    (r"curl/.*", {"uplink"}),
 ]
 
 # Programs talk to a person; what is not matched here is library code.

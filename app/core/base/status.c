@@ -18,6 +18,7 @@ static const char *const bus_names[] = { "DOWN",       "SCANNING", "PREOP",  "SA
 					 "RECOVERING", "STOPPED",  "FAILED", "INIT" };
 static const char *const dc_names[] = { "off", "acquiring", "locked", "lost" };
 static const char *const stream_names[] = { "connecting", "waiting", "recordings", "live" };
+static const char *const uplink_names[] = { "idle", "sending", "retrying" };
 static const char *const record_names[] = { "waiting", "running", "disk full", "ended", "failed" };
 
 static const char *name_of(const char *const *names, size_t count, uint32_t state)
@@ -49,6 +50,11 @@ const char *control_state_to_str(uint32_t state)
 const char *stream_state_to_str(uint32_t state)
 {
 	return name_of(stream_names, sizeof(stream_names) / sizeof(stream_names[0]), state);
+}
+
+const char *uplink_state_to_str(uint32_t state)
+{
+	return name_of(uplink_names, sizeof(uplink_names) / sizeof(uplink_names[0]), state);
 }
 
 const char *record_state_to_str(uint32_t state)

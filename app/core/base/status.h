@@ -235,6 +235,39 @@ struct stream_status {
 	_Atomic uint64_t heartbeat;
 };
 
+#define UPLINK_STATUS_MAGIC UINT64_C(0x316c707571616463) /* "cdaqupl1" */
+
+enum uplink_state {
+	UPLINK_IDLE = 0,
+	UPLINK_SENDING,
+	UPLINK_RETRYING /* the store is not to be had, or rejects */
+};
+
+/* Status of ecdaq-uplink ("uplink/status" in the run directory). [uplink] */
+struct uplink_status {
+	uint64_t magic;
+	uint32_t bytes;
+	uint32_t reserved;
+	int64_t pid;
+	char endpoint[256];
+	char bucket[64];
+	char appliance[64];
+	_Atomic uint64_t text_sequence;
+	char file[80];          /* recording that is being uploaded; "": none */
+	char message[256];      /* latest problem; "": none */
+	_Atomic uint32_t state; /* enum uplink_state */
+	_Atomic uint64_t file_bytes;
+	_Atomic uint64_t file_sent; /* of these */
+	_Atomic uint64_t uploaded;  /* recordings, since it was started */
+	_Atomic uint64_t uploaded_bytes;
+	_Atomic uint64_t waiting; /* finished recordings that are not uploaded */
+	_Atomic uint64_t waiting_bytes;
+	_Atomic uint64_t deleted;        /* before they were uploaded */
+	_Atomic uint64_t failures;       /* attempts */
+	_Atomic uint64_t uploaded_utc_s; /* Unix time of the newest upload; 0: none yet */
+	_Atomic uint64_t heartbeat;
+};
+
 enum record_state {
 	RECORD_WAITING = 0,
 	RECORD_RUNNING,
@@ -248,6 +281,7 @@ const char *dc_state_to_str(uint32_t state);
 const char *record_state_to_str(uint32_t state);
 const char *control_state_to_str(uint32_t state);
 const char *stream_state_to_str(uint32_t state);
+const char *uplink_state_to_str(uint32_t state);
 
 /**
  * Make a page of @bytes at @path (any size that starts with magic and bytes) and map it for

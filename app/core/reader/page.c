@@ -72,6 +72,21 @@ int page_read_stream(const char *path, struct stream_status *ret_page)
 	return r;
 }
 
+int page_read_uplink(const char *path, struct uplink_status *ret_page)
+{
+	int r = status_read(path, UPLINK_STATUS_MAGIC, sizeof(*ret_page),
+			    offsetof(struct uplink_status, text_sequence), ret_page);
+
+	if (r == 0) {
+		TERMINATE(ret_page->endpoint);
+		TERMINATE(ret_page->bucket);
+		TERMINATE(ret_page->appliance);
+		TERMINATE(ret_page->file);
+		TERMINATE(ret_page->message);
+	}
+	return r;
+}
+
 int page_read_sync0(const char *path, struct sync0_status *ret_page)
 {
 	int r = status_read(path, SYNC0_STATUS_MAGIC, sizeof(*ret_page),

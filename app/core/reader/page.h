@@ -15,6 +15,7 @@ int page_read_status(const char *path, struct status_page *ret_page);
 int page_read_record(const char *path, struct record_status *ret_page);
 int page_read_dds(const char *path, struct dds_status *ret_page);
 int page_read_stream(const char *path, struct stream_status *ret_page);
+int page_read_uplink(const char *path, struct uplink_status *ret_page);
 int page_read_sync0(const char *path, struct sync0_status *ret_page);
 
 /** 1 if the process with @pid, the writer of a page, is still there. */

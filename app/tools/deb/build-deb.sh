@@ -78,7 +78,7 @@ version=$(sed -n 's/^project(ecdaq VERSION \([0-9.]*\) .*/\1/p' "$root/app/CMake
 # The libraries' headers that app/tools/packages.txt names for the build, as "libyaml-dev, libzstd-dev".
 header_packages()
 {
-	awk '$1 !~ /^#/ && $2 ~ /(^|,)(build|dds|web|stream)(,|$)/ && $1 ~ /-dev$/ && $1 != "libc6-dev" { print $1 }' \
+	awk '$1 !~ /^#/ && $2 ~ /(^|,)(build|dds|web|stream|uplink)(,|$)/ && $1 ~ /-dev$/ && $1 != "libc6-dev" { print $1 }' \
 		"$root/app/tools/packages.txt" | paste -s -d ' ' | sed 's/ /, /g'
 }
 
