@@ -18,6 +18,7 @@ s|^EnvironmentFile=/run/ecdaq-boot/environment$|EnvironmentFile=-/etc/default/ec
 s|/run/ecdaq-boot/ecdaq\.yaml|/etc/ecdaq/ecdaq.yaml|
 s|ecdaq-boot-config\.service *||
 s|/data/record|/var/lib/ecdaq/record|
+s|/data/uplink|/var/lib/ecdaq/uplink|
 /^Wants=ecdaq-nic\.service$/d
 s|ecdaq-nic\.service *||
 /^After=$/d
@@ -36,7 +37,8 @@ cp "$root/usr/lib/ecdaq/nic-setup" "$root/usr/lib/ecdaq/port-irqs" "$debian/lib/
 sed -n 's|^g \(ecdaq[^ ]*\) [0-9]* -$|g \1 - -|p; /^m ecdaq/p
 s|^\(u ecdaq[^ ]*\) [0-9]*:900 \(".*"\) /$|\1 -:ecdaq-read \2|p' \
 	"$root/usr/lib/sysusers.d/ecdaq.conf" > "$debian/ecdaq.sysusers"
-sed -n 's|^d /data/record |d /var/lib/ecdaq/record |p; /^d \/run\/ecdaq[ \/]/p; /^d \/var\/lib\/ecdaq /p' \
+sed -n 's|^d /data/record |d /var/lib/ecdaq/record |p; s|^d /data/uplink |d /var/lib/ecdaq/uplink |p
+/^d \/run\/ecdaq[ \/]/p; /^d \/var\/lib\/ecdaq /p' \
 	"$root/usr/lib/tmpfiles.d/ecdaq.conf" > "$debian/ecdaq.tmpfiles"
 # Other rules are for the image's port and GPIO lines.
 grep '^KERNEL=="cpu_dma_latency"' "$root/usr/lib/udev/rules.d/60-ecdaq.rules" > "$debian/ecdaq.udev"

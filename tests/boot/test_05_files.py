@@ -162,7 +162,8 @@ def test_the_command_line_isolates_the_last_core(built: Built) -> None:
 def test_the_root_file_system_is_clean_and_has_our_programs(built: Built) -> None:
     start = int(built.partitions()[1]["start"]) * 512
     built.tool("e2fsck", "-f", "-n", f"{built.name}.img?offset={start}")
-    for program in ("ecdaqd", "ecdaq-record", "ecdaq-dds", "ecdaq-web", "ecdaq-stream", "ecdaq"):
+    services = ("ecdaqd", "ecdaq-record", "ecdaq-dds", "ecdaq-web", "ecdaq-stream", "ecdaq-uplink")
+    for program in (*services, "ecdaq"):
         head = built.root_file(f"/usr/bin/{program}")[:20]
         # 64 bits, little-endian, for AArch64.
         assert head[:6] == b"\x7fELF\x02\x01" and head[18:20] == b"\xb7\x00", program

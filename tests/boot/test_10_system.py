@@ -21,6 +21,7 @@ EXPOSURE_LIMITS = {
     "ecdaq-sync0.service": 2.0,
     "ecdaq-web.service": 1.5,
     "ecdaq-stream.service": 1.5,
+    "ecdaq-uplink.service": 1.5,
     "ecdaq-boot-config.service": 2.5,
     "ecdaq-boot-bad.service": 3.5,
     "ecdaq-boot-good.service": 3.5,

@@ -16,6 +16,7 @@ INSTALL = "apt-get install -q -y"
 LINES = [line.partition(" #")[0].replace("sudo ", "").strip() for line in README.splitlines()]
 OURS = "ecdaq ecdaq-sim libecdaq1 libecdaq-dev python3-ecdaq"
 USERS = {"ecdaqd", "ecdaq-record", "ecdaq-dds", "ecdaq-sync0", "ecdaq-web"} | {"ecdaq-stream"}
+USERS |= {"ecdaq-uplink"}
 REMOTE_LED = "outputs: [ { channel: piccolo0.led, owner: remote } ]"
 AS_USER = "setpriv --reuid {} --regid ecdaq-read --init-groups {} {} > /tmp/{}.log 2>&1 &"
 # What the kernel's and the package manager's own books are not asked for.
@@ -47,6 +48,7 @@ def test_users_groups_and_directories_are_there(machine: Machine) -> None:
     assert "ecdaq-remote" in machine.run("id --name --groups ecdaq-dds")
     assert machine.run("stat -c %U:%G:%a /run/ecdaq") == "ecdaqd:ecdaq-read:2750"
     assert machine.run("stat -c %U:%G:%a /var/lib/ecdaq/record") == "ecdaq-record:ecdaq-read:750"
+    assert machine.run("stat -c %U:%G:%a /var/lib/ecdaq/uplink") == "ecdaq-uplink:ecdaq-read:2750"
 
 
 def test_no_service_is_enabled_and_all_units_are_valid(machine: Machine) -> None:

@@ -45,6 +45,7 @@ class Place:
             "ECDAQ_HOSTS": str(base / "hosts"),
             "ECDAQ_CONSOLE": str(self.console),
             "ECDAQ_UPLOAD_DIR": str(base / "upload"),
+            "ECDAQ_UPLINK_USER": str(os.getuid()),
             "ECDAQ_WPA_SUPPLICANT": str(base / "wpa_supplicant"),
         }
 
@@ -88,6 +89,7 @@ def test_without_a_folder_the_built_in_settings_are_used(place: Place) -> None:
 def test_an_option_in_the_file_gets_no_default(place: Place) -> None:
     (place.source / "ecdaq.yaml").write_text(
         "bus:\n  interface: lan9\ncycle:\n  cpu: 2\nrecord:\n  dir: /data/x\n  budget: 1GiB\n"
+        "uplink:\n  dir: /data/y\n"
     )
     place.run()
     assert "lan9" in (place.target / "ecdaq.yaml").read_text()
@@ -332,3 +334,18 @@ def test_a_wifi_file_without_a_network_or_with_a_program_is_not_used(place: Plac
     (place.source / "wifi").write_text("pkcs11_module_path=/x.so\nnetwork={\n}\n")
     place.run()
     assert (place.target / "wifi.conf").read_text() == "network={\n}\n"
+
+
+def test_the_key_of_the_object_store_is_for_its_service_alone(place: Place) -> None:
+    place.run()
+    assert "uplink.dir=/data/uplink" in place.options()
+    assert "uplink.credentials" not in place.options()
+    (place.source / "uplink.credentials").write_text("aws_access_key_id = a\r\n")
+    assert "uplink" not in place.run()
+    copy = place.target / "uplink.credentials"
+    assert copy.read_text() == "aws_access_key_id = a\n"
+    assert copy.stat().st_mode & 0o777 == 0o600
+    assert f"--set uplink.credentials={copy}" in place.options()
+    (place.source / "ecdaq.yaml").write_text("uplink:\n  dir: /mnt/a\n  credentials: /mnt/b\n")
+    place.run()
+    assert "uplink." not in place.options()

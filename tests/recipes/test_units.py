@@ -90,7 +90,7 @@ def test_every_service_is_sandboxed(path: Path) -> None:
 
 def test_a_service_writes_in_its_own_folder_of_the_run_directory_only() -> None:
     folders = (ROOT / "usr/lib/tmpfiles.d/ecdaq.conf").read_text()
-    for unit in ("ecdaq-record", "ecdaq-dds", "ecdaq-sync0", "ecdaq-stream"):
+    for unit in ("ecdaq-record", "ecdaq-dds", "ecdaq-sync0", "ecdaq-stream", "ecdaq-uplink"):
         own = "/run/ecdaq/" + unit.removeprefix("ecdaq-")
         assert f"d {own} 2750 {unit} ecdaq-read -\n" in folders
         writes = " ".join(values(f"{unit}.service", "ReadWritePaths")).split()
@@ -130,6 +130,27 @@ def test_the_stream_writes_its_status_only_and_is_off_until_it_is_configured() -
     assert "m ecdaq-stream" not in text
     options = (TOP / "app/doc/reference/ecdaq.sample.yaml").read_text()
     found = re.findall(r"^  (\w+): (\S+)$", options.split("\nstream:\n")[1], re.MULTILINE)
+    assert found[0] == ("enable", "off")
+    if shutil.which("systemd-analyze"):
+        assert exposure(UNITS / unit) < 1.5
+
+
+def test_the_uplink_writes_its_marks_only_and_is_off_until_it_is_configured() -> None:
+    unit = "ecdaq-uplink.service"
+    assert values(unit, "ReadWritePaths") == ["/run/ecdaq/uplink", "/data/uplink"]
+    assert values(unit, "ProtectSystem") == ["strict"]
+    assert values(unit, "User") == ["ecdaq-uplink"]
+    assert values(unit, "CapabilityBoundingSet") == []
+    assert values(unit, "Restart") == ["on-failure"]
+    text = (ROOT / "usr/lib/sysusers.d/ecdaq.conf").read_text()
+    assert re.findall(r"^u ecdaq-uplink (\d+):900 ", text, re.MULTILINE) == ["911"]
+    assert "m ecdaq-uplink" not in text
+    # The recorder, in the same group, reads the marks.
+    folders = (ROOT / "usr/lib/tmpfiles.d/ecdaq.conf").read_text()
+    assert "d /data/uplink 2750 ecdaq-uplink ecdaq-read -\n" in folders
+    assert values(unit, "UMask") == ["0027"]
+    options = (TOP / "app/doc/reference/ecdaq.sample.yaml").read_text()
+    found = re.findall(r"^  (\w+): (\S+)$", options.split("\nuplink:\n")[1], re.MULTILINE)
     assert found[0] == ("enable", "off")
     if shutil.which("systemd-analyze"):
         assert exposure(UNITS / unit) < 1.5

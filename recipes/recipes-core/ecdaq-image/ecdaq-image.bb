@@ -134,4 +134,4 @@ IMAGE_PREINSTALL += "init systemd-sysv udev dbus kmod \
                      iproute2 ethtool iputils-ping nftables \
                      e2fsprogs fdisk dosfstools procps less gpiod libubootenv-tool \
                      rauc rauc-service curl ca-certificates \
-                     libcjson1 libddsc0t64 libdeflate0 libexpat1 libnats3.10 libwebsockets19t64 libyaml-0-2 libzstd1"
+                     libcjson1 libcurl4t64 libddsc0t64 libdeflate0 libexpat1 libnats3.10 libwebsockets19t64 libyaml-0-2 libzstd1"

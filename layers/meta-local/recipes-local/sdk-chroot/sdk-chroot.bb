@@ -20,7 +20,7 @@ SDK_PREINSTALL += "qemu-system-arm"
 # What our programs link; each is a Build-Depends of a recipe, too.
 SDK_PREINSTALL += "libyaml-dev:${DISTRO_ARCH} libzstd-dev:${DISTRO_ARCH} libdeflate-dev:${DISTRO_ARCH} \
                    libexpat1-dev:${DISTRO_ARCH} libgpiod-dev:${DISTRO_ARCH} libssl-dev:${DISTRO_ARCH} \
-                   libcjson-dev:${DISTRO_ARCH} libnats-dev:${DISTRO_ARCH} libwebsockets-dev:${DISTRO_ARCH} \
+                   libcjson-dev:${DISTRO_ARCH} libcurl4-openssl-dev:${DISTRO_ARCH} libnats-dev:${DISTRO_ARCH} libwebsockets-dev:${DISTRO_ARCH} \
                    cyclonedds-dev:${DISTRO_ARCH} cyclonedds-tools"
 
 do_bootstrap[dirs] = "${TMPDIR}"
