@@ -29,6 +29,7 @@ struct job {
 	struct contents contents;
 	struct upload_mark mark;
 	int has_key;  /* in the mark */
+	int is_sent;  /* the store has taken all of it */
 	int is_there; /* the object is, and was checked */
 	char *problem;
 };
@@ -113,6 +114,7 @@ static enum job_result read_file(struct job *j)
 	j->plan = NULL;
 	j->answered = NULL;
 	j->is_there = 0;
+	j->is_sent = 0;
 	j->has_key = 0;
 	r = contents_read(j->fd, stop_flag(), &j->contents);
 	r = r < 0 ? r
@@ -251,23 +253,27 @@ static enum job_result send_parts(struct job *j, struct object *o)
 static enum job_result send_object(struct job *j)
 {
 	struct object o = object_of(j);
-	enum job_result result;
+	enum job_result result = JOB_DONE;
 	int r;
 
 	if (j->is_there) {
 		return JOB_DONE;
 	}
-	result = j->plan->count > 1 ? send_parts(j, &o) : result_of(object_put(&o));
+	if (!j->is_sent) {
+		result = j->plan->count > 1 ? send_parts(j, &o) : result_of(object_put(&o));
+	}
 	if (result != JOB_DONE) {
 		return result;
 	}
+	j->is_sent = 1; /* what fails below is asked again, not sent again */
 	r = object_check(&o);
 	if (r == 1) {
 		j->is_there = 1;
 		return JOB_DONE;
 	}
-	j->mark.id[0] = '\0';
 	if (r == 0 || r == -ENOENT) {
+		j->is_sent = 0;
+		j->mark.id[0] = '\0';
 		snprintf(j->problem, BUCKET_PROBLEM_BYTES,
 			 "%.150s: what the store has is not what was sent: sent again",
 			 j->mark.key);
