@@ -56,7 +56,7 @@ int contents_read(int fd, const volatile sig_atomic_t *stop, struct contents *re
 	track_init(&rd.track);
 	r = mcap_scan_create(&source, &visitor, &scan);
 	if (r < 0) {
-		return r;
+		return *stop != 0 ? -EINTR : r;
 	}
 	*ret = (struct contents){
 		.session = rd.track.before.session,

@@ -19,7 +19,8 @@ enum { OBJECTS = 8, PARTS = 8, PATH_BYTES = 300, PART_BYTES = 1000, NEVER = 0 };
 enum failing { FAIL_BEFORE, FAIL_AFTER };
 
 struct blob {
-	char *data;
+	char data[PARTS * PART_BYTES];
+	int is_there;
 	size_t len;
 	char etag[ANSWER_ETAG_BYTES];
 };
@@ -51,12 +52,6 @@ static char reported[512];
 static const char name[] = "ecdaq-20260101T000000Z-0000000a-000001.mcap";
 
 /* --- the store --- */
-
-static void blob_free(struct blob *b)
-{
-	free(b->data);
-	*b = (struct blob){ .data = NULL };
-}
 
 static struct stored *find(const char *key)
 {
@@ -90,34 +85,34 @@ static void etag_of(const char *data, size_t len, const char *end, char etag[ANS
 }
 
 /* The content that is sent, whose checksum must be the one that is signed. */
-static struct blob receive(const struct bucket_request *rq)
+static void receive(const struct bucket_request *rq, struct blob *b)
 {
-	struct blob b = { .data = malloc(rq->len + 1), .len = rq->len };
 	struct plan_sums sums;
 
-	CHECK(b.data != NULL);
+	CHECK(rq->len < sizeof(b->data));
+	memset(b, 0, sizeof(*b));
+	b->is_there = 1;
+	b->len = rq->len;
 	if (rq->text != NULL) {
-		memcpy(b.data, rq->text, rq->len);
+		memcpy(b->data, rq->text, rq->len);
 	} else {
-		CHECK_EQ(pread(rq->fd, b.data, rq->len, (off_t)rq->offset), (ssize_t)rq->len);
+		CHECK_EQ(pread(rq->fd, b->data, rq->len, (off_t)rq->offset), (ssize_t)rq->len);
 	}
-	CHECK_EQ(plan_sum_text(b.data, b.len, &sums), 0);
+	CHECK_EQ(plan_sum_text(b->data, b->len, &sums), 0);
 	CHECK_STR(rq->sha256, sums.sha256);
 	if (rq->md5_base64 != NULL) {
 		CHECK_STR(rq->md5_base64, sums.md5_base64);
 	}
-	etag_of(b.data, b.len, "", b.etag);
-	return b;
+	etag_of(b->data, b->len, "", b->etag);
 }
 
-static void put(const char *key, const char *meta, struct blob blob)
+static void put(const char *key, const char *meta, const struct blob *blob)
 {
 	struct stored *s = find(key);
 
 	s = s != NULL ? s : find("");
 	CHECK(s != NULL);
-	blob_free(&s->blob);
-	s->blob = blob;
+	s->blob = *blob;
 	s->made++;
 	snprintf(s->key, sizeof(s->key), "%s", key);
 	snprintf(s->meta, sizeof(s->meta), "%s", meta != NULL ? meta : "");
@@ -166,7 +161,7 @@ static int list_parts(const struct bucket_request *rq, struct bucket_answer *ans
 
 	snprintf(store.answer, sizeof(store.answer), "<ListPartsResult>");
 	for (size_t i = marker; i < PARTS; i++) {
-		if (store.part[i].data != NULL) {
+		if (store.part[i].is_there) {
 			snprintf(store.answer + strlen(store.answer), 400,
 				 "<IsTruncated>true</IsTruncated>"
 				 "<NextPartNumberMarker>%zu</NextPartNumberMarker>"
@@ -184,19 +179,19 @@ static void forget_upload(void)
 {
 	store.upload.key[0] = '\0';
 	for (size_t i = 0; i < PARTS; i++) {
-		blob_free(&store.part[i]);
+		store.part[i].is_there = 0;
 	}
 }
 
 static int complete(struct bucket_answer *answer)
 {
-	struct blob whole = { .data = malloc((size_t)PARTS * PART_BYTES) };
+	static struct blob whole;
 	char md5s[PARTS * PLAN_MD5_BYTES];
 	char end[16];
 	size_t count = 0;
 
-	CHECK(whole.data != NULL);
-	for (; count < PARTS && store.part[count].data != NULL; count++) {
+	whole = (struct blob){ .is_there = 1 };
+	for (; count < PARTS && store.part[count].is_there; count++) {
 		const struct blob *part = &store.part[count];
 
 		memcpy(whole.data + whole.len, part->data, part->len);
@@ -209,7 +204,7 @@ static int complete(struct bucket_answer *answer)
 	}
 	snprintf(end, sizeof(end), "-%zu", count);
 	etag_of(md5s, count * PLAN_MD5_BYTES, end, whole.etag);
-	put(store.upload.key, store.upload.meta, whole);
+	put(store.upload.key, store.upload.meta, &whole);
 	snprintf(store.answer, sizeof(store.answer),
 		 "<CompleteMultipartUploadResult><ETag>\"%s\"</ETag>"
 		 "</CompleteMultipartUploadResult>",
@@ -242,8 +237,7 @@ static int serve_upload(const struct bucket_request *rq, struct bucket_answer *a
 		unsigned long number = strtoul(strchr(rq->query, '=') + 1, NULL, 10);
 
 		CHECK(number >= 1 && number <= PARTS);
-		blob_free(&store.part[number - 1]);
-		store.part[number - 1] = receive(rq);
+		receive(rq, &store.part[number - 1]);
 		memcpy(answer->etag, store.part[number - 1].etag, sizeof(answer->etag));
 		store.parts_sent++;
 		return 0;
@@ -257,11 +251,14 @@ static int serve_upload(const struct bucket_request *rq, struct bucket_answer *a
 
 static int serve(const struct bucket_request *rq, struct bucket_answer *answer)
 {
+	static struct blob blob;
+
 	if (rq->query != NULL) {
 		return serve_upload(rq, answer);
 	}
 	if (rq->method == BUCKET_PUT) {
-		put(rq->key, rq->meta_sha256, receive(rq));
+		receive(rq, &blob);
+		put(rq->key, rq->meta_sha256, &blob);
 		return 0;
 	}
 	return get(rq, answer);
@@ -359,10 +356,6 @@ static void end(void)
 {
 	char path[2 * PATH_BYTES];
 
-	for (size_t i = 0; i < OBJECTS; i++) {
-		blob_free(&store.object[i].blob);
-	}
-	forget_upload();
 	store = (struct bucket){ .requests = 0 };
 	(void)upload_mark_remove(marks, name, UPLOAD_MARK_BEGUN);
 	(void)upload_mark_remove(marks, name, UPLOAD_MARK_DONE);
@@ -488,10 +481,10 @@ TEST(uplink_job, without_failures_nothing_is_sent_twice)
 TEST(uplink_job, another_object_under_the_key_is_never_touched)
 {
 	struct config cfg;
-	struct blob blob = { .data = strdup("another one"), .len = 11 };
+	static const struct blob blob = { .data = "another one", .len = 11 };
 
 	begin(&cfg, PART_BYTES);
-	put("plant/a/rig1/ecdaq-20260101T000000Z-0000000a-000001.mcap", NULL, blob);
+	put("plant/a/rig1/ecdaq-20260101T000000Z-0000000a-000001.mcap", NULL, &blob);
 	run_to_end(&cfg, 0);
 	CHECK_EQ(store.object[0].blob.len, 11);
 	CHECK(strstr(reported, "another recording of this name") != NULL);
