@@ -59,11 +59,14 @@ static void refresh(struct esc *esc, enum esc_side side, int64_t t_ns, uint16_t 
 	if (addr >= ESC_REG_EEPROM_CONFIG) {
 		return;
 	}
-	if (esc_touches(addr, len, ESC_REG_DL_STATUS, 2)) {
-		refresh_dl_status(esc);
-	}
 	if (esc_touches(addr, len, ESC_REG_AL_STATUS, 1)) {
 		esc_show_late_status(esc, t_ns);
+	}
+	if (addr > ESC_REG_DL_STATUS + 1 && addr + len <= ESC_REG_ECAT_EVENT_REQUEST) {
+		return; /* AL status, of all slaves in each cycle */
+	}
+	if (esc_touches(addr, len, ESC_REG_DL_STATUS, 2)) {
+		refresh_dl_status(esc);
 	}
 	if (esc_touches(addr, len, ESC_REG_ECAT_EVENT_REQUEST, 2)) {
 		put_le16(r + ESC_REG_ECAT_EVENT_REQUEST, (uint16_t)esc->ecat_event);

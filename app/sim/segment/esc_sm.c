@@ -162,11 +162,26 @@ static int is_writer(const struct esc_sm *sm, enum esc_side side)
 	return sm->is_ecat_write == (side == ESC_ECAT);
 }
 
+/* A buffered area from its first byte to its last, as it is usually read: opened and closed. */
+static int sm_read_whole(struct esc *esc, struct esc_sm *sm, enum esc_side side, uint8_t *buf)
+{
+	sm->reader = sm->has_data ? sm->newest : sm->reader;
+	sm->is_reader_open = 0;
+	clear_event(esc, sm, side);
+	memcpy(buf, esc->ram + buffer_offset(sm, sm->reader), sm->len);
+	set_event(esc, sm, side);
+	mark_status(esc, sm, SM_STATUS_READ, SM_STATUS_WRITTEN);
+	return 1;
+}
+
 static int sm_read(struct esc *esc, struct esc_sm *sm, enum esc_side side, size_t at, uint8_t *buf,
 		   size_t len)
 {
 	if (sm->is_locked || is_writer(sm, side) || (sm->is_mailbox && !sm->is_full)) {
 		return 0;
+	}
+	if (len == sm->len && !sm->is_mailbox) {
+		return sm_read_whole(esc, sm, side, buf);
 	}
 	if (at == 0) {
 		sm->is_reader_open = 1;
@@ -187,7 +202,9 @@ static int sm_read(struct esc *esc, struct esc_sm *sm, enum esc_side side, size_
 	return 1;
 }
 
-static void close_writer(struct esc *esc, struct esc_sm *sm, enum esc_side side, int64_t t_ns)
+/* @clear: of the status. */
+static void close_writer(struct esc *esc, struct esc_sm *sm, enum esc_side side, int64_t t_ns,
+			 uint8_t clear)
 {
 	sm->is_writer_open = 0;
 	sm->is_full = sm->is_mailbox;
@@ -195,7 +212,7 @@ static void close_writer(struct esc *esc, struct esc_sm *sm, enum esc_side side,
 	sm->newest = sm->writer;
 	sm->has_data = 1;
 	set_event(esc, sm, side);
-	mark_status(esc, sm, SM_STATUS_WRITTEN, 0);
+	mark_status(esc, sm, SM_STATUS_WRITTEN, clear);
 	if (side == ESC_ECAT && (sm->control & SM_WATCHDOG_TRIGGER)) {
 		esc_watchdog_trigger(esc, t_ns);
 	}
@@ -210,6 +227,8 @@ struct writer {
 static int sm_write(struct esc *esc, struct esc_sm *sm, const struct writer *by, size_t at,
 		    const uint8_t *buf, size_t len)
 {
+	uint8_t clear = 0;
+
 	if (sm->is_locked || !is_writer(sm, by->side) || (sm->is_mailbox && sm->is_full) ||
 	    (by->side == ESC_PDI && sm->is_mailbox && by->t_ns < esc->mailbox_stuck_until_ns)) {
 		return 0;
@@ -218,14 +237,18 @@ static int sm_write(struct esc *esc, struct esc_sm *sm, const struct writer *by,
 		sm->is_writer_open = 1;
 		sm->writer = sm->is_mailbox ? 0 : free_buffer(sm);
 		clear_event(esc, sm, by->side);
-		mark_status(esc, sm, 0, SM_STATUS_READ);
+		/* An area written as a whole is closed at once, which shows the status. */
+		clear = SM_STATUS_READ;
+		if (len < sm->len) {
+			mark_status(esc, sm, 0, clear);
+		}
 	}
 	if (!sm->is_writer_open) {
 		return 0;
 	}
 	memcpy(esc->ram + buffer_offset(sm, sm->writer) + at, buf, len);
 	if (at + len == sm->len) {
-		close_writer(esc, sm, by->side, by->t_ns);
+		close_writer(esc, sm, by->side, by->t_ns, clear);
 	}
 	return 1;
 }

@@ -9,10 +9,9 @@
 #include "base/limits.h"
 #include "base/prng.h"
 
-enum { IN_FLIGHT_MAX = 64, NS_A_BYTE = 80, PREAMBLE_AND_GAP_BYTES = 24 };
+enum { IN_FLIGHT_MAX = 64, /* as a word has bits */ NS_A_BYTE = 80, PREAMBLE_AND_GAP_BYTES = 24 };
 
 struct flight {
-	int is_used;
 	mono_t arrives;
 	uint64_t order;
 	size_t len;
@@ -26,6 +25,7 @@ struct in_process {
 	int64_t stall_ns;
 	int64_t tai_step_ns;
 	uint64_t sent;
+	uint64_t used; /* bit n: flight n is one */
 	struct flight flight[IN_FLIGHT_MAX];
 };
 
@@ -109,27 +109,29 @@ static int ip_sleep_until(void *ctx, mono_t deadline)
 
 static void put_in_flight(struct in_process *ip, const uint8_t *frame, size_t len, mono_t arrives)
 {
-	for (unsigned i = 0; i < IN_FLIGHT_MAX; i++) {
-		struct flight *f = &ip->flight[i];
+	struct flight *f;
+	unsigned i;
 
-		if (!f->is_used) {
-			f->is_used = 1;
-			f->arrives = arrives;
-			f->order = ip->sent;
-			f->len = len;
-			memcpy(f->bytes, frame, len);
-			return;
-		}
+	if (ip->used == UINT64_MAX) {
+		return; /* a wire holds no more: it is lost */
 	}
-	/* A wire holds no more: it is lost. */
+	i = (unsigned)__builtin_ctzll(~ip->used);
+	ip->used |= UINT64_C(1) << i;
+	f = &ip->flight[i];
+	f->arrives = arrives;
+	f->order = ip->sent;
+	f->len = len;
+	memcpy(f->bytes, frame, len);
 }
 
 /* What was held back comes with the next frame. */
 static void release_held(struct in_process *ip)
 {
-	for (unsigned i = 0; i < IN_FLIGHT_MAX; i++) {
-		if (ip->flight[i].is_used && ip->flight[i].arrives.ns == INT64_MAX) {
-			ip->flight[i].arrives = ip->now;
+	for (uint64_t left = ip->used; left != 0; left &= left - 1) {
+		struct flight *f = &ip->flight[__builtin_ctzll(left)];
+
+		if (f->arrives.ns == INT64_MAX) {
+			f->arrives = ip->now;
 		}
 	}
 }
@@ -180,11 +182,11 @@ static struct flight *next_arrival(struct in_process *ip)
 {
 	struct flight *best = NULL;
 
-	for (unsigned i = 0; i < IN_FLIGHT_MAX; i++) {
-		struct flight *f = &ip->flight[i];
+	for (uint64_t left = ip->used; left != 0; left &= left - 1) {
+		struct flight *f = &ip->flight[__builtin_ctzll(left)];
 
-		if (f->is_used && (best == NULL || f->arrives.ns < best->arrives.ns ||
-				   (f->arrives.ns == best->arrives.ns && f->order < best->order))) {
+		if (best == NULL || f->arrives.ns < best->arrives.ns ||
+		    (f->arrives.ns == best->arrives.ns && f->order < best->order)) {
 			best = f;
 		}
 	}
@@ -208,7 +210,7 @@ static int ip_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t deadlin
 	}
 	len = f->len < capacity ? f->len : capacity;
 	memcpy(frame, f->bytes, len);
-	f->is_used = 0;
+	ip->used &= ~(UINT64_C(1) << (f - ip->flight));
 	if (ret_at != NULL) {
 		*ret_at = ip->now;
 	}
@@ -253,10 +255,5 @@ void in_process_stall(struct in_process *ip, int64_t late_ns)
 
 unsigned in_process_in_flight(const struct in_process *ip)
 {
-	unsigned n = 0;
-
-	for (unsigned i = 0; i < IN_FLIGHT_MAX; i++) {
-		n += ip->flight[i].is_used != 0;
-	}
-	return n;
+	return (unsigned)__builtin_popcountll(ip->used);
 }
