@@ -149,6 +149,8 @@ struct esc_clock {
 	uint8_t time_filter; /* depth in force: 0x0934 as of the last write to 0x0930 */
 	uint8_t speed_filter;
 	uint16_t speed_start; /* S, 0x0930 */
+	double loop_gain;     /* of these filters, */
+	double rate_limit;    /* and of S */
 };
 
 struct esc_sync {

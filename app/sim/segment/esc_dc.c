@@ -44,6 +44,12 @@ static int64_t speed_of_rate(const struct esc_clock *c, double wanted)
 	return (int64_t)copysign(d, wanted);
 }
 
+/* A filtered difference must not lag behind what the loop does with it. */
+static double loop_gain(const struct esc_clock *c)
+{
+	return fmin(LOOP_GAIN, 1.0 / (3.0 * (double)(1u << c->time_filter)));
+}
+
 void esc_dc_reset_filter(struct esc *esc, int64_t t_ns)
 {
 	struct esc_clock *c = &esc->clock;
@@ -51,6 +57,8 @@ void esc_dc_reset_filter(struct esc *esc, int64_t t_ns)
 	c->time_filter = esc->reg[ESC_REG_DC_TIME_FILTER] & 0x0f;
 	c->speed_filter = esc->reg[ESC_REG_DC_SPEED_FILTER] & 0x0f;
 	c->speed_start = get_le16(esc->reg + ESC_REG_DC_SPEED_COUNTER_START) & 0x7fff;
+	c->loop_gain = loop_gain(c);
+	c->rate_limit = (double)rate_of_speed(c, speed_limit(c)) * 0x1p-48;
 	c->diff_filtered_ns = 0;
 	c->integral = 0;
 	c->interval_ns = INTERVAL_START_NS;
@@ -59,20 +67,14 @@ void esc_dc_reset_filter(struct esc *esc, int64_t t_ns)
 	esc_clock_correct(esc, t_ns, 0);
 }
 
-/* A filtered difference must not lag behind what the loop does with it. */
-static double loop_gain(const struct esc_clock *c)
-{
-	return fmin(LOOP_GAIN, 1.0 / (3.0 * (double)(1u << c->time_filter)));
-}
-
 static void regulate(struct esc *esc, int64_t t_ns, double behind_ns)
 {
 	struct esc_clock *c = &esc->clock;
-	double gain = loop_gain(c);
+	double gain = c->loop_gain;
 	double slower = c->speed_filter > SPEED_FILTER_NOMINAL
 				? 1.0 / (double)(1u << (c->speed_filter - SPEED_FILTER_NOMINAL))
 				: 1.0;
-	double limit = (double)rate_of_speed(c, speed_limit(c)) * 0x1p-48;
+	double limit = c->rate_limit;
 	double proportional = 2.0 * gain * behind_ns / c->interval_ns;
 	int64_t speed_diff;
 
