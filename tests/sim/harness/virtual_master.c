@@ -183,8 +183,15 @@ static void advance_clock(void *ctx, mono_t until)
 
 static void hash_bytes(uint64_t *hash, const uint8_t *bytes, size_t len)
 {
-	for (size_t i = 0; i < len; i++) {
-		*hash = (*hash ^ bytes[i]) * FNV_PRIME;
+	while (len > 0) {
+		size_t n = len < sizeof(uint64_t) ? len : sizeof(uint64_t);
+		uint64_t word = 0;
+
+		memcpy(&word, bytes, n);
+		*hash = (*hash ^ word) * FNV_PRIME;
+		*hash ^= *hash >> 32; /* a multiplication carries upwards only */
+		bytes += n;
+		len -= n;
 	}
 }
 

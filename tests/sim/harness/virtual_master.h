@@ -33,7 +33,7 @@ struct virtual_result {
 	uint64_t wkc_low;
 	uint64_t unlocked;    /* in OP and not locked */
 	int64_t phase_max_ns; /* largest |phase error| in OP */
-	uint64_t hash;        /* FNV-1a over every byte of every sample */
+	uint64_t hash;        /* over every byte of every sample, eight at once */
 	uint64_t first_cycle;
 	uint64_t last_cycle;
 };
