@@ -19,7 +19,7 @@ usage: ./build.sh VERB [OPTION...]
   fuzz     search for inputs that break a parser
   lint     formatting, static analysis, shell and Python checks
   measure  measure on this machine and write the pages of app/doc/results/
-  bench    measure ecdaq beside other EtherCAT masters
+  bench    measure ecdaq beside other EtherCAT masters, and how fast virtual time is
   clean    remove what was built
   deb      build Debian packages of the programs, for a PC or a board with Debian 12
   image    build the disk image of the SBC, or of the QEMU machine
@@ -71,7 +71,8 @@ the images are built with what time the processors have left. What measures time
   kit      the Python kit: recordings read and converted, without a bus
   replay   captures of real buses against the simulated segment
   sim      the whole master on virtual time; also under ASan+UBSan
-  cost     instructions of a cycle, a recorded and a published sample, counted by callgrind
+  cost     instructions of a cycle, a recorded and a published sample and a cycle on virtual time,
+           counted by callgrind
   fuzz     every fuzz target: its corpus, then some seconds of search
   recipes  the image's recipes and layers, parsed by BitBake, and their rules
   deb      the Debian packages: built, and installed, upgraded and removed in a chroot; needs root

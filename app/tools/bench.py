@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Measure ecdaq beside other masters, on this machine, and write app/doc/results/peers.md.
+"""Measure ecdaq beside other masters, or the simulator, on this machine: app/doc/results/.
 
 Called by `build.sh bench`, which has built everything.
 """
@@ -8,6 +8,7 @@ Called by `build.sh bench`, which has built everything.
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import sys
 from collections.abc import Sequence
@@ -18,14 +19,24 @@ from typing import NoReturn
 ROOT = Path(__file__).resolve().parents[2]
 SLAVES_MOST = 128  # what the loops have room for
 CYCLES_MOST = 50000  # what the sample ring holds
+CYCLES = {"peers": 4000, "sim": 20000}
+SLAVES = {"peers": [2, 16, 64], "sim": [2, 16, 64, 128]}
 
 HELP = """\
+peers  ecdaq beside other masters
+
 Runs ecdaq, SOEM, pysoem and EtherCrab in turns on a simulated segment in a network namespace of
 its own, beside cyclictest and the echo of a raw packet, and writes what it found to
 app/doc/results/peers.md: wake latency, interval, round trip, cycles lost per lost frame, rate,
 SYNC0 spread, time to OP, instructions and system calls a cycle. Masters that cannot take part and
 figures that cannot be had are listed there with the reason. The masters come from their
 registries, once, into ~/.cache/ecdaq/. About 15 minutes; run it on an idle machine.
+
+sim  how fast virtual time is
+
+Runs the whole master with simulated slaves on virtual time, seed by seed and many seeds on all
+cores at once, and writes app/doc/results/sim.md: virtual seconds in a second, instructions and
+processor time a cycle. About a minute.
 
 Instructions of the cycle and of a recorded sample, and DDS: cycle, record and dds of
 ./build.sh help measure.
@@ -60,29 +71,54 @@ def interface(text: str) -> str:
     return text
 
 
+def check_options(parser: Parser, options: argparse.Namespace) -> None:
+    others = ("seeds", "before") if options.what == "peers" else ("rounds", "interface")
+    for name in others:
+        if getattr(options, name) is not None:
+            parser.error(f"--{name}: not an option of {options.what}")
+    if options.before and not (options.before / "tests/cost/cost_virtual").exists():
+        parser.error(f"--before: {options.before} has no tests/cost/cost_virtual")
+    if options.interface and options.slaves:
+        parser.error("--interface and --slaves exclude each other")
+    if options.interface and os.geteuid() != 0:
+        parser.error("--interface: only as root")
+    options.cycles = options.cycles or CYCLES[options.what]
+
+
 def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
     parser = Parser(
         prog="./build.sh bench",
-        usage="./build.sh bench peers [OPTION...]",
+        usage="./build.sh bench peers|sim [OPTION...]",
         description=HELP,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("what", metavar="peers", nargs="?", help="what to measure")
+    parser.add_argument("what", metavar="peers|sim", nargs="?", help="what to measure")
     parser.add_argument(
-        "--slaves", type=numbers, metavar="N,...", help="FB1111-Piccolos (default: 2,16,64)"
+        "--slaves",
+        type=numbers,
+        metavar="N,...",
+        help="FB1111-Piccolos (default: 2,16,64; sim: 128, too)",
     )
     parser.add_argument(
-        "--cycles", type=number(100, CYCLES_MOST), default=4000, metavar="N",
-        help="of 1 ms in each run (default: 4000)",
+        "--cycles", type=number(100, CYCLES_MOST), metavar="N",
+        help=f"of 1 ms in each run (default: {CYCLES['peers']}; sim: {CYCLES['sim']})",
     )  # fmt: skip
     parser.add_argument(
-        "--rounds", type=number(1, 100), default=2, metavar="N",
-        help="how often each master has its turn (default: 2)",
+        "--rounds", type=number(1, 100), metavar="N",
+        help="peers: how often each master has its turn (default: 2)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--seeds", type=number(1, 1000), metavar="N",
+        help="sim: runs of each number of slaves (default: 8)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--before", type=Path, metavar="FOLDER",
+        help="sim: build/release of another tree, which is measured in turns with this one",
     )  # fmt: skip
     parser.add_argument(
         "--interface", type=interface, metavar="IF",
-        help="a network interface of this machine with real slaves on it, instead of the simulated "
-        "segment. They are led to OP, with all outputs 0; as root",
+        help="peers: a network interface of this machine with real slaves on it, instead of the "
+        "simulated segment. They are led to OP, with all outputs 0; as root",
     )  # fmt: skip
     parser.add_argument("--json", type=Path, metavar="FILE", help="the same for programs")
     parser.add_argument(
@@ -91,13 +127,10 @@ def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
     # build.sh calls this before it prepares anything.
     parser.add_argument("--check", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args(arguments)
-    if options.what != "peers":
-        parser.error("name what to measure: peers" if options.what is None
-                     else f"no subject '{options.what}'; there are: peers")  # fmt: skip
-    if options.interface and options.slaves:
-        parser.error("--interface and --slaves exclude each other")
-    if options.interface and os.geteuid() != 0:
-        parser.error("--interface: only as root")
+    if options.what not in CYCLES:
+        parser.error("name what to measure: peers or sim" if options.what is None
+                     else f"no subject '{options.what}'; there are: peers sim")  # fmt: skip
+    check_options(parser, options)
     return options
 
 
@@ -109,10 +142,10 @@ def measure(options: argparse.Namespace, arguments: Sequence[str]) -> int:
     from measure.page import NotMeasuredError, commit, machine, write_index, write_page
     from measure.subjects import PAGES, PEERS
 
-    slaves = [0] if options.interface else options.slaves or [2, 16, 64]
+    slaves = [0] if options.interface else options.slaves or SLAVES["peers"]
     try:
         programs_are_there()
-        bench = Bench(Plan(slaves, options.cycles, options.rounds, options.interface))
+        bench = Bench(Plan(slaves, options.cycles, options.rounds or 2, options.interface))
     except (Unavailable, PermissionError) as why:
         print(f"build.sh: bench: {why}", file=sys.stderr)
         return 1
@@ -139,9 +172,43 @@ def measure(options: argparse.Namespace, arguments: Sequence[str]) -> int:
     return 0
 
 
+def measure_virtual(options: argparse.Namespace, arguments: Sequence[str]) -> int:
+    from bench import virtual
+    from measure.page import NotMeasuredError, commit, machine, write_index, write_page
+    from measure.subjects import PAGES, SIM
+
+    command = " ".join(["./build.sh bench", *arguments])
+    cores = os.cpu_count() or 1
+    seeds = options.seeds or 8
+
+    def run(_: Path) -> list[str]:
+        at = commit(ROOT)
+        rows = [
+            virtual.measure_row(slaves, options.cycles, seeds, options.before, cores)
+            for slaves in options.slaves or SLAVES["sim"]
+        ]
+        if options.json:
+            head = {"command": command, "commit": at, "machine": machine(), "seeds": seeds}
+            whole = head | {"cycles": options.cycles, "rows": virtual.figures(rows)}
+            options.json.write_text(json.dumps(whole, indent=1) + "\n")
+        return virtual.lines_of(rows, options.cycles, seeds, cores)
+
+    try:
+        page = write_page(ROOT, replace(SIM, commands=(command,), measure=run), options.page)
+    except (NotMeasuredError, FileNotFoundError, RuntimeError) as why:
+        print(f"build.sh: bench: {why}", file=sys.stderr)
+        return 1
+    if not options.page:
+        write_index(ROOT, PAGES)
+    print(f"sim: wrote {page}", flush=True)
+    return 0
+
+
 def main(arguments: Sequence[str]) -> int:
     options = parse_arguments(arguments)
-    return 0 if options.check else measure(options, arguments)
+    if options.check:
+        return 0
+    return {"peers": measure, "sim": measure_virtual}[options.what](options, arguments)
 
 
 if __name__ == "__main__":

@@ -226,4 +226,7 @@ SUBJECTS = {s.name: s for s in ALL}
 PEERS = Subject(
     "peers", "Beside other masters", ("./build.sh bench peers",), lambda _: [], verb="bench"
 )
-PAGES = (*ALL, PEERS)
+SIM = Subject(
+    "sim", "How fast virtual time is", ("./build.sh bench sim",), lambda _: [], verb="bench"
+)
+PAGES = (*ALL, PEERS, SIM)
