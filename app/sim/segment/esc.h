@@ -188,6 +188,7 @@ struct esc {
 	struct esc_sm sm[ESC_LIMIT_SM];
 	struct esc_fmmu fmmu[ESC_LIMIT_FMMU];
 	uint16_t sm_mapped;    /* bit n: SM n minds its area, active or locked */
+	uint16_t sm_apart;     /* of those the ones whose areas are nobody else's */
 	uint16_t fmmu_active;  /* bit n: FMMU n maps something, */
 	uint16_t fmmu_writing; /* and writes */
 	struct esc_clock clock;

@@ -18,6 +18,17 @@
 
 enum { SPEED_MARGIN = 0x7f, SPEED_FILTER_NOMINAL = 12, RATE_SCALE_BITS = 48 };
 
+/* Neither is ever no number; fmin() and fmax() are calls. */
+static double lesser(double a, double b)
+{
+	return a < b ? a : b;
+}
+
+static double greater(double a, double b)
+{
+	return a > b ? a : b;
+}
+
 static int64_t speed_limit(const struct esc_clock *c)
 {
 	return c->speed_start > SPEED_MARGIN ? c->speed_start - SPEED_MARGIN : 0;
@@ -40,14 +51,14 @@ static int64_t speed_of_rate(const struct esc_clock *c, double wanted)
 	double limit = (double)speed_limit(c);
 	double d = k < 1e-12 ? 0.0 : (-1.0 + sqrt(1.0 + 4.0 * k * k * s * s)) / (2.0 * k);
 
-	d = fmin(floor(d + 0.5), limit);
+	d = lesser(floor(d + 0.5), limit);
 	return (int64_t)copysign(d, wanted);
 }
 
 /* A filtered difference must not lag behind what the loop does with it. */
 static double loop_gain(const struct esc_clock *c)
 {
-	return fmin(LOOP_GAIN, 1.0 / (3.0 * (double)(1u << c->time_filter)));
+	return lesser(LOOP_GAIN, 1.0 / (3.0 * (double)(1u << c->time_filter)));
 }
 
 void esc_dc_reset_filter(struct esc *esc, int64_t t_ns)
@@ -81,7 +92,7 @@ static void regulate(struct esc *esc, int64_t t_ns, double behind_ns)
 	/* Driven to its limit it learns nothing about the crystals. */
 	if (fabs(proportional) < limit) {
 		c->integral += gain * gain * slower * behind_ns / c->interval_ns;
-		c->integral = fmax(-limit, fmin(limit, c->integral));
+		c->integral = greater(-limit, lesser(limit, c->integral));
 	}
 	speed_diff = speed_of_rate(c, c->integral + proportional);
 	if (speed_diff != c->speed_diff) {
@@ -108,9 +119,9 @@ void esc_dc_compare(struct esc *esc, int64_t t_ns, uint64_t received_ns)
 		return;
 	}
 	if (c->has_compared) {
-		since_ns = fmax(INTERVAL_MIN_NS, fmin(INTERVAL_MAX_NS, since_ns));
+		since_ns = greater(INTERVAL_MIN_NS, lesser(INTERVAL_MAX_NS, since_ns));
 		c->interval_ns += (since_ns - c->interval_ns) * INTERVAL_SHARE;
-		c->interval_ns = fmax(c->interval_ns, since_ns);
+		c->interval_ns = greater(c->interval_ns, since_ns);
 		regulate(esc, t_ns, c->diff_filtered_ns);
 	}
 	c->has_compared = 1;
@@ -120,7 +131,7 @@ void esc_dc_compare(struct esc *esc, int64_t t_ns, uint64_t received_ns)
 void esc_dc_to_registers(struct esc *esc)
 {
 	const struct esc_clock *c = &esc->clock;
-	double magnitude = fmin(floor(fabs(c->diff_filtered_ns) + 0.5), (double)INT32_MAX);
+	double magnitude = lesser(floor(fabs(c->diff_filtered_ns) + 0.5), (double)INT32_MAX);
 
 	/* Bit 31: the local copy is smaller than the time received (data sheet, section II). */
 	put_le32(esc->reg + ESC_REG_DC_SYSTEM_TIME_DIFF,

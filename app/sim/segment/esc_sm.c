@@ -100,6 +100,42 @@ static void reset(struct esc *esc, struct esc_sm *sm)
 	mark_status(esc, sm, 0, SM_STATUS_WRITTEN | SM_STATUS_READ);
 }
 
+static size_t ram_end(const struct esc *esc)
+{
+	return ESC_REG_PROCESS_RAM + (size_t)esc->features.ram_kib * 1024;
+}
+
+static int is_apart(const struct esc *esc, const struct esc_sm *sm)
+{
+	for (unsigned left = esc->sm_mapped; left != 0;) {
+		const struct esc_sm *other = &esc->sm[esc_take_lowest(&left)];
+
+		if (other != sm && other->start < sm->start + sm->len &&
+		    sm->start < other->start + other->len) {
+			return 0;
+		}
+	}
+	return (size_t)sm->start + sm->len <= ram_end(esc);
+}
+
+static void map_areas(struct esc *esc)
+{
+	esc->sm_mapped = 0;
+	esc->sm_apart = 0;
+	for (unsigned n = 0; n < esc->features.sm_count; n++) {
+		const struct esc_sm *sm = &esc->sm[n];
+
+		if ((sm->is_active || sm->is_locked) && sm->start >= ESC_REG_PROCESS_RAM) {
+			esc->sm_mapped |= (uint16_t)(1u << n);
+		}
+	}
+	for (unsigned left = esc->sm_mapped; left != 0;) {
+		unsigned n = esc_take_lowest(&left);
+
+		esc->sm_apart |= (uint16_t)((unsigned)is_apart(esc, &esc->sm[n]) << n);
+	}
+}
+
 void esc_sm_configure(struct esc *esc, unsigned n, enum esc_side side)
 {
 	uint8_t *r = &esc->reg[ESC_REG_SM + n * ESC_SM_BYTES];
@@ -113,10 +149,7 @@ void esc_sm_configure(struct esc *esc, unsigned n, enum esc_side side)
 	sm->is_ecat_write = (sm->control & 0x0c) == SM_DIRECTION_WRITE;
 	sm->is_active = (r[SM_ACTIVATE] & 1) && !(r[SM_PDI_CONTROL] & 1) && sm->len > 0;
 	sm->is_locked = (r[SM_ACTIVATE] & 1) && (r[SM_PDI_CONTROL] & 1) && sm->len > 0;
-	esc->sm_mapped &= (uint16_t)~(1u << n);
-	if ((sm->is_active || sm->is_locked) && sm->start >= ESC_REG_PROCESS_RAM) {
-		esc->sm_mapped |= (uint16_t)(1u << n);
-	}
+	map_areas(esc);
 	if (!was_active || !sm->is_active) {
 		reset(esc, sm);
 	}
@@ -273,17 +306,29 @@ static struct esc_sm *sm_at(struct esc *esc, size_t addr, size_t *len)
 	return NULL;
 }
 
-static size_t ram_end(const struct esc *esc)
+/* The SM that has exactly this area, as process data are accessed; NULL: look at the pieces. */
+static struct esc_sm *sm_of(struct esc *esc, uint16_t addr, size_t len)
 {
-	return ESC_REG_PROCESS_RAM + (size_t)esc->features.ram_kib * 1024;
+	for (unsigned left = esc->sm_apart; left != 0;) {
+		struct esc_sm *sm = &esc->sm[esc_take_lowest(&left)];
+
+		if (sm->start == addr) {
+			return sm->len == len ? sm : NULL;
+		}
+	}
+	return NULL;
 }
 
 int esc_ram_read(struct esc *esc, enum esc_side side, uint16_t addr, uint8_t *buf, size_t len)
 {
 	size_t end = ram_end(esc) < (size_t)addr + len ? ram_end(esc) : (size_t)addr + len;
+	struct esc_sm *whole = sm_of(esc, addr, len);
 	size_t piece;
 	int any = 0;
 
+	if (whole != NULL) {
+		return sm_read(esc, whole, side, 0, buf, len);
+	}
 	for (size_t at = addr; at < end; at += piece) {
 		struct esc_sm *sm;
 
@@ -304,9 +349,13 @@ int esc_ram_write(struct esc *esc, enum esc_side side, int64_t t_ns, uint16_t ad
 {
 	size_t end = ram_end(esc) < (size_t)addr + len ? ram_end(esc) : (size_t)addr + len;
 	struct writer by = { .side = side, .t_ns = t_ns };
+	struct esc_sm *whole = sm_of(esc, addr, len);
 	size_t piece;
 	int any = 0;
 
+	if (whole != NULL) {
+		return sm_write(esc, whole, &by, 0, buf, len);
+	}
 	for (size_t at = addr; at < end; at += piece) {
 		struct esc_sm *sm;
 

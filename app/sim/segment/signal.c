@@ -30,7 +30,8 @@ uint16_t signal_adc(const struct signal_spec *signal, int64_t t_ns)
 {
 	double counts = nearbyint(signal_volt(signal, t_ns) / ADC_FULL_SCALE_V * ADC_MAX);
 
-	return (uint16_t)fmin(fmax(counts, 0.0), ADC_MAX);
+	counts = counts > 0.0 ? counts : 0.0; /* fmax() and fmin() are calls */
+	return (uint16_t)(counts < ADC_MAX ? counts : ADC_MAX);
 }
 
 /* A finite number that ends at a colon or the text's end; moves *text behind it. */
