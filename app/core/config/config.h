@@ -37,7 +37,7 @@ enum config_channel_type {
 };
 
 enum config_when_full { CONFIG_WHEN_FULL_OLDEST, CONFIG_WHEN_FULL_STOP };
-enum config_keep { CONFIG_KEEP_OFF, CONFIG_KEEP_UNTIL_FULL, CONFIG_KEEP_ALWAYS };
+enum config_keep { CONFIG_KEEP_NEVER, CONFIG_KEEP_UNTIL_FULL, CONFIG_KEEP_ALWAYS };
 enum config_addressing { CONFIG_ADDRESSING_PATH, CONFIG_ADDRESSING_HOST };
 /* When a start-up SDO is written (slaves[].sdo[].transition). */
 enum config_transition {

@@ -86,12 +86,12 @@ static const struct option rows[] = {
 	  .type = OPTION_WORD,
 	  FIELD(record_keep_until_uploaded),
 	  .default_value = "until_full",
-	  .words = "off|until_full|always",
+	  .words = "never|until_full|always",
 	  .effect = CONFIG_EFFECT_RECORD,
-	  .prose = "With uplink.enable, recordings that are uploaded are deleted first. off: then "
-		   "the oldest. until_full: others may pass record.budget, and the oldest are "
-		   "deleted only where the disk is full up to record.reserve. always: they are "
-		   "never deleted; recording stops where the disk is full." },
+	  .prose = "What is deleted while uplink.enable is on. never: the oldest, uploaded or not. "
+		   "until_full: what is uploaded, first; the rest may pass record.budget, and its "
+		   "oldest go only where the disk is full up to record.reserve. always: only what "
+		   "is uploaded; recording stops where the disk is full." },
 	{ .name = "record.values",
 	  .type = OPTION_WORD,
 	  FIELD(record_values),

@@ -78,7 +78,7 @@ static int is_kept_back(const struct space *sp, const struct store_entry *entry)
 	const char *suffix = strrchr(entry->name, '.');
 
 	return opt->marks_dir != NULL && opt->marks_dir[0] != '\0' &&
-	       opt->keep_until_uploaded != CONFIG_KEEP_OFF && suffix != NULL &&
+	       opt->keep_until_uploaded != CONFIG_KEEP_NEVER && suffix != NULL &&
 	       strcmp(suffix, ".mcap") == 0 && !upload_mark_is_done(opt->marks_dir, entry);
 }
 
