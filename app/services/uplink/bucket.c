@@ -382,7 +382,7 @@ static int explain_answer(struct bucket *b, char *problem)
 			return answer->status == 403 ? -EPERM : -EIO;
 		}
 	}
-	snprintf(problem, BUCKET_PROBLEM_BYTES, "%.120s: HTTP status %ld%s%s%s", b->base,
+	snprintf(problem, BUCKET_PROBLEM_BYTES, "%.100s: HTTP status %ld%s%.60s%s", b->base,
 		 answer->status, error.code[0] != '\0' ? ", " : "", error.code,
 		 answer->status == 403 ? ": check what uplink.credentials permit" : "");
 	return answer->status == 403 ? -EPERM : -EIO;
