@@ -9,11 +9,14 @@ import os
 import random
 import re
 import shutil
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import pyarrow.parquet
 import pytest
-from ecdaq import CONFIG, OK, Fake, ecdaq
+from ecdaq import CONFIG, OK, ROOT, Fake, ecdaq
 from recording import Bench, wait_until
 from uplink_bench import (
     BUCKET,
@@ -306,6 +309,30 @@ def test_the_budget_deletes_what_is_uploaded_first(bench: Bench, moto: Store) ->
     left = [p.name for p in bench.files()]
     assert paths[0].name in left and paths[1].name in left
     assert paths[2].name not in left
+
+
+def test_what_is_fetched_is_what_ecdaq_parquet_reads(
+    bench: Bench, moto: Store, tmp_path: Path
+) -> None:
+    record_small(bench, 2)
+    Uplink(bench, moto).finish()
+    keys = moto.keys()
+    for key in keys:
+        path = tmp_path / "fleet" / Path(key).relative_to("plant/a")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(moto.get(key))
+    done = subprocess.run(
+        [sys.executable, "-m", "ecdaq.dataset", "fleet", "lake"],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(ROOT / "app/services/publish/python")},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == OK, done.stderr
+    rows = list((tmp_path / "lake/samples/appliance=rig1").glob("date=*/*.parquet"))
+    assert sum(pyarrow.parquet.read_metadata(p).num_rows for p in rows) == 1000
 
 
 def test_status_and_metrics_have_the_uplink(daemon: Fake, bench: Bench, moto: Store) -> None:
