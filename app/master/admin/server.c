@@ -10,8 +10,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "admin/listener.h"
 #include "admin/pending.h"
+#include "base/listener.h"
 
 /* Messages read from a client in one pass, and requests that it may have open. */
 enum { READS_PER_PASS = 16, OPEN_PER_CLIENT = 8 };

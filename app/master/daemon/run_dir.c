@@ -3,8 +3,6 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <grp.h>
-#include <limits.h>
 #include <linux/magic.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,8 +15,9 @@
 #include <unistd.h>
 
 #include "base/event.h"
+#include "base/group.h"
 
-enum { DIR_MODE = 0750, SHARED_MODE = 02750, FILE_MODE = 0640, GROUP_BYTES = 4096 };
+enum { DIR_MODE = 0750, SHARED_MODE = 02750, FILE_MODE = 0640 };
 
 int run_dir_path(const struct run_dir *run, const char *file, char *ret_path, size_t path_bytes)
 {
@@ -54,35 +53,15 @@ static int fail(struct failure *failure, const char *what, int err)
 			   err == ENOSPC ? " (a smaller ring.depth needs less)" : "");
 }
 
-static int is_member(gid_t group)
-{
-	gid_t groups[NGROUPS_MAX];
-	int n = getgroups(NGROUPS_MAX, groups);
-
-	for (int i = 0; i < n; i++) {
-		if (groups[i] == group) {
-			return 1;
-		}
-	}
-	return group == getegid() || geteuid() == 0;
-}
-
 /* The group that is configured as @option has to be there; without one @usual is taken where it can
  * be. */
 static int find_group(const char *option, const char *name, const char *usual, gid_t *ret_group,
 		      struct failure *failure)
 {
-	struct group entry;
-	struct group *found = NULL;
-	char buf[GROUP_BYTES];
-
-	getgrnam_r(name[0] != '\0' ? name : usual, &entry, buf, sizeof(buf), &found);
-	if (name[0] != '\0' && found == NULL) {
+	if (group_find(name, usual, ret_group) < 0) {
 		return failure_set(failure, EXIT_CODE_CONFIG, -ENOENT, "%s: %s: no such group",
 				   option, name);
 	}
-	*ret_group = found != NULL && (name[0] != '\0' || is_member(found->gr_gid)) ? found->gr_gid
-										    : (gid_t)-1;
 	return 0;
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "admin/listener.h"
+#include "base/listener.h"
 
 #include <errno.h>
 #include <stdio.h>

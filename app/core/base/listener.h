@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* A listening SOCK_SEQPACKET socket in the run directory, mode 0660. Context: service thread. */
-#ifndef ADMIN_LISTENER_H
-#define ADMIN_LISTENER_H
+/* A listening SOCK_SEQPACKET socket in the run directory, mode 0660. Context: any but the cycle. */
+#ifndef BASE_LISTENER_H
+#define BASE_LISTENER_H
 
 #include <sys/types.h>
 #include <sys/un.h>
