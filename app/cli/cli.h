@@ -116,6 +116,7 @@ enum exit_code verb_top(struct cli *cli, int argc, char **argv);
 enum exit_code verb_topology(struct cli *cli, int argc, char **argv);
 enum exit_code verb_voe(struct cli *cli, int argc, char **argv);
 enum exit_code verb_watch(struct cli *cli, int argc, char **argv);
+enum exit_code verb_web_token(struct cli *cli, int argc, char **argv);
 enum exit_code verb_xml(struct cli *cli, int argc, char **argv);
 
 #endif

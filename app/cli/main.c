@@ -243,6 +243,13 @@ static const struct verb verbs[] = {
 	  "apply, or could not be read. Exit code 1 with a FAIL (--strict: or a WARN).\n",
 	  verb_doctor },
 	{ "clear", "", "Set counters and histograms of ecdaqd to zero.", NULL, verb_clear },
+	{ "web-token", "viewer|operator|engineer", "A one-time token for a log-in on the page.",
+	  "Good for one log-in within 10 minutes; printed here and nowhere else. Given by "
+	  "ecdaq-web-command\n"
+	  "to who may command. viewer looks, operator also sets outputs, engineer also leads "
+	  "slaves and\n"
+	  "the bus to states.\n",
+	  verb_web_token },
 	{ "stop", "", "Stop the bus and ecdaqd in order.", NULL, verb_stop },
 	{ "completion", "", "Completion of this command line, for bash.",
 	  "source <(ecdaq completion)\n\n"

@@ -163,7 +163,7 @@ def test_the_root_file_system_is_clean_and_has_our_programs(built: Built) -> Non
     start = int(built.partitions()[1]["start"]) * 512
     built.tool("e2fsck", "-f", "-n", f"{built.name}.img?offset={start}")
     services = ("ecdaqd", "ecdaq-record", "ecdaq-dds", "ecdaq-web", "ecdaq-stream", "ecdaq-uplink")
-    for program in (*services, "ecdaq"):
+    for program in (*services, "ecdaq-web-command", "ecdaq"):
         head = built.root_file(f"/usr/bin/{program}")[:20]
         # 64 bits, little-endian, for AArch64.
         assert head[:6] == b"\x7fELF\x02\x01" and head[18:20] == b"\xb7\x00", program

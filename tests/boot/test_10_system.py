@@ -20,6 +20,7 @@ EXPOSURE_LIMITS = {
     "ecdaq-dds.service": 2.0,
     "ecdaq-sync0.service": 2.0,
     "ecdaq-web.service": 1.5,
+    "ecdaq-web-command.service": 1.5,
     "ecdaq-stream.service": 1.5,
     "ecdaq-uplink.service": 1.5,
     "ecdaq-boot-config.service": 2.5,

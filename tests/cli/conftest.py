@@ -19,6 +19,7 @@ from made_machine import Machine
 from recording import PRODUCER, RECORD, Bench
 from terminal import Terminal
 from web_bench import WEB, Web
+from web_session import WebCommand
 
 
 @pytest.fixture
@@ -93,6 +94,11 @@ def make_web(bench: Bench) -> Iterator[Callable[..., Web]]:
 @pytest.fixture
 def web(make_web: Callable[..., Web]) -> Web:
     return make_web()
+
+
+@pytest.fixture
+def web_command(bench: Bench) -> WebCommand:
+    return WebCommand(bench)
 
 
 @pytest.fixture

@@ -20,6 +20,7 @@ SERVICES = {
     "ecdaq-sync0": "sync0.enable",
     "ecdaq-uplink": "uplink.enable",
     "ecdaq-web": "web.enable",
+    "ecdaq-web-command": "web.enable",
 }
 PROGRAMS = [*SERVICES, "ecdaq"]
 RUN_BY_ECDAQ = ["log", "security"]

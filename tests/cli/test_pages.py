@@ -60,7 +60,8 @@ def test_words_and_slaves_of_a_verb_are_completed(daemon: Fake) -> None:
 @pytest.mark.parametrize("verb", VERBS)
 def test_every_verb_has_a_manual_page_with_its_options(verb: str) -> None:
     page = works(ecdaq(None, "manual", verb))
-    assert page.startswith(f'.TH "ecdaq\\-{verb}" 1 ')
+    name = f"ecdaq-{verb}".replace("-", "\\-")
+    assert page.startswith(f'.TH "{name}" 1 ')
     text = page.replace("\\-", "-")
     assert f"\\fBecdaq {verb}\\fR [OPTION...] {VERBS[verb]}" in text
     for option in options_of(verb):

@@ -45,6 +45,7 @@ VERBS = {
     "metrics": "",
     "doctor": "",
     "clear": "",
+    "web-token": "viewer|operator|engineer",
     "stop": "",
     "completion": "",
     "manual": "[VERB]",

@@ -19,18 +19,21 @@ class RejectedError(Exception):
     """The server did not make it a WebSocket; the first line of its answer."""
 
 
-def http(port: int, request: str, **headers: str) -> tuple[int, dict[str, str], bytes]:
+def http(
+    port: int, request: str, body: str = "", **headers: str
+) -> tuple[int, dict[str, str], bytes]:
     """Status, headers and body of the answer to @request ("GET /")."""
     fields = {"Host": f"127.0.0.1:{port}", "Connection": "close"} | headers
     lines = [f"{request} HTTP/1.1", *(f"{k}: {v}" for k, v in fields.items()), "", ""]
     with socket.create_connection(("127.0.0.1", port), timeout=20) as sock:
-        sock.sendall("\r\n".join(lines).encode())
+        sock.sendall(("\r\n".join(lines) + body).encode())
         data = b""
         while part := sock.recv(65536):
             data += part
-    head, _, body = data.partition(b"\r\n\r\n")
+    head, _, answer = data.partition(b"\r\n\r\n")
     first, *rest = head.decode().split("\r\n")
-    return int(first.split()[1]), {k.lower(): v for k, v in (r.split(": ", 1) for r in rest)}, body
+    fields = {k.lower(): v for k, v in (r.split(": ", 1) for r in rest)}
+    return int(first.split()[1]), fields, answer
 
 
 def unchunk(body: bytes) -> bytes:

@@ -16,7 +16,7 @@ from conftest import Machine
 TRIPLETS = {"amd64": "x86_64-linux-gnu", "arm64": "aarch64-linux-gnu"}
 PACKAGES = ["ecdaq", "ecdaq-sim", "libecdaq-dev", "libecdaq1", "python3-ecdaq"]
 PROGRAMS = ["ecdaq", "ecdaqd", "ecdaq-dds", "ecdaq-record", "ecdaq-sim", "ecdaq-stream"]
-PROGRAMS += ["ecdaq-sync0", "ecdaq-uplink", "ecdaq-web"]
+PROGRAMS += ["ecdaq-sync0", "ecdaq-uplink", "ecdaq-web", "ecdaq-web-command"]
 
 
 def deb(packages: Path, arch: str, name: str) -> Path:

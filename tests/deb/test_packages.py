@@ -16,7 +16,7 @@ INSTALL = "apt-get install -q -y"
 LINES = [line.partition(" #")[0].replace("sudo ", "").strip() for line in README.splitlines()]
 OURS = "ecdaq ecdaq-sim libecdaq1 libecdaq-dev python3-ecdaq"
 USERS = {"ecdaqd", "ecdaq-record", "ecdaq-dds", "ecdaq-sync0", "ecdaq-web"} | {"ecdaq-stream"}
-USERS |= {"ecdaq-uplink"}
+USERS |= {"ecdaq-uplink", "ecdaq-web-command"}
 REMOTE_LED = "outputs: [ { channel: piccolo0.led, owner: remote } ]"
 AS_USER = "setpriv --reuid {} --regid ecdaq-read --init-groups {} {} > /tmp/{}.log 2>&1 &"
 # What the kernel's and the package manager's own books are not asked for.

@@ -90,7 +90,8 @@ def test_every_service_is_sandboxed(path: Path) -> None:
 
 def test_a_service_writes_in_its_own_folder_of_the_run_directory_only() -> None:
     folders = (ROOT / "usr/lib/tmpfiles.d/ecdaq.conf").read_text()
-    for unit in ("ecdaq-record", "ecdaq-dds", "ecdaq-sync0", "ecdaq-stream", "ecdaq-uplink"):
+    services = ("ecdaq-record", "ecdaq-dds", "ecdaq-sync0", "ecdaq-stream", "ecdaq-uplink")
+    for unit in (*services, "ecdaq-web-command"):
         own = "/run/ecdaq/" + unit.removeprefix("ecdaq-")
         assert f"d {own} 2750 {unit} ecdaq-read -\n" in folders
         writes = " ".join(values(f"{unit}.service", "ReadWritePaths")).split()
@@ -104,10 +105,24 @@ def test_the_page_writes_nothing_and_its_user_is_its_own() -> None:
     assert values("ecdaq-web.service", "User") == ["ecdaq-web"]
     text = (ROOT / "usr/lib/sysusers.d/ecdaq.conf").read_text()
     assert re.findall(r"^u ecdaq-web (\d+):900 ", text, re.MULTILINE) == ["908"]
-    assert "m ecdaq-web" not in text
+    assert re.search(r"^m ecdaq-web ", text, re.MULTILINE) is None
     # Whoever takes it over has the network, and little else.
     if shutil.which("systemd-analyze"):
         assert exposure(UNITS / "ecdaq-web.service") < 1.5
+
+
+def test_what_may_command_for_the_page_has_no_network_and_a_user_of_its_own() -> None:
+    unit = "ecdaq-web-command.service"
+    assert values(unit, "PrivateNetwork") == ["yes"]
+    assert values(unit, "RestrictAddressFamilies") == ["AF_UNIX"]
+    assert values(unit, "ReadWritePaths") == ["/run/ecdaq/web-command"]
+    assert values(unit, "ProtectSystem") == ["strict"]
+    assert values(unit, "User") == ["ecdaq-web-command"]
+    text = (ROOT / "usr/lib/sysusers.d/ecdaq.conf").read_text()
+    assert re.findall(r"^u ecdaq-web-command (\d+):900 ", text, re.MULTILINE) == ["911"]
+    assert "m ecdaq-web-command ecdaq-admin\n" in text
+    if shutil.which("systemd-analyze"):
+        assert exposure(UNITS / unit) < 1.5
 
 
 def test_the_page_is_off_until_it_is_configured() -> None:

@@ -39,3 +39,17 @@ int config_web_address(const struct config *cfg, struct sockaddr_in6 *ret, sockl
 {
 	return find_address(cfg->web_listen, cfg->web_port, ret, ret_bytes);
 }
+
+int config_web_is_loopback(const struct config *cfg)
+{
+	struct sockaddr_in6 ip6;
+	struct sockaddr_in ip4;
+	socklen_t bytes;
+
+	if (config_web_address(cfg, &ip6, &bytes) < 0) {
+		return 0;
+	}
+	memcpy(&ip4, &ip6, sizeof(ip4));
+	return ip4.sin_family == AF_INET ? ntohl(ip4.sin_addr.s_addr) >> 24 == 127
+					 : IN6_IS_ADDR_LOOPBACK(&ip6.sin6_addr);
+}

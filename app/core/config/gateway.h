@@ -18,5 +18,7 @@ int config_gateway_address(const struct config *cfg, struct sockaddr_in6 *ret,
 
 /** The same for ecdaq-web: 1; -EINVAL: web.listen is neither loopback nor an address. */
 int config_web_address(const struct config *cfg, struct sockaddr_in6 *ret, socklen_t *ret_bytes);
+/** Does ecdaq-web listen for programs of this machine only? */
+int config_web_is_loopback(const struct config *cfg);
 
 #endif

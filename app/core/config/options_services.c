@@ -198,15 +198,16 @@ static const struct option rows[] = {
 	  FIELD(web_enable),
 	  .default_value = "off",
 	  .effect = CONFIG_EFFECT_WEB,
-	  .prose = "Serve samples and state over HTTP and WebSocket. Reading only." },
+	  .prose = "Serve samples and state over HTTP and WebSocket, and commands to "
+		   "who has logged in (ecdaq-web-command)." },
 	{ .name = "web.listen",
 	  .type = OPTION_TEXT,
 	  FIELD(web_listen),
 	  .default_value = "loopback",
 	  .effect = CONFIG_EFFECT_WEB,
 	  .prose = "loopback: on 127.0.0.1, for this machine and SSH tunnels. An IPv4 or IPv6 "
-		   "address of this machine: for everyone who reaches it; there is no password "
-		   "and no encryption." },
+		   "address of this machine: for everyone who reaches it, to read; there is no "
+		   "encryption, so commands are for the loopback only." },
 	{ .name = "web.port",
 	  .type = OPTION_UINT,
 	  FIELD(web_port),

@@ -16,7 +16,8 @@ enum { PIPE_BYTES = 256 * 1024, NICE = 10 };
 
 /* Standard output to @out, nothing else that is open here, and the signals as they are by default.
  */
-static int spawn(const char *path, char *const words[], int out, pid_t *ret_pid)
+static int spawn(const char *path, char *const words[], enum exports_errors errors, int out,
+		 pid_t *ret_pid)
 {
 	char *environment[] = { NULL };
 	posix_spawn_file_actions_t actions;
@@ -40,6 +41,9 @@ static int spawn(const char *path, char *const words[], int out, pid_t *ret_pid)
 	posix_spawnattr_setsigdefault(&attributes, &all);
 	posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
 	r = posix_spawn_file_actions_adddup2(&actions, out, STDOUT_FILENO);
+	if (r == 0 && errors == EXPORTS_ERRORS_TO_PIPE) {
+		r = posix_spawn_file_actions_adddup2(&actions, out, STDERR_FILENO);
+	}
 	r = r != 0 ? r
 		   : posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY,
 						      0);
@@ -61,7 +65,7 @@ void exports_reap(struct exports *e)
 	}
 }
 
-int exports_start(struct exports *e, char *const words[], int *ret_fd)
+int exports_start(struct exports *e, char *const words[], enum exports_errors errors, int *ret_fd)
 {
 	char program_path[PATH_MAX];
 	int number = 0;
@@ -84,8 +88,9 @@ int exports_start(struct exports *e, char *const words[], int *ret_fd)
 		return -errno;
 	}
 	(void)fcntl(fds[0], F_SETPIPE_SZ, PIPE_BYTES); /* a smaller one is slower, no more */
-	r = fcntl(fds[0], F_SETFL, O_NONBLOCK) < 0 ? -errno
-						   : spawn(program_path, words, fds[1], &pid);
+	r = fcntl(fds[0], F_SETFL, O_NONBLOCK) < 0
+		    ? -errno
+		    : spawn(program_path, words, errors, fds[1], &pid);
 	close(fds[1]);
 	if (r < 0) {
 		close(fds[0]);

@@ -20,12 +20,15 @@ struct exports {
 	} process[EXPORTS_AT_A_TIME];
 };
 
+/* Where standard error of a program goes. */
+enum exports_errors { EXPORTS_ERRORS_TO_LOG, EXPORTS_ERRORS_TO_PIPE };
+
 /**
  * Begin to run @words: one of our programs, its arguments, NULL; its environment is empty. The
  * number of the process, and in @ret_fd the pipe with what it prints, which the caller closes and
  * which does not block; -EBUSY: there are as many as there may be; or -errno.
  */
-int exports_start(struct exports *e, char *const words[], int *ret_fd);
+int exports_start(struct exports *e, char *const words[], enum exports_errors errors, int *ret_fd);
 /** After the end of its pipe. 1: it is complete, with an exit code of at most @good_exit; 0: ask
  * again; -EIO: it failed, and said why on standard error. With 1 and -EIO @number is free. */
 int exports_finish(struct exports *e, int number, int good_exit);

@@ -156,7 +156,7 @@ static int start(struct past *p, const struct channel_table *table)
 	snprintf(number[2], sizeof(number[2]), "%" PRIu64, g->first + g->cycles - 1);
 	snprintf(number[3], sizeof(number[3]), "%" PRIu32, g->pixels);
 	p->text_len = 0;
-	r = exports_start(&p->exports, words, &p->fd);
+	r = exports_start(&p->exports, words, EXPORTS_ERRORS_TO_LOG, &p->fd);
 	p->number = r;
 	return r < 0 ? r : 0;
 }

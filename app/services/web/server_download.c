@@ -150,7 +150,7 @@ static int begin_process(struct download *d, struct exports *exports, char *cons
 	if (lws_hdr_total_length(d->wsi, WSI_TOKEN_HEAD_URI) > 0) {
 		return put_table_head(d) < 0 ? -EIO : 0;
 	}
-	r = exports_start(exports, words, &d->fd);
+	r = exports_start(exports, words, EXPORTS_ERRORS_TO_LOG, &d->fd);
 	if (r < 0) {
 		return r;
 	}

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The page's files, which are in the program, recordings, and what ecdaq says; nothing else is
- * served. */
+ * served, and nothing but log-in and commands is taken. */
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
@@ -17,6 +17,8 @@ struct reply {
 	size_t sent;
 	int is_last_one;           /* what follows on this connection is not read */
 	struct download *download; /* in place of a body */
+	struct command_post *post; /* the same */
+	const char *cookie;        /* NULL, "": none */
 };
 
 static const char recordings_path[] = "/recordings/";
@@ -52,6 +54,15 @@ int server_put_headers(struct lws *wsi, uint8_t **p, uint8_t *end)
 	return 0;
 }
 
+static int put_cookie(struct lws *wsi, const struct reply *reply, uint8_t **p, uint8_t *end)
+{
+	return reply->cookie == NULL || reply->cookie[0] == '\0'
+		       ? 0
+		       : lws_add_http_header_by_name(wsi, (const uint8_t *)"set-cookie:",
+						     (const uint8_t *)reply->cookie,
+						     (int)strlen(reply->cookie), p, end);
+}
+
 static int begin(struct lws *wsi, struct reply *reply, unsigned status, const char *type)
 {
 	uint8_t buf[LWS_PRE + HEAD_BYTES];
@@ -60,7 +71,7 @@ static int begin(struct lws *wsi, struct reply *reply, unsigned status, const ch
 	uint8_t *end = buf + sizeof(buf) - 1;
 
 	if (lws_add_http_common_headers(wsi, status, type, reply->bytes, &p, end) != 0 ||
-	    server_put_headers(wsi, &p, end) != 0) {
+	    server_put_headers(wsi, &p, end) != 0 || put_cookie(wsi, reply, &p, end) != 0) {
 		return -1;
 	}
 	if (lws_finalize_write_http_header(wsi, start, &p, end) != 0) {
@@ -76,7 +87,7 @@ static int begin(struct lws *wsi, struct reply *reply, unsigned status, const ch
 
 static int put_text(struct lws *wsi, struct reply *reply, unsigned status, const char *text)
 {
-	reply->body = (const uint8_t *)text; /* a constant */
+	reply->body = (const uint8_t *)text; /* a constant, or of the post */
 	reply->bytes = strlen(text);
 	return begin(wsi, reply, status, "text/plain; charset=utf-8");
 }
@@ -113,6 +124,31 @@ static int continue_download(struct lws *wsi, struct reply *reply)
 	return r > 1 ? put_failure(wsi, reply, r) : r;
 }
 
+static int take_post(struct lws *wsi, struct reply *reply, const char *path)
+{
+	const char *why = "GET and HEAD only\n";
+	int r = server_command_begin(wsi, path, &reply->post, &why);
+
+	if (r == 0) {
+		return 0; /* its body follows */
+	}
+	reply->is_last_one = 1;
+	return put_text(wsi, reply, r == -ENOENT ? HTTP_STATUS_METHOD_NOT_ALLOWED : (unsigned)r,
+			why);
+}
+
+static int continue_post(struct lws *wsi, struct reply *reply)
+{
+	struct command_answer answer;
+
+	if (server_command_turn(reply->post, &answer) == 0) {
+		return 0;
+	}
+	reply->cookie = answer.cookie;
+	reply->is_last_one = 1; /* and with it all of the post */
+	return put_text(wsi, reply, answer.status, answer.text);
+}
+
 static int serve(struct lws *wsi, struct reply *reply, const char *path)
 {
 	char why[SERVER_WHY_BYTES];
@@ -124,8 +160,7 @@ static int serve(struct lws *wsi, struct reply *reply, const char *path)
 	}
 	if (lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) <= 0 &&
 	    lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) <= 0) {
-		reply->is_last_one = 1;
-		return put_text(wsi, reply, HTTP_STATUS_METHOD_NOT_ALLOWED, "GET and HEAD only\n");
+		return take_post(wsi, reply, path);
 	}
 	if (strncmp(path, recordings_path, strlen(recordings_path)) == 0) {
 		return begun(wsi, reply,
@@ -171,6 +206,20 @@ static int put_chunk(struct lws *wsi, struct reply *reply)
 	return 0;
 }
 
+/* What was refused already is not kept: the connection ends with its answer. */
+static int take_body(struct reply *reply, enum lws_callback_reasons reason, const void *in,
+		     size_t len)
+{
+	if (reply->post == NULL) {
+		return 0;
+	}
+	if (reason == LWS_CALLBACK_HTTP_BODY) {
+		return server_command_body(reply->post, in, len);
+	}
+	server_command_send(reply->post);
+	return 0;
+}
+
 int server_http(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t len)
 {
 	/* A long table of reasons; those that are not here are not ours. */
@@ -180,8 +229,12 @@ int server_http(struct lws *wsi, enum lws_callback_reasons reason, void *user, v
 	if (reason == LWS_CALLBACK_HTTP_WRITEABLE) {
 		struct reply *reply = user;
 
-		return reply->download != NULL ? continue_download(wsi, reply)
-					       : put_chunk(wsi, reply);
+		return reply->download != NULL                      ? continue_download(wsi, reply)
+		       : reply->post != NULL && reply->body == NULL ? continue_post(wsi, reply)
+								    : put_chunk(wsi, reply);
+	}
+	if (reason == LWS_CALLBACK_HTTP_BODY || reason == LWS_CALLBACK_HTTP_BODY_COMPLETION) {
+		return take_body(user, reason, in, len);
 	}
 	if ((reason == LWS_CALLBACK_CLOSED_HTTP || reason == LWS_CALLBACK_HTTP_DROP_PROTOCOL) &&
 	    user != NULL) {
@@ -189,6 +242,8 @@ int server_http(struct lws *wsi, enum lws_callback_reasons reason, void *user, v
 
 		server_download_end(reply->download);
 		reply->download = NULL;
+		server_command_end(reply->post);
+		reply->post = NULL;
 	}
 	if (reason == LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION) {
 		return -1; /* a WebSocket without a subprotocol that we have */

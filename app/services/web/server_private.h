@@ -37,6 +37,7 @@ struct server {
 	struct server_client *first_client;
 	int64_t reported_ns;    /* when a rejected request was reported */
 	uint32_t downloads;     /* that are being sent */
+	uint32_t commands;      /* that are being posted */
 	struct exports exports; /* of recordings */
 	struct exports reports; /* of ecdaq */
 	lws_sorted_usec_list_t timer;
@@ -86,6 +87,27 @@ void server_download_end(struct download *d);
 /** Send some more, when the client takes it. 0: go on; 1: all was sent; -1: end the connection; or
  * the HTTP status to be answered. */
 int server_download_turn(struct download *d);
+
+/* What the page posts, server_command.c. */
+struct command_post;
+
+struct command_answer {
+	unsigned status;
+	const char *text;   /* as long as the post */
+	const char *cookie; /* to be set; "": none */
+};
+
+/** Begin with what is posted to @path. 0; -ENOENT: nothing is; or the HTTP status to be answered
+ * with a constant in @ret_why. Free with server_command_end(). */
+int server_command_begin(struct lws *wsi, const char *path, struct command_post **ret_post,
+			 const char **ret_why);
+void server_command_end(struct command_post *post);
+/** A part of the body. 0; -1: end the connection. */
+int server_command_body(struct command_post *post, const void *data, size_t len);
+/** All of it is there: pass it on; the client becomes writable when there is an answer. */
+void server_command_send(struct command_post *post);
+/** 1 with the answer; 0: not yet, the client becomes writable again. */
+int server_command_turn(struct command_post *post, struct command_answer *ret);
 
 /* Callbacks of libwebsockets. */
 int server_http(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in,
