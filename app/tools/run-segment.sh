@@ -30,8 +30,8 @@ real-time priority and reports that once.
   --no-sync0      do not start ecdaq-sync0. Without this option it checks the simulated pulses, marked
                   as simulated in `ecdaq sync0`, or what section sync0 of FILE names (enable, edges)
   --no-web        do not start ecdaq-web. Without this option it listens on 127.0.0.1, on the first free
-                  port from 8765 on (the address is printed at start), or as section web of FILE
-                  configures
+                  port from 8765 on (the address is printed at start, and one with a token that logs an
+                  operator in, once), or as section web of FILE configures
   --json          no live view; the last line of standard output is `ecdaq status --json --summary`;
                   there is none if the start failed
 
@@ -166,10 +166,27 @@ free_web_port()
 	return 1
 }
 
+# start_web_command OPTION...: log-in and commands of the page. Sets $token to one that logs an operator in.
+start_web_command()
+{
+	local tries=0
+
+	if [ ! -x "$bin/ecdaq-web-command" ]; then
+		return 0
+	fi
+	setpriv --pdeathsig TERM setsid "$bin/ecdaq-web-command" "$@" < /dev/null 2<> "$run_work/pipe" &
+	export run_web_command_pid=$!
+	until [ -S "$ECDAQ_RUN_DIR/web-command/token" ] || [ "$tries" -ge 250 ]; do
+		tries=$((tries + 1))
+		sleep 0.02
+	done
+	token=$("$bin/ecdaq" --run-dir "$ECDAQ_RUN_DIR" web-token operator) || token=
+}
+
 # ecdaq-web listens outside the namespace, too.
 start_web()
 {
-	local options=(--config "$config") port='' why
+	local options=(--config "$config") port='' token='' why
 
 	[ "$web" = yes ] || return 0
 	if [ ! -x "$bin/ecdaq-web" ]; then
@@ -191,7 +208,10 @@ start_web()
 	fi
 	setpriv --pdeathsig TERM setsid "$bin/ecdaq-web" "${options[@]}" < /dev/null 2<> "$run_work/pipe" &
 	export run_web_pid=$!
+	start_web_command "${options[@]}"
 	[ -z "$port" ] || note "page: http://127.0.0.1:$port/ (Foxglove: ws://127.0.0.1:$port/)"
+	[ -z "$port" ] || [ -z "$token" ] ||
+		note "page with a log-in, once and within 10 min, as operator: http://127.0.0.1:$port/#token=$token"
 }
 
 # Directories of earlier runs that were killed: no process holds their lock any more.
@@ -247,7 +267,7 @@ make_wire()
 
 declare -A pid=() program=(
 	[daemon]=ecdaqd [recorder]=ecdaq-record [segment]=ecdaq-sim [sync0]=ecdaq-sync0 [dds]=ecdaq-dds
-	[web]=ecdaq-web [view]=ecdaq
+	[web]=ecdaq-web [webcommand]=ecdaq-web-command [view]=ecdaq
 )
 view=no
 cause=
@@ -396,6 +416,7 @@ end_in_order()
 	stop recorder
 	stop_adopted dds "${run_dds_pid:-}"
 	stop_adopted web "${run_web_pid:-}"
+	stop_adopted webcommand "${run_web_command_pid:-}"
 	stop segment
 }
 
@@ -414,8 +435,8 @@ has_ended()
 	wait "${pid[$1]}" || status=$?
 }
 
-# Returns when the first of the children has ended, except ecdaq-sync0 and ecdaq-web: the run continues
-# without them. It
+# Returns when the first of the children has ended, except ecdaq-sync0, ecdaq-web and ecdaq-web-command: the run
+# continues without them. It
 # polls instead of waiting: a signal during "wait -n" can make bash lose the end of a child.
 wait_for_end()
 {
@@ -431,6 +452,11 @@ wait_for_end()
 			sync0*)
 				unset 'pid[sync0]'
 				[ "$status" = 0 ] || note "ecdaq-sync0 ended with $status"
+				continue
+				;;
+			webcommand*)
+				unset 'pid[webcommand]'
+				note "ecdaq-web-command has ended: the page has no commands any more"
 				continue
 				;;
 			web*)
@@ -517,6 +543,7 @@ run_inside()
 	daemon_pid=${pid[daemon]}
 	adopt dds "${run_dds_pid:-}"
 	adopt web "${run_web_pid:-}"
+	adopt webcommand "${run_web_command_pid:-}"
 	start_sync0 "$has_source"
 	wait_for_end
 	end_in_order

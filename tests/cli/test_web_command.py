@@ -11,9 +11,12 @@ import stat
 import struct
 from collections.abc import Callable
 
+import npm
 import pytest
+from browser import Browser
 from ecdaq import NO_DAEMON, REFUSED, USAGE, Fake, ecdaq, fails, json_of
 from recording import Bench
+from test_web_views import AXE, FOUND
 from web_bench import Web
 from web_client import RejectedError, WebSocket, http
 from web_session import Session, WebCommand, post
@@ -310,3 +313,100 @@ def test_it_starts_again_and_nobody_is_logged_in_any_more(
     assert session.ask("set", LED, "1")[0] == 401
     again.stop()
     assert list(again.folder.iterdir()) == []
+
+
+def press(browser: Browser, selector: str) -> None:
+    browser.value(f"document.querySelector({selector!r}).click()")
+
+
+SET = f"""[...document.querySelectorAll('#channel-rows tr')]
+  .find((line) => line.children[0].textContent === '{LED}')"""
+
+
+def test_set_lights_the_led_and_names_the_cycle_in_a_browser(
+    daemon: Fake, web: Web, web_command: WebCommand, make_browser: Callable[..., Browser]
+) -> None:
+    token = web_command.token("operator")
+    browser = make_browser(web, f"#token={token}")
+    browser.wait_for("document.querySelector('#session-role').textContent === 'operator'")
+    # The token is neither in the address nor in the history; no script sees the cookie.
+    assert browser.value("[location.hash, history.length, document.cookie]")[::2] == ["", ""]
+    history = browser.tell("Page.getNavigationHistory")["entries"]
+    assert all(token not in entry["url"] for entry in history[-1:])
+    browser.value("location.hash = '#channels'")
+    browser.wait_for(f"{SET} !== undefined")
+    assert browser.value(f"{SET}.querySelector('form').offsetWidth > 0")
+    assert browser.value(f"{SET}.children[1].textContent") == "0"
+    browser.value(f"{SET}.querySelector('select').value = '1'")
+    browser.value(f"{SET}.querySelector('form button').click()")
+    said = browser.wait_for(f"{SET}.querySelector('[role=status]').textContent.match(/cycle \\d+/)")
+    assert int(said[0].split()[1]) >= 1000
+    browser.wait_for(f"{SET}.children[1].textContent === '1'")
+    assert json_of(daemon("watch", LED, "--count", "1", "--json"))["values"] == {LED: 1}
+    # What is refused has its reason in the same place.
+    other = SET.replace(LED, "piccolo1.led")
+    browser.value(f"{other}.querySelector('form button').click()")
+    browser.wait_for(f"{other}.querySelector('[role=status]').textContent.includes('owned by')")
+    # A reload keeps the log-in, as the cookie does.
+    browser.tell("Page.reload")
+    browser.wait_for("document.querySelector('#session-role')?.textContent === 'operator'")
+    press(browser, "#session-end")
+    browser.wait_for("document.querySelector('#session-role').textContent === ''")
+    assert browser.value("!document.querySelector('#session-form').hidden")
+    log = web_command.stop()
+    assert f"operator 1: set {LED} 1: done" in log and "operator 1 has logged out" in log
+
+
+def test_an_engineer_leads_a_slave_and_the_bus_in_a_browser(
+    daemon: Fake, web: Web, web_command: WebCommand, make_browser: Callable[..., Browser]
+) -> None:
+    browser = make_browser(web, "#bus?s=0")
+    browser.wait_for("!document.querySelector('#bus-slave').hidden")
+    visible = (
+        "['#bus-commands', '#slave-commands'].map((q) => document.querySelector(q).offsetWidth > 0)"
+    )
+    assert browser.value(visible) == [False, False]
+    # By keyboard: the field, the token, Enter.
+    browser.value("document.querySelector('#session-token').focus()")
+    browser.tell("Input.insertText", text=web_command.token("engineer"))
+    for kind in ("keyDown", "keyUp"):
+        browser.tell("Input.dispatchKeyEvent", type=kind, key="Enter", code="Enter", text="\r",
+                     windowsVirtualKeyCode=13)  # fmt: skip
+    browser.wait_for("document.querySelector('#session-role').textContent === 'engineer'")
+    assert browser.value(visible) == [True, True]
+    result = "document.querySelector('#bus-result').textContent"
+    press(browser, "#slave-commands button")
+    assert browser.value(result) == ""  # disabled
+    press(browser, "#bus-allow")
+    for place, number, done in (
+        ("slave", 2, "state PREOP 0: done"),
+        ("slave", 5, "errors 0: done"),
+        ("bus", 4, "state OP: done"),
+        ("bus", 6, "clear: done"),
+    ):
+        press(browser, f"#{place}-commands button:nth-of-type({number})")
+        browser.wait_for(f"{result} === {done!r}")
+    axe = npm.install(AXE, "axe-core") / "node_modules" / "axe-core" / "axe.min.js"
+    browser.value(axe.read_text() + "; void 0")
+    assert browser.value(FOUND) == []
+    browser.value("location.hash = '#channels'")
+    browser.wait_for(f"{SET} !== undefined")
+    assert browser.value(FOUND) == []
+    assert browser.problems() == []
+
+
+def test_a_viewer_and_a_wrong_token_see_no_command_in_a_browser(
+    daemon: Fake, web: Web, web_command: WebCommand, make_browser: Callable[..., Browser]
+) -> None:
+    browser = make_browser(web, f"#token={web_command.token('viewer')}")
+    browser.wait_for("document.querySelector('#session-role').textContent === 'viewer'")
+    browser.value("location.hash = '#channels'")
+    browser.wait_for(f"{SET} !== undefined")
+    assert browser.value(f"{SET}.querySelector('form').offsetWidth") == 0
+    press(browser, "#session-end")
+    browser.wait_for("!document.querySelector('#session-form').hidden")
+    browser.value("document.querySelector('#session-token').value = 'x'")
+    press(browser, "#session-form button")
+    browser.wait_for(
+        "document.querySelector('#session-note').textContent.includes('no such token')"
+    )

@@ -426,6 +426,37 @@ def test_the_page_is_served_on_loopback_and_its_address_printed(bench: Bench) ->
     assert "end ecdaq-web" in ends(bench)
 
 
+# As the real one: a socket in a folder of its own.
+LISTEN = """python3 - "$ECDAQ_RUN_DIR/web-command" <<'EOF'
+import os, socket, sys
+os.makedirs(sys.argv[1])
+socket.socket(socket.AF_UNIX).bind(sys.argv[1] + "/token")
+EOF
+"""
+
+
+def test_an_address_with_a_token_is_printed_and_the_run_continues_without_commands(
+    bench: Bench,
+) -> None:
+    bench.program("ecdaq-web", STAND_IN.replace("{body}", ""))
+    ends_early = LISTEN + WHEN_RUN.format(count=6) + "sleep 1\nexit 1"
+    bench.program("ecdaq-web-command", STAND_IN.replace("{body}", ends_early))
+    bench.program("ecdaq", TOOL.replace("{page}", PAGE) + '[ "$3" != web-token ] || echo abc\n')
+    run = bench.start("--seconds", "1", "--no-dds", web="")
+    bench.wait_for_log("start ecdaq-web-command", "start ecdaqd", "start ecdaq-record")
+    assert run.stderr is not None
+    lines: list[str] = []
+    while "-- ecdaq-web-command has ended: the page has no commands any more" not in lines:
+        assert (line := run.stderr.readline()), lines
+        lines.append(line.rstrip())
+    run.terminate()
+    run.communicate(timeout=SECONDS)
+    assert run.returncode == 0
+    assert re.search(r"^-- page with a log-in, .*: http://127\.0\.0\.1:\d+/#token=abc$",
+                     "\n".join(lines), re.M)  # fmt: skip
+    assert any(line.endswith(" web-token operator") for line in bench.log)
+
+
 def test_a_web_section_of_the_configuration_is_used(bench: Bench) -> None:
     bench.program("ecdaq-web", STAND_IN.replace("{body}", ""))
     config = bench.folder / "ecdaq.yaml"

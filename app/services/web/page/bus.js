@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The view Bus: the tree of ports, and all that is known of one slave.
 import { branches } from "./tree.js";
-import { row, set_level, set_text } from "./table.js";
+import { button, row, set_level, set_text } from "./table.js";
 
 const by_id = (id) => document.getElementById(id);
 const PORTS = 4;
@@ -24,11 +24,34 @@ function fill_table(body, lines) {
   });
 }
 
+const STATES = ["INIT", "PREOP", "SAFEOP", "OP"];
+
 export class BusView {
-  // on_choose(position) is called for the slave that is clicked.
-  constructor(on_choose) {
+  // on_choose(position) is called for the slave that is clicked; command(...words) is of the session.
+  constructor(on_choose, command) {
     this.on_choose = on_choose;
+    this.command = command;
     this.chosen = NaN;
+    const chosen = () => [String(this.chosen)];
+    this.add_buttons("bus-commands", "the bus", () => [], [["Scan anew", "rescan"], ["Reset counters", "clear"]]);
+    this.add_buttons("slave-commands", "this slave", chosen, [["Reset error counters", "errors"]]);
+    by_id("bus-allow").addEventListener("change", ({ target }) => {
+      by_id("bus-commands").disabled = by_id("slave-commands").disabled = !target.checked;
+    });
+  }
+
+  add_buttons(place, of, operands, more) {
+    const all = [...STATES.map((state) => [state, "state", state]), ...more];
+    by_id(place).append(...all.map(([text, ...words]) => button(text, `${text}: ${of}`, () => this.ask(...words, ...operands()))));
+  }
+
+  async ask(...words) {
+    const result = by_id("bus-result");
+    result.textContent = `${words.join(" ")}: …`;
+    set_level(result, "");
+    const { ok, text } = await this.command(...words);
+    result.textContent = ok ? `${words.join(" ")}: done` : text;
+    set_level(result, ok ? "good" : "bad");
   }
 
   // The part of the address behind "#bus?".

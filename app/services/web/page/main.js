@@ -6,16 +6,19 @@ import { EventsView } from "./events.js";
 import { Link } from "./link.js";
 import { RecordingsView } from "./recordings.js";
 import { Scope } from "./scope.js";
+import { Session } from "./session.js";
 import { set_level, set_text } from "./table.js";
 import { ChannelsView, StateView } from "./views.js";
 
 const VIEWS = ["state", "bus", "channels", "events", "recordings", "scope", "config"];
 const lamp = document.getElementById("lamp");
 
+const session = new Session();
+const command = (...words) => session.command(...words);
 const state = new StateView();
 const bus = new BusView((position) => {
   location.hash = `bus?s=${position}`;
-});
+}, command);
 const config = new ConfigView();
 const doctor = new Doctor();
 const recordings = new RecordingsView();
@@ -23,7 +26,7 @@ const scope = new Scope((request) => link.send(request));
 const channels = new ChannelsView((channel) => {
   scope.add(channel);
   location.hash = scope.hash();
-});
+}, command);
 const events = new EventsView({
   on_scope: (cycle) => {
     scope.show_cycle(cycle);

@@ -23,9 +23,40 @@ export class StateView {
   }
 }
 
+// A field and a button that set an output, and what came of it.
+function setter(channel, command) {
+  const form = document.createElement("form");
+  const field = document.createElement(channel.binary ? "select" : "input");
+  const note = document.createElement("span");
+  if (channel.binary) {
+    field.append(new Option("off", "0"), new Option("on", "1"));
+  } else {
+    field.required = true;
+    field.inputMode = "decimal";
+    field.autocomplete = "off";
+  }
+  field.setAttribute("aria-label", `${channel.name}: new value`);
+  note.setAttribute("role", "status");
+  const set = document.createElement("button");
+  set.textContent = "Set";
+  set.setAttribute("aria-label", `set ${channel.name}`);
+  form.append(field, " ", set, " ", note);
+  form.addEventListener("submit", async (event) => {
+    event.preventDefault();
+    const wanted = field.value.trim();
+    note.textContent = "…";
+    const { ok, text } = await command("set", channel.name, wanted);
+    note.textContent = ok ? `${wanted} from cycle ${JSON.parse(text).cycle} on` : text;
+    set_level(note, ok ? "good" : "bad");
+  });
+  return form;
+}
+
 export class ChannelsView {
-  constructor(on_scope) {
+  // on_scope(index) shows a channel; command(...words) is of the session.
+  constructor(on_scope, command) {
     this.on_scope = on_scope;
+    this.command = command;
     this.lines = [];
     by_id("channel-filter").addEventListener("input", () => this.filter());
   }
@@ -34,6 +65,11 @@ export class ChannelsView {
     this.lines = table.channels.map((channel, i) => {
       const line = row(channel.name, "", channel.unit, "", button("+", `${channel.name} in the scope`, () => this.on_scope(i)));
       line.children[1].className = "number";
+      const place = line.insertCell();
+      place.className = "for-operator";
+      if (channel.output) {
+        place.append(setter(channel, this.command));
+      }
       return line;
     });
     this.names = table.channels.map((channel) => channel.name.toLowerCase());
