@@ -336,7 +336,7 @@ def test_set_lights_the_led_and_names_the_cycle_in_a_browser(
     browser.value("location.hash = '#channels'")
     browser.wait_for(f"{SET} !== undefined")
     assert browser.value(f"{SET}.querySelector('form').offsetWidth > 0")
-    assert browser.value(f"{SET}.children[1].textContent") == "0"
+    browser.wait_for(f"{SET}.children[1].textContent === '0'")
     browser.value(f"{SET}.querySelector('select').value = '1'")
     browser.value(f"{SET}.querySelector('form button').click()")
     said = browser.wait_for(f"{SET}.querySelector('[role=status]').textContent.match(/cycle \\d+/)")
