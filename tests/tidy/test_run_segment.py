@@ -447,7 +447,8 @@ def test_an_address_with_a_token_is_printed_and_the_run_continues_without_comman
     assert run.stderr is not None
     lines: list[str] = []
     while "-- ecdaq-web-command has ended: the page has no commands any more" not in lines:
-        assert (line := run.stderr.readline()), lines
+        line = run.stderr.readline()
+        assert line, lines
         lines.append(line.rstrip())
     run.terminate()
     run.communicate(timeout=SECONDS)

@@ -235,7 +235,9 @@ struct config {
 	uint32_t web_port;
 	uint32_t web_clients;              /* WebSockets at a time */
 	char web_hosts[CONFIG_PATH_BYTES]; /* names in the header Host, comma between; "" = none */
-	char web_origins[CONFIG_PATH_BYTES]; /* of pages that may connect, the same */
+	char web_origins[CONFIG_PATH_BYTES];     /* of pages that may connect, the same */
+	char web_certificate[CONFIG_PATH_BYTES]; /* files; "" = no TLS */
+	char web_key[CONFIG_PATH_BYTES];
 	/* stream */
 	uint32_t stream_enable;
 	char stream_servers[CONFIG_PATH_BYTES];     /* URLs, comma between */

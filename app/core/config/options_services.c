@@ -206,8 +206,8 @@ static const struct option rows[] = {
 	  .default_value = "loopback",
 	  .effect = CONFIG_EFFECT_WEB,
 	  .prose = "loopback: on 127.0.0.1, for this machine and SSH tunnels. An IPv4 or IPv6 "
-		   "address of this machine: for everyone who reaches it, to read; there is no "
-		   "encryption, so commands are for the loopback only." },
+		   "address of this machine: for everyone who reaches it, to read; commands "
+		   "are for the loopback only, unless web.certificate is set." },
 	{ .name = "web.port",
 	  .type = OPTION_UINT,
 	  FIELD(web_port),
@@ -239,6 +239,20 @@ static const struct option rows[] = {
 	  .effect = CONFIG_EFFECT_WEB,
 	  .prose = "Origins of web pages of other servers, commas between, that may read the "
 		   "samples: https://app.foxglove.dev. Empty: our own page only." },
+	{ .name = "web.certificate",
+	  .type = OPTION_TEXT,
+	  FIELD(web_certificate),
+	  .default_value = "",
+	  .effect = CONFIG_EFFECT_WEB,
+	  .prose = "PEM file of a certificate and those between it and its CA: HTTPS and TLS only, "
+		   "and commands on any address. Empty: no encryption." },
+	{ .name = "web.key",
+	  .type = OPTION_TEXT,
+	  FIELD(web_key),
+	  .default_value = "",
+	  .effect = CONFIG_EFFECT_WEB,
+	  .prose = "PEM file of its private key, which the user of ecdaq-web may read and nobody "
+		   "else." },
 	/* stream */
 	{ .name = "stream.enable",
 	  .type = OPTION_SWITCH,

@@ -8,9 +8,11 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "base/foreign.h"
 #include "config/gateway.h"
 #include "web/foxglove.h"
 #include "web/origin.h"
@@ -71,9 +73,20 @@ static void report_rejected(struct server *s, const char *why)
 	}
 }
 
-int server_check_request(struct server *s, struct lws *wsi, char why[SERVER_WHY_BYTES])
+int server_has_tls(const struct config *cfg)
 {
+	return cfg->web_certificate[0] != '\0';
+}
+
+int server_check_request(struct server *s, struct lws *wsi, const char **ret_why)
+{
+	char why[SERVER_WHY_BYTES];
 	char host[SERVER_HOST_BYTES];
+
+	if (server_has_tls(s->cfg) && !lws_is_ssl(wsi)) {
+		*ret_why = "this port has TLS only: https://, wss://\n";
+		return HTTP_STATUS_FORBIDDEN;
+	}
 
 	get_header(wsi, WSI_TOKEN_HOST, host, sizeof(host));
 	if (!origin_host_is_ours(host, s->own_name, s->cfg->web_hosts)) {
@@ -82,6 +95,7 @@ int server_check_request(struct server *s, struct lws *wsi, char why[SERVER_WHY_
 			 "machine has it",
 			 host);
 		report_rejected(s, why);
+		*ret_why = "this server does not have that host name (option web.hosts)\n";
 		return HTTP_STATUS_FORBIDDEN;
 	}
 	return 0;
@@ -92,7 +106,8 @@ static int check_websocket(struct server *s, struct lws *wsi)
 	char why[SERVER_WHY_BYTES];
 	char host[SERVER_HOST_BYTES];
 	char origin[SERVER_HOST_BYTES];
-	int r = server_check_request(s, wsi, why);
+	const char *answer;
+	int r = server_check_request(s, wsi, &answer);
 
 	if (r != 0) {
 		return r;
@@ -215,15 +230,50 @@ static int try_listen(const struct config *cfg, char *error, size_t error_bytes)
 	return r;
 }
 
+/* libwebsockets says little of what it does not take. */
+static int check_file(const char *option, const char *path, char *error, size_t error_bytes)
+{
+	struct stat st;
+	int fd = foreign_open(path, &st);
+
+	if (fd < 0) {
+		snprintf(error, error_bytes, "%s: %s: %s", option, path,
+			 fd == -EPROTO ? "is no regular file" : strerror(-fd));
+		return fd == -EACCES ? fd : -EINVAL;
+	}
+	close(fd);
+	return 0;
+}
+
+static int check_tls(const struct config *cfg, char *error, size_t error_bytes)
+{
+	int r = 0;
+
+	if (server_has_tls(cfg)) {
+		r = check_file("web.certificate", cfg->web_certificate, error, error_bytes);
+		r = r < 0 ? r : check_file("web.key", cfg->web_key, error, error_bytes);
+	}
+	return r;
+}
+
+/* HTTP without TLS on its port gets an answer in words, and nothing else. */
+#define TLS_OPTIONS                                                                                \
+	(LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT | LWS_SERVER_OPTION_ALLOW_NON_SSL_ON_SSL_PORT |      \
+	 LWS_SERVER_OPTION_ALLOW_HTTP_ON_HTTPS_LISTENER)
+
 static struct lws_context *create_context(struct server *s)
 {
+	int has_tls = server_has_tls(s->cfg);
 	const struct lws_context_creation_info info = {
 		.iface = strcmp(s->cfg->web_listen, "loopback") == 0 ? "127.0.0.1"
 								     : s->cfg->web_listen,
 		.port = (int)s->cfg->web_port,
 		.protocols = s->protocols,
 		.options = LWS_SERVER_OPTION_FAIL_UPON_UNABLE_TO_BIND |
-			   LWS_SERVER_OPTION_VALIDATE_UTF8 | LWS_SERVER_OPTION_DISABLE_OS_CA_CERTS,
+			   LWS_SERVER_OPTION_VALIDATE_UTF8 | LWS_SERVER_OPTION_DISABLE_OS_CA_CERTS |
+			   (has_tls ? TLS_OPTIONS : 0),
+		.ssl_cert_filepath = has_tls ? s->cfg->web_certificate : NULL,
+		.ssl_private_key_filepath = has_tls ? s->cfg->web_key : NULL,
 		.user = s,
 		.server_string = "ecdaq",
 		.timeout_secs = REQUEST_SECONDS,
@@ -283,12 +333,16 @@ int server_create(const struct config *cfg, void (*report)(const char *line),
 	r = r < 0 ? r : create_texts(s);
 	r = r < 0 ? r : server_pages_create(s);
 	snprintf(error, error_bytes, "%s", strerror(-r));
+	r = r < 0 ? r : check_tls(cfg, error, error_bytes);
 	r = r < 0 ? r : try_listen(cfg, error, error_bytes);
 	if (r == 0) {
 		s->context = create_context(s);
 		if (s->context == NULL) {
-			snprintf(error, error_bytes, "libwebsockets cannot start");
-			r = -ENOMEM;
+			r = server_has_tls(cfg) ? -EINVAL : -ENOMEM;
+			snprintf(error, error_bytes, "%s",
+				 r == -ENOMEM ? "libwebsockets cannot start"
+					      : "web.certificate, web.key: no certificate and its "
+						"key in PEM: see above");
 		}
 	}
 	if (r < 0) {

@@ -69,7 +69,7 @@ static int is_own_page(struct lws *wsi)
 {
 	char host[SERVER_HOST_BYTES];
 	char origin[SERVER_HOST_BYTES];
-	static const char scheme[] = "http://";
+	const char *scheme = server_has_tls(server_of(wsi)->cfg) ? "https://" : "http://";
 
 	get_header(wsi, WSI_TOKEN_HOST, host, sizeof(host));
 	get_header(wsi, WSI_TOKEN_ORIGIN, origin, sizeof(origin));
@@ -84,8 +84,10 @@ static int check(struct server *s, struct lws *wsi, size_t *ret_bytes, const cha
 	char *end;
 	unsigned long bytes;
 
-	if (!config_web_is_loopback(s->cfg)) {
-		*ret_why = "commands are for web.listen: loopback only: use an SSH tunnel\n";
+	if (!server_has_tls(s->cfg) && !config_web_is_loopback(s->cfg)) {
+		*ret_why =
+			"commands are for web.listen: loopback only, without web.certificate: use "
+			"an SSH tunnel\n";
 		return HTTP_STATUS_FORBIDDEN;
 	}
 	if (!is_own_page(wsi)) {
@@ -227,6 +229,7 @@ void server_command_send(struct command_post *post)
 
 static void make_cookie(struct command_post *post)
 {
+	const char *secure = server_has_tls(post->server->cfg) ? "; Secure" : "";
 	char name[COOKIE_BYTES];
 
 	name_cookie(post->server, name);
@@ -235,10 +238,11 @@ static void make_cookie(struct command_post *post)
 	}
 	if (post->request.verb == WEB_LOGIN) {
 		snprintf(post->cookie, sizeof(post->cookie),
-			 "%.16s=%s; Path=/; HttpOnly; SameSite=Strict", name, post->reply.session);
+			 "%.16s=%s; Path=/; HttpOnly; SameSite=Strict%s", name, post->reply.session,
+			 secure);
 	} else if (post->request.verb == WEB_LOGOUT) {
 		snprintf(post->cookie, sizeof(post->cookie),
-			 "%.16s=; Path=/; HttpOnly; SameSite=Strict; Max-Age=0", name);
+			 "%.16s=; Path=/; HttpOnly; SameSite=Strict; Max-Age=0%s", name, secure);
 	}
 }
 

@@ -151,12 +151,12 @@ static int continue_post(struct lws *wsi, struct reply *reply)
 
 static int serve(struct lws *wsi, struct reply *reply, const char *path)
 {
-	char why[SERVER_WHY_BYTES];
 	const struct asset *asset = asset_find(path);
+	const char *why;
 
-	if (server_check_request(server_of(wsi), wsi, why) != 0) {
-		return put_text(wsi, reply, HTTP_STATUS_FORBIDDEN,
-				"this server does not have that host name (option web.hosts)\n");
+	if (server_check_request(server_of(wsi), wsi, &why) != 0) {
+		reply->is_last_one = 1;
+		return put_text(wsi, reply, HTTP_STATUS_FORBIDDEN, why);
 	}
 	if (lws_hdr_total_length(wsi, WSI_TOKEN_GET_URI) <= 0 &&
 	    lws_hdr_total_length(wsi, WSI_TOKEN_HEAD_URI) <= 0) {

@@ -53,8 +53,11 @@ struct server {
 /** The server that @wsi belongs to. */
 struct server *server_of(struct lws *wsi);
 
-/** 0 if the request may be served; else the HTTP status, and why in @why. */
-int server_check_request(struct server *server, struct lws *wsi, char why[SERVER_WHY_BYTES]);
+/** Is it HTTPS? */
+int server_has_tls(const struct config *cfg);
+/** 0 if the request may be served; else the HTTP status, and the answer, a constant, in @ret_why.
+ */
+int server_check_request(struct server *server, struct lws *wsi, const char **ret_why);
 /** LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION: 0: the request becomes a WebSocket; -1: it was
  * rejected. */
 int server_filter(struct lws *wsi);
