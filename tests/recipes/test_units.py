@@ -150,6 +150,13 @@ def test_the_stream_writes_its_status_only_and_is_off_until_it_is_configured() -
         assert exposure(UNITS / unit) < 1.5
 
 
+def test_no_two_users_have_one_number() -> None:
+    """Files of the one on the data partition would be the other's."""
+    text = (ROOT / "usr/lib/sysusers.d/ecdaq.conf").read_text()
+    numbers = re.findall(r"^u \S+ (\d+)", text, re.MULTILINE)
+    assert len(numbers) > 5 and len(numbers) == len(set(numbers)), numbers
+
+
 def test_the_uplink_writes_its_marks_only_and_is_off_until_it_is_configured() -> None:
     unit = "ecdaq-uplink.service"
     assert values(unit, "ReadWritePaths") == ["/run/ecdaq/uplink", "/data/uplink"]
@@ -158,7 +165,7 @@ def test_the_uplink_writes_its_marks_only_and_is_off_until_it_is_configured() ->
     assert values(unit, "CapabilityBoundingSet") == []
     assert values(unit, "Restart") == ["on-failure"]
     text = (ROOT / "usr/lib/sysusers.d/ecdaq.conf").read_text()
-    assert re.findall(r"^u ecdaq-uplink (\d+):900 ", text, re.MULTILINE) == ["911"]
+    assert re.findall(r"^u ecdaq-uplink (\d+):900 ", text, re.MULTILINE) == ["912"]
     assert "m ecdaq-uplink" not in text
     # The recorder, in the same group, reads the marks.
     folders = (ROOT / "usr/lib/tmpfiles.d/ecdaq.conf").read_text()
