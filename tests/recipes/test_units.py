@@ -178,11 +178,12 @@ def test_the_uplink_writes_its_marks_only_and_is_off_until_it_is_configured() ->
         assert exposure(UNITS / unit) < 1.5
 
 
-def test_only_an_operator_commands_the_master_and_only_dds_sets_remote_outputs() -> None:
+def test_operators_and_their_page_command_the_master_and_only_dds_sets_remote_outputs() -> None:
     text = (ROOT / "usr/lib/sysusers.d/ecdaq.conf").read_text()
     members = [line.split()[1:] for line in text.splitlines() if line.startswith("m ")]
     # ecdaqd gives its sockets away, for which it has to be a member.
-    assert {user for user, group in members if group == "ecdaq-admin"} == {"ecdaqd", "operator"}
+    may_command = {user for user, group in members if group == "ecdaq-admin"}
+    assert may_command == {"ecdaqd", "operator", "ecdaq-web-command"}
     assert {user for user, group in members if group == "ecdaq-remote"} == {"ecdaqd", "ecdaq-dds"}
     for unit in UNITS.glob("*.service"):
         assert values(unit.name, "Group") in ([], ["ecdaq-read"])
