@@ -234,8 +234,9 @@ static const struct verb verbs[] = {
 	  "The text format: counters, gauges and histograms of ecdaqd, its slaves and services.\n"
 	  "Without ecdaqd it is \"ecdaq_up 0\".\n",
 	  verb_metrics },
-	{ "log", "...", "Recordings: list, info, check, recover, export (see ecdaq log --help).",
-	  NULL, verb_program },
+	{ "log", "...",
+	  "Recordings: list, info, check, recover, export, cut (see ecdaq log --help).", NULL,
+	  verb_program },
 	{ "security", "...", "The keys of DDS Security (see ecdaq security --help).", NULL,
 	  verb_program },
 	{ "doctor", "", "Check this machine for the cycle; each problem with its fix.",

@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <limits.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "base/args.h"
 #include "config/config.h"
@@ -32,7 +33,9 @@ enum {
 	TAKES_OUTPUT = 1 << 1,
 	TAKES_CHANNELS = 1 << 2,
 	TAKES_RAW = 1 << 3,
-	TAKES_ENVELOPE = 1 << 4,
+	TAKES_ROWS = 1 << 4,
+	TAKES_SESSION = 1 << 5,
+	TAKES_RANGE = 1 << 6,
 };
 
 enum { OPTIONS = 12 };
@@ -48,6 +51,8 @@ static void help(FILE *out)
 	      "       ecdaq log export [--dir DIR | FILE-OR-DIR...] [--channels NAME,...] [--from "
 	      "CYCLE]\n"
 	      "                        [--to CYCLE] [--raw] [--output FILE] [--json]\n"
+	      "       ecdaq log cut [--dir DIR] [--session NUMBER] [--from CYCLE] [--to CYCLE]\n"
+	      "                        [--output FILE]\n"
 	      "       ecdaq log envelope [--dir DIR] [--session NUMBER] [--channels NAME,...]\n"
 	      "                        [--from CYCLE] [--to CYCLE] [--rows N] [--json]\n"
 	      "       ecdaq log ros2pkg FILE... [--output DIR]\n"
@@ -62,6 +67,8 @@ static void help(FILE *out)
 	      "  export   a table with one row per cycle, as CSV (pandas.read_csv reads it); "
 	      "columns as\n"
 	      "           NAME [UNIT]\n"
+	      "  cut      the cycles from --from to --to of a session, with their events, as a "
+	      "recording\n"
 	      "  envelope least, greatest, mean and RMS value of each channel in each of N parts "
 	      "of a\n"
 	      "           session: a day in a moment\n"
@@ -75,9 +82,9 @@ static void help(FILE *out)
 	      "  --session NUMBER of the recordings (ecdaq log info; default: the newest one)\n"
 	      "  --rows N         parts, 1 to 65536 (default: 1000)\n"
 	      "  --raw            raw values (default: physical)\n"
-	      "  --output FILE    file to write (export: default is standard output; ros2pkg: the "
-	      "new\n"
-	      "                   folder, default " MESSAGES_PACKAGE ")\n"
+	      "  --output FILE    file to write (export, cut: default is standard output; "
+	      "ros2pkg:\n"
+	      "                   the new folder, default " MESSAGES_PACKAGE ")\n"
 	      "  --json           JSON (export: one object per line)\n"
 	      "  --progress       check, export, recover: progress also where standard error is "
 	      "no\n"
@@ -108,11 +115,11 @@ static size_t select_options(unsigned takes, struct arguments *a, struct args_op
 		{ TAKES_DIR, { "dir", 0, args_text, &a->dir, "DIR", NULL } },
 		{ TAKES_OUTPUT, { "output", 0, args_text, &a->output, "FILE", NULL } },
 		{ TAKES_CHANNELS, { "channels", 0, args_text, &a->export.channels, "LIST", NULL } },
-		{ TAKES_CHANNELS, { "from", 0, args_cycle, &a->export.from, "CYCLE", NULL } },
-		{ TAKES_CHANNELS, { "to", 0, args_cycle, &a->export.to, "CYCLE", NULL } },
+		{ TAKES_RANGE, { "from", 0, args_cycle, &a->export.from, "CYCLE", NULL } },
+		{ TAKES_RANGE, { "to", 0, args_cycle, &a->export.to, "CYCLE", NULL } },
 		{ TAKES_RAW, { "raw", 0, args_flag, &a->export.is_raw, NULL, NULL } },
-		{ TAKES_ENVELOPE, { "session", 0, args_cycle, &a->session, "NUMBER", NULL } },
-		{ TAKES_ENVELOPE, { "rows", 0, args_cycle, &a->rows, "N", NULL } },
+		{ TAKES_SESSION, { "session", 0, args_cycle, &a->session, "NUMBER", NULL } },
+		{ TAKES_ROWS, { "rows", 0, args_cycle, &a->rows, "N", NULL } },
 	};
 	size_t count = 0;
 
@@ -252,6 +259,25 @@ static int run_envelope(const struct arguments *a, char **operands, int count)
 	return r != EXIT_CODE_OK ? r : log_envelope(&options, stdout, stderr);
 }
 
+static int run_cut(const struct arguments *a, char **operands, int count)
+{
+	char dir[PATH_MAX];
+	const struct log_cut_options options = { .dir = dir,
+						 .output = a->output,
+						 .session = a->session,
+						 .from = a->export.from,
+						 .to = a->export.to };
+	int r;
+
+	(void)operands;
+	(void)count;
+	if (a->output == NULL && isatty(STDOUT_FILENO)) {
+		return usage("cut: standard output is a terminal: use --output FILE");
+	}
+	r = find_dir(a, dir, sizeof(dir));
+	return r != EXIT_CODE_OK ? r : log_cut(&options, stderr);
+}
+
 static int run_ros2pkg(const struct arguments *a, char **operands, int count)
 {
 	return log_ros2pkg((const char *const *)operands, (size_t)count,
@@ -270,9 +296,11 @@ static const struct command {
 	{ "info", 0, 1, 1, "FILE", run_info },
 	{ "check", TAKES_DIR, 0, INT_MAX, "", run_check },
 	{ "recover", TAKES_OUTPUT, 1, 1, "FILE", run_recover },
-	{ "export", TAKES_DIR | TAKES_OUTPUT | TAKES_CHANNELS | TAKES_RAW, 0, INT_MAX, "",
-	  run_export },
-	{ "envelope", TAKES_DIR | TAKES_CHANNELS | TAKES_ENVELOPE, 0, 0, "", run_envelope },
+	{ "export", TAKES_DIR | TAKES_OUTPUT | TAKES_CHANNELS | TAKES_RANGE | TAKES_RAW, 0, INT_MAX,
+	  "", run_export },
+	{ "cut", TAKES_DIR | TAKES_OUTPUT | TAKES_SESSION | TAKES_RANGE, 0, 0, "", run_cut },
+	{ "envelope", TAKES_DIR | TAKES_CHANNELS | TAKES_SESSION | TAKES_RANGE | TAKES_ROWS, 0, 0,
+	  "", run_envelope },
 	{ "ros2pkg", TAKES_OUTPUT, 1, INT_MAX, "FILE", run_ros2pkg },
 };
 
@@ -307,7 +335,7 @@ int log_main(int argc, char **argv)
 		.option_count = select_options(TAKES_ALL, &a, options),
 		.operands_min = 1,
 		.operands_usage =
-			"command: list, info, check, recover, export, envelope or ros2pkg",
+			"command: list, info, check, recover, export, cut, envelope or ros2pkg",
 		.ends_at_operand = 1
 	};
 	char error[ARGS_ERROR_BYTES];

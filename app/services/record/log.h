@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What people do with recordings: `ecdaq log list|info|check|recover|export|envelope|ros2pkg`.
+ * What people do with recordings: `ecdaq log list|info|check|recover|export|cut|envelope|ros2pkg`.
  * Context: blocking.
  */
 #ifndef RECORD_LOG_H
@@ -57,6 +57,14 @@ struct log_envelope_options {
 	enum log_format format;
 };
 
+struct log_cut_options {
+	const char *dir;
+	const char *output; /* NULL: standard output, which may be a pipe */
+	uint64_t session;   /* 0: the newest one */
+	uint64_t from;      /* cycles, both included */
+	uint64_t to;
+};
+
 enum {
 	LOG_ENVELOPE_ROWS = 65536,
 	LOG_ENVELOPE_CELLS = 1 << 23, /* rows times channels */
@@ -67,6 +75,10 @@ enum {
  * each channel in each. Rows of a second or more are made of whole seconds, which were counted when
  * they were recorded (record/envelope.h). */
 int log_envelope(const struct log_envelope_options *options, FILE *out, FILE *err);
+
+/** The cycles from one to another of a session as a recording of its own, with their events; a file
+ * that is there already is not written to. */
+int log_cut(const struct log_cut_options *options, FILE *err);
 
 /** The samples of @options->paths as a table, a row a cycle. */
 int log_export(const struct log_export_options *options, FILE *out, FILE *err);

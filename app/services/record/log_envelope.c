@@ -195,7 +195,7 @@ static void take_blocks(struct envelope_table *t, const struct envelope_view *v,
 	}
 }
 
-/* The seconds of one attachment. 0; -ENODATA: they are no use here; or -errno. */
+/* The seconds of one attachment. 1; 0: it has none; -ENODATA: they are no use here; or -errno. */
 static int read_envelope(struct envelope_table *t, struct recording *rec, uint64_t offset)
 {
 	struct envelope_view v;
@@ -228,26 +228,27 @@ static int read_envelope(struct envelope_table *t, struct recording *rec, uint64
 		take_blocks(t, &v, channel);
 	}
 	free(channel);
-	return r < 0 ? r : 0;
+	return r < 0 ? r : 1;
 }
 
-/* All seconds of the file; *@ret_end is behind the last ones, 0 if they are no use here. */
+/* All seconds of the file; *@ret_end is where the last ones are, 0 if there are none, or they are
+ * no use here. */
 static int read_envelopes(struct envelope_table *t, struct recording *rec, uint64_t *ret_end)
 {
 	struct mcap_places places;
 	int r = mcap_places_read(&rec->file.source, MCAP_OP_ATTACHMENT, &places);
 
 	*ret_end = 0;
-	for (size_t i = 0; i < places.count && r == 0; i++) {
+	for (size_t i = 0; i < places.count && r >= 0; i++) {
 		r = read_envelope(t, rec, places.at[i]);
-		*ret_end = r == 0 ? places.at[i] : 0;
+		*ret_end = r > 0 ? places.at[i] : r < 0 ? 0 : *ret_end;
 	}
 	mcap_places_done(&places);
 	if (r == -ENODATA) {
 		forget(t, &t->file); /* the samples say the same, only later */
 		r = 0;
 	}
-	return r;
+	return r < 0 ? r : 0;
 }
 
 static void take_row(struct envelope_table *t, const struct columns *c)
@@ -413,24 +414,6 @@ static void find_whole_range(struct envelope_table *t, const struct store_entry 
 	t->to = last;
 }
 
-/* That of the newest recording which names one; 0: none does. */
-static uint64_t newest_session(const char *dir, const struct store_entry *entries, size_t count)
-{
-	uint64_t session = 0;
-
-	while (count-- > 0 && session == 0) {
-		struct recording rec;
-		char path[PATH_MAX];
-
-		if (store_path(dir, entries[count].name, path, sizeof(path)) == 0 &&
-		    recording_open(&rec, path, NULL) == 0) {
-			session = rec.session;
-			recording_close(&rec);
-		}
-	}
-	return session;
-}
-
 static void put_number(const struct envelope_table *t, double value)
 {
 	char text[40];
@@ -563,7 +546,7 @@ int log_envelope(const struct log_envelope_options *options, FILE *out, FILE *er
 		return log_fail_errno(err, options->dir, r);
 	}
 	if (t.session == 0) {
-		t.session = newest_session(options->dir, entries, count);
+		t.session = recording_newest_session(options->dir, entries, count);
 	}
 	if (t.to == UINT64_MAX) {
 		find_whole_range(&t, entries, count);

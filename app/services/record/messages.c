@@ -363,3 +363,12 @@ int messages_decode_event(const uint8_t *data, size_t data_len, uint64_t *ret_se
 	*ret_sequence = get_le64(data + CDR_HEADER_BYTES + 16);
 	return 0;
 }
+
+int messages_decode_event_cycle(const uint8_t *data, size_t data_len, uint64_t *ret_cycle)
+{
+	if (data_len < CDR_HEADER_BYTES + 32 || data[0] != 0 || data[1] != 1) {
+		return -EBADMSG;
+	}
+	*ret_cycle = get_le64(data + CDR_HEADER_BYTES + 24);
+	return 0;
+}

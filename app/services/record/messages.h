@@ -56,5 +56,7 @@ size_t messages_encode_sync0(const struct sync0_result *result, int64_t utc_ns, 
 int messages_decode_cycle(const uint8_t *data, size_t data_len, uint64_t *ret_cycle);
 int messages_decode_event(const uint8_t *data, size_t data_len, uint64_t *ret_sequence,
 			  int64_t *ret_mono_ns);
+/** The cycle of an event message. 0, -EBADMSG. */
+int messages_decode_event_cycle(const uint8_t *data, size_t data_len, uint64_t *ret_cycle);
 
 #endif

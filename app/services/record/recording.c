@@ -2,6 +2,7 @@
 #include "record/recording.h"
 
 #include <errno.h>
+#include <limits.h>
 #include <stdlib.h>
 
 #include "record/messages.h"
@@ -148,4 +149,21 @@ int recording_find_range(struct recording *rec, uint64_t *ret_first, uint64_t *r
 	mcap_places_done(&chunks);
 	*ret_first = first;
 	return r < 0 ? r : found;
+}
+
+uint64_t recording_newest_session(const char *dir, const struct store_entry *entries, size_t count)
+{
+	uint64_t session = 0;
+
+	while (count-- > 0 && session == 0) {
+		struct recording rec;
+		char path[PATH_MAX];
+
+		if (store_path(dir, entries[count].name, path, sizeof(path)) == 0 &&
+		    recording_open(&rec, path, NULL) == 0) {
+			session = rec.session;
+			recording_close(&rec);
+		}
+	}
+	return session;
 }

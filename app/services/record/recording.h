@@ -13,6 +13,7 @@
 #include "record/log_common.h"
 #include "record/mcap_places.h"
 #include "record/mcap_reader.h"
+#include "record/store.h"
 
 struct recording {
 	const char *path;
@@ -34,5 +35,8 @@ int recording_find_chunk(struct recording *rec, const struct mcap_places *chunks
 			 size_t *ret_chunk);
 /** First and last cycle of the recording. 1; 0: it has none; -errno. */
 int recording_find_range(struct recording *rec, uint64_t *ret_first, uint64_t *ret_last);
+
+/** The session of the newest of @entries in @dir which names one; 0: none does. */
+uint64_t recording_newest_session(const char *dir, const struct store_entry *entries, size_t count);
 
 #endif
