@@ -15,6 +15,7 @@
 #include "web/range.h"
 #include "web/recordings.h"
 #include "web/server_private.h"
+#include "web/window.h"
 
 enum {
 	CHUNK_BYTES = 64 * 1024,
@@ -25,9 +26,12 @@ enum {
 	POLL_US = 5000,       /* while the table is being made */
 	REPORT_WORDS = 3,
 	MAX_WORDS = 5 + REPORT_WORDS + 1,
+	NUMBER_BYTES = 24,
 };
 
 static const char csv_suffix[] = ".csv";
+static const char window_path[] = "/window.mcap";
+static char log_program[] = "ecdaq-log";
 
 struct download {
 	lws_sorted_usec_list_t timer; /* first: it is all that its callback has */
@@ -38,6 +42,8 @@ struct download {
 	struct exports *exports; /* its process is one of these */
 	int export;              /* number of the process; -1: the bytes of a file */
 	const char *type;        /* of what the process prints */
+	const char *suffix;      /* of the name, for that */
+	int failed_status;       /* where the process fails before it printed anything */
 	int good_exit;
 	int has_head;
 	size_t filled;               /* bytes of the table in data */
@@ -136,7 +142,7 @@ static int put_table_head(struct download *d)
 	d->has_head = 1;
 	if (lws_add_http_header_status(d->wsi, HTTP_STATUS_OK, &p, end) != 0 ||
 	    put_header(d->wsi, "transfer-encoding:", "chunked", &p, end) != 0 ||
-	    put_common(d, d->type, csv_suffix, &p, end) != 0) {
+	    put_common(d, d->type, d->suffix, &p, end) != 0) {
 		return -1;
 	}
 	return lws_finalize_write_http_header(d->wsi, start, &p, end) != 0 ? -1 : 0;
@@ -163,12 +169,11 @@ static int begin_process(struct download *d, struct exports *exports, char *cons
 static int begin_table(struct download *d, const char *stem, int stem_len)
 {
 	static const char *const suffixes[] = { ".mcap", ".part" };
-	static char program[] = "ecdaq-log";
 	static char verb[] = "export";
 	const char *dir = d->server->cfg->record_dir;
 	char name[STORE_NAME_BYTES + 8];
 	char path[PATH_MAX];
-	char *words[] = { program, verb, path, NULL };
+	char *words[] = { log_program, verb, path, NULL };
 	uint64_t bytes;
 	int fd = -ENOENT;
 	int r;
@@ -184,8 +189,62 @@ static int begin_table(struct download *d, const char *stem, int stem_len)
 	close(fd);
 	snprintf(d->name, sizeof(d->name), "%.*s", stem_len, stem);
 	d->type = "text/csv; charset=utf-8";
+	d->suffix = csv_suffix;
 	r = store_path(dir, name, path, sizeof(path));
 	return r < 0 ? r : begin_process(d, &d->server->exports, words);
+}
+
+/* The query of the request as it came, in which the library has cut out each "&". 0 or -EINVAL. */
+static int get_query(struct lws *wsi, char query[WINDOW_QUERY_BYTES])
+{
+	int len = 0;
+	int part;
+
+	query[0] = '\0';
+	for (int i = 0; (part = lws_hdr_fragment_length(wsi, WSI_TOKEN_HTTP_URI_ARGS, i)) > 0;
+	     i++) {
+		if (part > WINDOW_QUERY_BYTES - len - 2) { /* with "&" before it and its end */
+			return -EINVAL;
+		}
+		if (i > 0) {
+			query[len++] = '&';
+		}
+		if (lws_hdr_copy_fragment(wsi, query + len, WINDOW_QUERY_BYTES - len,
+					  WSI_TOKEN_HTTP_URI_ARGS, i) != part ||
+		    strlen(query + len) != (size_t)part) {
+			return -EINVAL;
+		}
+		len += part;
+	}
+	return 0;
+}
+
+/* The cycles of a session that its query names, as a recording. */
+static int begin_window(struct download *d)
+{
+	static char verb[] = "cut";
+	static char option[][12] = { "--dir", "--session", "--from", "--to" };
+	char query[WINDOW_QUERY_BYTES];
+	char number[3][NUMBER_BYTES];
+	char dir[PATH_MAX];
+	char *words[] = { log_program, verb,      option[0], dir,       option[1], number[0],
+			  option[2],   number[1], option[3], number[2], NULL };
+	struct window w;
+
+	if (get_query(d->wsi, query) < 0 || window_parse(query, &w) < 0) {
+		return -EINVAL;
+	}
+	if (snprintf(dir, sizeof(dir), "%s", d->server->cfg->record_dir) >= (int)sizeof(dir)) {
+		return -ENAMETOOLONG;
+	}
+	snprintf(number[0], NUMBER_BYTES, "%" PRIu64, w.session);
+	snprintf(number[1], NUMBER_BYTES, "%" PRIu64, w.from);
+	snprintf(number[2], NUMBER_BYTES, "%" PRIu64, w.to);
+	snprintf(d->name, sizeof(d->name), "ecdaq-%s-%s", number[1], number[2]);
+	d->type = "application/octet-stream";
+	d->suffix = ".mcap";
+	d->failed_status = HTTP_STATUS_NOT_FOUND; /* almost always: no such cycle is recorded */
+	return begin_process(d, &d->server->exports, words);
 }
 
 /* What ecdaq prints for the page, and for Prometheus. */
@@ -243,6 +302,7 @@ static int begin_file(struct download *d, const char *name)
 static int status_of(int error)
 {
 	return error == -ENOENT || error == -ENAMETOOLONG ? HTTP_STATUS_NOT_FOUND
+	       : error == -EINVAL                         ? HTTP_STATUS_BAD_REQUEST
 	       : error == -EBUSY                          ? HTTP_STATUS_SERVICE_UNAVAILABLE
 	       : error == -EACCES                         ? HTTP_STATUS_FORBIDDEN
 							  : HTTP_STATUS_INTERNAL_SERVER_ERROR;
@@ -265,6 +325,8 @@ static int add(struct lws *wsi, struct download **ret_download)
 	d->server = s;
 	d->fd = -1;
 	d->export = -1;
+	d->suffix = "";
+	d->failed_status = HTTP_STATUS_INTERNAL_SERVER_ERROR;
 	s->downloads++;
 	*ret_download = d;
 	return 0;
@@ -303,6 +365,12 @@ int server_download_begin(struct lws *wsi, const char *name, struct download **r
 
 int server_report_begin(struct lws *wsi, const char *path, struct download **ret_download)
 {
+	if (strcmp(path, window_path) == 0) {
+		struct download *d;
+		int r = add(wsi, &d);
+
+		return r != 0 ? r : begun(d, begin_window(d), ret_download);
+	}
 	for (size_t i = 0; i < sizeof(reports) / sizeof(reports[0]); i++) {
 		struct download *d;
 		int r;
@@ -386,7 +454,7 @@ static int end_table(struct download *d)
 	d->export = -1;
 	if (r < 0) {
 		/* A table that is cut off must not look like a whole one. */
-		return d->has_head ? -1 : HTTP_STATUS_INTERNAL_SERVER_ERROR;
+		return d->has_head ? -1 : d->failed_status;
 	}
 	if (!d->has_head && put_table_head(d) < 0) {
 		return -1;

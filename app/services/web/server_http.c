@@ -99,6 +99,9 @@ static int put_failure(struct lws *wsi, struct reply *reply, int status)
 			status == HTTP_STATUS_NOT_FOUND ? "no such recording\n"
 			: status == HTTP_STATUS_SERVICE_UNAVAILABLE
 				? "too many downloads or exports at a time: try again later\n"
+			: status == HTTP_STATUS_BAD_REQUEST
+				? "the query is not session=N&from=CYCLE&to=CYCLE of at most "
+				  "4194304 cycles\n"
 			: status == HTTP_STATUS_FORBIDDEN
 				? "ecdaq-web may not read this recording: see its user's groups\n"
 				: "the export failed: see the log of ecdaq-web\n");

@@ -84,7 +84,8 @@ struct download;
  * status to be answered. Free with server_download_end().
  */
 int server_download_begin(struct lws *wsi, const char *name, struct download **ret_download);
-/** The same with what a verb of `ecdaq` prints; -ENOENT: there is none for @path. */
+/** The same with what a verb of `ecdaq` prints, or a window of the scope as a recording; -ENOENT:
+ * there is none for @path. */
 int server_report_begin(struct lws *wsi, const char *path, struct download **ret_download);
 void server_download_end(struct download *d);
 /** Send some more, when the client takes it. 0: go on; 1: all was sent; -1: end the connection; or

@@ -3,12 +3,26 @@
 import { paint, plot_area } from "./chart.js";
 import { SvgContext } from "./svg.js";
 
-function download(blob, name) {
+const RECORDER_MS = 2000; // after which the recorder has written what is new
+
+function follow(href, name) {
   const made = document.createElement("a");
-  made.href = URL.createObjectURL(blob);
+  made.href = href;
   made.download = name;
   made.click();
-  setTimeout(() => URL.revokeObjectURL(made.href), 10000);
+}
+
+function download(blob, name) {
+  const href = URL.createObjectURL(blob);
+  follow(href, name);
+  setTimeout(() => URL.revokeObjectURL(href), 10000);
+}
+
+// The cycles of the picture with all channels, as they were recorded.
+export function save_recording({ first, cycles }, session, is_live) {
+  const last = first + cycles - 1;
+  const href = `window.mcap?session=${session}&from=${first}&to=${last}`;
+  setTimeout(() => follow(href, `ecdaq-${first}-${last}.mcap`), is_live ? RECORDER_MS : 0);
 }
 
 // The options of chart.js, and the channels of the table.

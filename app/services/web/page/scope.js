@@ -4,7 +4,7 @@ import { Analysis } from "./analysis.js";
 import { draw, plot_area } from "./chart.js";
 import { Gestures } from "./gestures.js";
 import { format_seconds } from "./picture.js";
-import { save_as } from "./save.js";
+import { save_as, save_recording } from "./save.js";
 import { ScopeTable, list_events } from "./scope_table.js";
 import { set_text } from "./table.js";
 import { Trigger } from "./trigger.js";
@@ -278,6 +278,10 @@ export class Scope {
     const kind = by_id("scope-save").value;
     by_id("scope-save").value = "";
     if (!this.picture || kind === "") {
+      return;
+    }
+    if (kind === "mcap") {
+      save_recording(this.picture, this.table.session, this.is_live());
       return;
     }
     save_as(kind, this.canvas, this.picture, { ...this.options(), channels: this.channels_of(this.picture) });
