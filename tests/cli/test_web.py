@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import socket
 import struct
@@ -105,6 +106,48 @@ def test_the_published_client_sees_what_is_recorded_without_a_gap(
             assert without(data, at) == without(recorded_data, at)
             # Each program fits its own map of DC time to UTC.
             assert abs(stamp - recorded_stamp) < 1_000_000
+
+
+def test_the_published_client_reads_parameters_and_sets_none(bench: Bench, web: Web) -> None:
+    bench.produce("--cycles", "1000000", "--pace", "--session", "18446744073709551615")
+    folder = npm.install(VIEWER, "@foxglove/ws-protocol")
+    shutil.copy(VIEWER / "parameters.js", folder)
+    names = ["piccolo1.adc.unit", "ecdaq.period_ns", "no.such", "ecdaq.session"]
+    done = subprocess.run(
+        ["node", "parameters.js", f"ws://127.0.0.1:{web.port}", *names],
+        cwd=folder, capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["capabilities"] == ["parameters"]
+    assert {p["name"]: p["value"] for p in found["some"]} == {
+        "piccolo1.adc.unit": "V",
+        "ecdaq.period_ns": 1_000_000,
+        "ecdaq.session": "18446744073709551615",
+    }
+    everything = {p["name"]: p["value"] for p in found["all"]}
+    assert len(everything) == len(found["all"])
+    assert everything["ecdaq.appliance"] == socket.gethostname()
+    assert re.fullmatch(r"\d+\.\d+\.\d+.*", everything["ecdaq.version"])
+    assert everything["piccolo0.adc.slave"] == "piccolo0"
+    assert everything["piccolo0.adc.direction"] == "input"
+    assert 0 < everything["piccolo0.adc.scale"] < 1
+    assert everything["piccolo0.adc.offset"] == pytest.approx(0)
+    assert (found["status"]["level"], found["status"]["message"]) == (
+        2,
+        "parameters were not set: they can only be read",
+    )
+
+
+def test_parameters_are_answered_some_times_a_second(bench: Bench, web: Web) -> None:
+    bench.produce("--cycles", "1000000", "--pace")
+    viewer = Viewer(web.port)
+    viewer.wait_for_topics(SLAVE)
+    for _ in range(50):
+        viewer.send('{"op":"getParameters","parameterNames":[]}')
+    while not viewer.statuses:
+        viewer.step()
+    assert viewer.statuses[0]["message"] == "too many requests for parameters in a second"
 
 
 def number_of(topic: str, data: bytes) -> int:
@@ -245,6 +288,10 @@ def connects(port: int) -> bool:
         '{"op":"subscribe","subscriptions":[{"id":1,"channelId":77}]}',
         '{"op":"unsubscribe","subscriptionIds":[5]}',
         '{"op":"advertise","channels":[]}',
+        '{"op":"getParameters"}',
+        '{"op":"getParameters","parameterNames":[1]}',
+        '{"op":"setParameters","parameters":[]}',
+        json.dumps({"op": "getParameters", "parameterNames": ["x"] * 1025}),
         "[" * 5000,
     ],
 )

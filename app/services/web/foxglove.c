@@ -57,10 +57,12 @@ static int get_request(const cJSON *root, struct foxglove_request *ret)
 		return -EBADMSG;
 	}
 	ret->count = 0;
-	ret->op = strcmp(op, "subscribe") == 0     ? FOXGLOVE_SUBSCRIBE
-		  : strcmp(op, "unsubscribe") == 0 ? FOXGLOVE_UNSUBSCRIBE
-						   : FOXGLOVE_OTHER;
-	if (ret->op == FOXGLOVE_OTHER) {
+	ret->op = strcmp(op, "subscribe") == 0       ? FOXGLOVE_SUBSCRIBE
+		  : strcmp(op, "unsubscribe") == 0   ? FOXGLOVE_UNSUBSCRIBE
+		  : strcmp(op, "getParameters") == 0 ? FOXGLOVE_GET_PARAMETERS
+		  : strcmp(op, "setParameters") == 0 ? FOXGLOVE_SET_PARAMETERS
+						     : FOXGLOVE_OTHER;
+	if (ret->op != FOXGLOVE_SUBSCRIBE && ret->op != FOXGLOVE_UNSUBSCRIBE) {
 		return 0;
 	}
 	list = cJSON_GetObjectItemCaseSensitive(
@@ -97,6 +99,7 @@ char *foxglove_server_info(void)
 	}
 	json_text(&t.json, "name", "ecdaq " ECDAQ_VERSION);
 	json_array_begin(&t.json, "capabilities");
+	json_text(&t.json, NULL, "parameters");
 	json_array_end(&t.json);
 	json_array_begin(&t.json, "supportedEncodings");
 	json_array_end(&t.json);

@@ -18,7 +18,13 @@ enum {
 	FOXGLOVE_MESSAGE_HEAD_BYTES = 13,
 };
 
-enum foxglove_op { FOXGLOVE_SUBSCRIBE, FOXGLOVE_UNSUBSCRIBE, FOXGLOVE_OTHER };
+enum foxglove_op {
+	FOXGLOVE_SUBSCRIBE,
+	FOXGLOVE_UNSUBSCRIBE,
+	FOXGLOVE_GET_PARAMETERS, /* see web/parameters.h */
+	FOXGLOVE_SET_PARAMETERS,
+	FOXGLOVE_OTHER
+};
 
 struct foxglove_request {
 	enum foxglove_op op;

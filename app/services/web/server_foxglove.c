@@ -7,6 +7,7 @@
 
 #include "base/clock.h"
 #include "web/foxglove.h"
+#include "web/parameters.h"
 #include "web/server_private.h"
 #include "web/subscriptions.h"
 
@@ -14,6 +15,7 @@ enum {
 	MESSAGES_PER_TURN = 500,
 	BYTES_PER_SECOND = 4 * FOXGLOVE_REQUEST_BYTES, /* of requests; more end the connection */
 	STATUS_BYTES = 200,
+	ANSWERS = 4, /* with parameters, that wait for the client; and so many in a second */
 };
 
 struct client {
@@ -25,12 +27,15 @@ struct client {
 	int has_info;          /* was sent */
 	int has_fixed;         /* was sent */
 	char *status;          /* to be sent; NULL: none */
+	char *answer[ANSWERS]; /* to be sent, the oldest first */
+	int answers;
+	int answers_made;      /* in the second */
 	uint64_t dropped;      /* messages in all */
 	uint64_t dropped_told; /* of those, in a status */
 	int64_t dropped_at_ns; /* when */
 	uint8_t *request;      /* that arrives in parts; FOXGLOVE_REQUEST_BYTES */
 	size_t request_bytes;
-	int64_t second_ns; /* of received_bytes */
+	int64_t second_ns; /* of received_bytes and answers_made */
 	size_t received_bytes;
 };
 
@@ -90,6 +95,34 @@ static void unsubscribe(struct server *s, struct client *c, uint32_t id)
 	forget(s, (uint32_t)channel);
 }
 
+static void answer_parameters(struct server *s, struct client *c)
+{
+	if (c->answers == ANSWERS || c->answers_made == ANSWERS) {
+		set_status(c, FOXGLOVE_WARNING, "too many requests for parameters in a second");
+		return;
+	}
+	c->answers_made++;
+	if (parameters_answer((const char *)c->request, c->request_bytes, s->source,
+			      &c->answer[c->answers]) < 0) {
+		set_status(c, FOXGLOVE_ERROR,
+			   "a request for parameters was ignored: it is not valid");
+		return;
+	}
+	c->answers++;
+	lws_callback_on_writable(c->link.wsi);
+}
+
+static int send_answer(struct client *c)
+{
+	char *answer = c->answer[0];
+	int r = server_send_text(c->link.wsi, answer);
+
+	free(answer);
+	c->answers--;
+	memmove(&c->answer[0], &c->answer[1], (size_t)c->answers * sizeof(c->answer[0]));
+	return r;
+}
+
 static void take_request(struct server *s, struct client *c)
 {
 	struct foxglove_request *request = malloc(sizeof(*request));
@@ -99,9 +132,14 @@ static void take_request(struct server *s, struct client *c)
 
 	if (r < 0) {
 		set_status(c, FOXGLOVE_ERROR, "a request was ignored: it is not valid");
+	} else if (request->op == FOXGLOVE_GET_PARAMETERS) {
+		answer_parameters(s, c);
+	} else if (request->op == FOXGLOVE_SET_PARAMETERS) {
+		set_status(c, FOXGLOVE_ERROR, "parameters were not set: they can only be read");
 	} else if (request->op == FOXGLOVE_OTHER) {
 		set_status(c, FOXGLOVE_WARNING,
-			   "a request was ignored: this server has channels to subscribe to only");
+			   "a request was ignored: this server has channels to subscribe to and "
+			   "parameters to read only");
 	} else {
 		for (uint32_t i = 0; i < request->count; i++) {
 			if (request->op == FOXGLOVE_SUBSCRIBE) {
@@ -122,6 +160,7 @@ static int receive(struct lws *wsi, struct client *c, const void *in, size_t len
 	if (s->now_ns - c->second_ns >= NS_PER_S) {
 		c->second_ns = s->now_ns;
 		c->received_bytes = 0;
+		c->answers_made = 0;
 	}
 	c->received_bytes += len;
 	if (c->received_bytes > BYTES_PER_SECOND) {
@@ -237,6 +276,9 @@ static int send_next(struct server *s, struct client *c)
 		c->status = NULL;
 		return r;
 	}
+	if (c->answers > 0) {
+		return send_answer(c);
+	}
 	/* First what is left of the session before. */
 	if (c->session != source_session(s->source) &&
 	    (c->subs.count == 0 || c->cursor >= source_session_position(s->source))) {
@@ -287,6 +329,9 @@ static void closed(struct lws *wsi, struct client *c)
 			 "a client was slower than the data: %" PRIu64 " messages were dropped",
 			 c->dropped);
 		s->report(text);
+	}
+	while (c->answers > 0) {
+		free(c->answer[--c->answers]);
 	}
 	free(c->status);
 	free(c->request);

@@ -297,6 +297,11 @@ const struct layout_topic *source_slaves(const struct source *s, size_t *ret_cou
 	return s->layout == NULL ? NULL : layout_topics(s->layout, ret_count);
 }
 
+const struct sample_meta *source_meta(const struct source *s)
+{
+	return s->layout == NULL ? NULL : layout_meta(s->layout);
+}
+
 const char *source_topic(const struct source *s, uint32_t channel)
 {
 	const struct layout_topic *topic;

@@ -66,6 +66,8 @@ uint64_t source_next(const struct source *s, uint32_t channel);
 const char *source_topic(const struct source *s, uint32_t channel);
 /** Slaves of the session, in the order of their slots; NULL with 0: none. */
 const struct layout_topic *source_slaves(const struct source *s, size_t *ret_count);
+/** Of the session; NULL: there is none. */
+const struct sample_meta *source_meta(const struct source *s);
 /** What is added to CLOCK_TAI for Unix time. */
 int64_t source_utc_minus_tai(const struct source *s);
 /** Why there is no session, one line; "" if there is one. */

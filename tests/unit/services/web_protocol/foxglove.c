@@ -39,6 +39,10 @@ TEST(web_protocol, an_unsubscribe_request_gives_its_ids)
 TEST(web_protocol, another_operation_is_recognised_as_such)
 {
 	CHECK_EQ(parse("{\"op\":\"setParameters\",\"parameters\":[]}"), 0);
+	CHECK_EQ(request.op, FOXGLOVE_SET_PARAMETERS);
+	CHECK_EQ(parse("{\"op\":\"getParameters\",\"parameterNames\":[]}"), 0);
+	CHECK_EQ(request.op, FOXGLOVE_GET_PARAMETERS);
+	CHECK_EQ(parse("{\"op\":\"callService\"}"), 0);
 	CHECK_EQ(request.op, FOXGLOVE_OTHER);
 }
 
