@@ -18,7 +18,7 @@ static struct source *make_source(void)
 	struct source *source;
 
 	config_defaults(&cfg);
-	if (outbox_create((size_t)4 * SOURCE_LARGEST_BYTES, SOURCE_LARGEST_BYTES, &box) < 0 ||
+	if (outbox_create((size_t)8 * SOURCE_LARGEST_BYTES, SOURCE_LARGEST_BYTES, &box) < 0 ||
 	    source_create(&cfg, box, &source) < 0) {
 		abort();
 	}
