@@ -376,10 +376,10 @@ int config_parse_duration(const char *text, int64_t *ret_ns, char *reason);
 #define CONFIG_RUN_UPLINK_STATUS "uplink/status"     /* struct uplink_status */
 #define CONFIG_RUN_WEB_PAGE "web-command/page"       /* sockets, base/web_command.h */
 #define CONFIG_RUN_WEB_TOKEN "web-command/token"
-#define CONFIG_RUN_SYNC0 "sync0/results"             /* ring of struct sync0_result */
-#define CONFIG_RUN_SYNC0_EVENTS "sync0/events"       /* ring of events of ecdaq-sync0 */
-#define CONFIG_RUN_SYNC0_STATUS "sync0/status"       /* struct sync0_status */
-#define CONFIG_RUN_SYNC0_LOCK "sync0/lock"           /* held by the one ecdaq-sync0 */
+#define CONFIG_RUN_SYNC0 "sync0/results"       /* ring of struct sync0_result */
+#define CONFIG_RUN_SYNC0_EVENTS "sync0/events" /* ring of events of ecdaq-sync0 */
+#define CONFIG_RUN_SYNC0_STATUS "sync0/status" /* struct sync0_status */
+#define CONFIG_RUN_SYNC0_LOCK "sync0/lock"     /* held by the one ecdaq-sync0 */
 
 /** 1 if the run directory is named by @cfg->run_dir or $ECDAQ_RUN_DIR, and not the default. */
 int config_has_run_dir(const struct config *cfg);
