@@ -297,6 +297,12 @@ do_measure()
 
 do_bench()
 {
+	case ${1:-} in
+	cycle | record | dds)
+		[ $# = 1 ] || usage_error "bench: $1 has no options"
+		do_measure "$1"
+		;;
+	esac
 	if python=$(find_python); then
 		"$python" "$root/app/tools/bench.py" --check "$@"
 	fi

@@ -38,8 +38,9 @@ Runs the whole master with simulated slaves on virtual time, seed by seed and ma
 cores at once, and writes app/doc/results/sim.md: virtual seconds in a second, instructions and
 processor time a cycle. About a minute.
 
-Instructions of the cycle and of a recorded sample, and DDS: cycle, record and dds of
-./build.sh help measure.
+cycle, record, dds  the same as `./build.sh measure` of these
+
+Instructions of a cycle, of a recorded sample beside the official MCAP writer, and what DDS delivers.
 """
 
 
@@ -88,7 +89,7 @@ def check_options(parser: Parser, options: argparse.Namespace) -> None:
 def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
     parser = Parser(
         prog="./build.sh bench",
-        usage="./build.sh bench peers|sim [OPTION...]",
+        usage="./build.sh bench peers|sim [OPTION...], or cycle|record|dds",
         description=HELP,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -128,8 +129,9 @@ def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--check", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args(arguments)
     if options.what not in CYCLES:
-        parser.error("name what to measure: peers or sim" if options.what is None
-                     else f"no subject '{options.what}'; there are: peers sim")  # fmt: skip
+        there_are = "peers sim cycle record dds"  # the last three are not for this program
+        parser.error(f"name what to measure: {there_are}" if options.what is None
+                     else f"no subject '{options.what}'; there are: {there_are}")  # fmt: skip
     check_options(parser, options)
     return options
 
