@@ -110,7 +110,7 @@ def test_the_file_describes_itself(bench: Bench, tmp_path: Path) -> None:
         reader = make_reader(file)
         assert reader.get_header().profile == "ros2"
         metadata = {record.name: record.metadata for record in reader.iter_metadata()}
-        attachments = {a.name: a.data.decode() for a in reader.iter_attachments()}
+        attachments = {a.name: a.data for a in reader.iter_attachments()}
         summary = reader.get_summary()
     assert metadata["ecdaq.config"]["yaml"] == config.read_text()
     table = json.loads(metadata["ecdaq.channels"]["json"])
@@ -119,7 +119,7 @@ def test_the_file_describes_itself(bench: Bench, tmp_path: Path) -> None:
     assert metadata["ecdaq.end"]["cycles"] == "100"
     assert metadata["ecdaq.end"]["reason"] == "producer ended"
     assert int(metadata["ecdaq.timemap"]["utc_ns"]) > 1_600_000_000 * 10**9
-    assert "struct Piccolo0 {" in attachments["ecdaq.idl"]
+    assert b"struct Piccolo0 {" in attachments["ecdaq.idl"]
     assert summary is not None and summary.statistics is not None
     assert summary.statistics.message_count == 3 * 100 + 1
     assert all(chunk.compression == "" for chunk in summary.chunk_indexes)
