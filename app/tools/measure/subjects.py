@@ -142,6 +142,11 @@ ALL = (
         ),
     ),
     subject(
+        "web-clients",
+        "The cycle while none, 8 and 50 clients use ecdaq-web",
+        pytest("tests/live/test_web_clients.py", keep=r"^(clients|\s+\d+  )"),
+    ),
+    subject(
         "history",
         "Pictures of a day of recordings",
         (
