@@ -142,6 +142,22 @@ ALL = (
         ),
     ),
     subject(
+        "stream-fleet",
+        "Live streams of 50 appliances into one JetStream",
+        (
+            "python tests/cli/stream_fleet.py",
+            partial(run, [sys.executable, "tests/cli/stream_fleet.py"], "."),
+        ),
+    ),
+    subject(
+        "kills",
+        "Stream and uplink of two appliances while their servers are killed, 10 minutes",
+        (
+            "python tests/cli/kill_figures.py",
+            partial(run, [sys.executable, "tests/cli/kill_figures.py"], "."),
+        ),
+    ),
+    subject(
         "web-clients",
         "The cycle while none, 8 and 50 clients use ecdaq-web",
         pytest("tests/live/test_web_clients.py", keep=r"^(clients|\s+\d+  )"),
