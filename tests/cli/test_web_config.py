@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from browser import Browser
 from ecdaq import Fake
+from recording import Bench
 from web_bench import Web
 from web_client import http, unchunk
 
@@ -75,6 +76,26 @@ def test_settings_of_the_file_are_seen_first_and_all_on_request(
     assert browser.value(f"{cells}[1].textContent") == wanted["value"]
     assert str(config) in browser.value("document.querySelector('#config-file').textContent")
     assert browser.value(f"{cells}[5].textContent") == wanted["takes_effect"]
+    assert browser.problems() == []
+
+
+def test_channels_say_who_writes_an_output_and_its_limits(
+    bench: Bench,
+    make_web: Callable[..., Web],
+    make_browser: Callable[..., Browser],
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "outputs.yaml"
+    file.write_text(
+        "slaves:\n  - name: piccolo0\n  - name: piccolo1\n    outputs:\n"
+        "      - {channel: led, owner: remote, min: 0, max: 1, fail_safe: 1}\n"
+    )
+    bench.produce("--cycles", "1000", "--wait")
+    browser = make_browser(make_web(file), "#channels")
+    row = "[...document.querySelectorAll('#channel-rows tr')].find((r) => r.children[0]"
+    cell = f"{row}.textContent === 'piccolo1.led')?.children[5].textContent"
+    assert browser.wait_for(cell) == "remote; 0 to 1; fail-safe 1"
+    assert browser.value(f"{row}.textContent === 'piccolo0.adc').children[5].textContent") == ""
     assert browser.problems() == []
 
 

@@ -15,6 +15,30 @@ export function parse(text) {
   return text.split("\n").filter((line) => line !== "").map((line) => JSON.parse(line));
 }
 
+export async function load_options() {
+  const answer = await fetch("config.json");
+  if (!answer.ok) {
+    throw new Error(await answer.text());
+  }
+  return parse(await answer.text());
+}
+
+// What outputs[] and slaves[].outputs[] say of each output, by the name of its channel.
+export function outputs_of(options) {
+  const values = new Map(options.map(({ option, value }) => [option, value]));
+  const found = new Map();
+  for (const [option, value] of values) {
+    const [, item, slave] = /^((slaves\[\d+\])?\.?outputs\[\d+\])\.channel$/.exec(option) ?? [];
+    if (item) {
+      const of = (name) => values.get(`${item}.${name}`);
+      found.set(slave ? `${values.get(`${slave}.name`)}.${value}` : value, {
+        owner: of("owner"), min: of("min"), max: of("max"), fail_safe: of("fail_safe"),
+      });
+    }
+  }
+  return found;
+}
+
 export class ConfigView {
   constructor() {
     this.options = [];
@@ -26,11 +50,7 @@ export class ConfigView {
   async load() {
     const note = by_id("config-note");
     try {
-      const answer = await fetch("config.json");
-      if (!answer.ok) {
-        throw new Error(await answer.text());
-      }
-      this.show(parse(await answer.text()));
+      this.show(await load_options());
     } catch (error) {
       note.textContent = `cannot be shown: ${error.message}`;
     }

@@ -63,6 +63,8 @@ function show_view() {
       config.load();
     } else if (shown === "state") {
       doctor.load();
+    } else if (shown === "channels") {
+      channels.load();
     }
   }
 }

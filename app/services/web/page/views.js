@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The views State and Channels.
+import { load_options, outputs_of } from "./config.js";
 import { format } from "./picture.js";
 import { button, row, set_level, set_text } from "./table.js";
 
@@ -65,6 +66,7 @@ export class ChannelsView {
     this.lines = table.channels.map((channel, i) => {
       const line = row(channel.name, "", channel.unit, "", button("+", `${channel.name} in the scope`, () => this.on_scope(i)));
       line.children[1].className = "number";
+      line.insertCell();
       const place = line.insertCell();
       place.className = "for-operator";
       if (channel.output) {
@@ -73,8 +75,31 @@ export class ChannelsView {
       return line;
     });
     this.names = table.channels.map((channel) => channel.name.toLowerCase());
+    this.outputs = table.channels.map((channel) => channel.output);
     by_id("channel-rows").replaceChildren(...this.lines);
     this.filter();
+    this.show_owners();
+  }
+
+  // Who may write each output, and what it is limited to, by the configuration.
+  async load() {
+    try {
+      this.owners = outputs_of(await load_options());
+    } catch {
+      return; // the view Configuration says why; it is read again when this view is opened
+    }
+    this.show_owners();
+  }
+
+  show_owners() {
+    this.lines.forEach((line, i) => {
+      if (this.outputs[i] && this.owners) {
+        const { owner, min, max, fail_safe } = this.owners.get(line.children[0].textContent) ?? { owner: "local" };
+        const limits = min === "-inf" && max === "inf" ? [] : [`${min} to ${max}`];
+        const all = [owner, ...(min === undefined ? [] : [...limits, `fail-safe ${fail_safe}`])];
+        set_text(line.children[5], all.join("; "));
+      }
+    });
   }
 
   filter() {
