@@ -45,7 +45,7 @@ def produce(bench: recording.Bench, first: int, cycles: int, *more: str) -> None
 def record(bench: recording.Bench, hours: int) -> None:
     for hour in range(hours):
         produce(bench, hour * HOUR, HOUR)
-        recorder = bench.record("--once")
+        recorder = bench.record("--once", "--set", "record.budget=64GiB")
         _, output = recorder.communicate(timeout=3600)
         assert recorder.returncode == 0, output
     produce(bench, hours * HOUR - MINUTE, MINUTE, "--wait")
