@@ -387,22 +387,13 @@ static int take_file(struct cut *cut, const char *name)
 {
 	struct recording rec;
 	char path[PATH_MAX];
-	int result = EXIT_CODE_OK;
-	int r = store_path(cut->options->dir, name, path, sizeof(path));
+	int result;
+	int r = recording_open_of(&rec, cut->options->dir, name, cut->session, NULL, path);
 
-	r = r < 0 ? r : recording_open(&rec, path, NULL);
-	if (r == -ENOENT && log_part_to_final(path)) { /* finished just now */
-		r = recording_open(&rec, path, NULL);
+	if (r <= 0) {
+		return r == 0 ? EXIT_CODE_OK : log_fail_errno(cut->err, name, r);
 	}
-	if (r < 0) {
-		/* One that has just begun is empty, one that the budget removes is gone. */
-		return r == -ENOENT || (r == -ENODATA && log_is_recording(path))
-			       ? EXIT_CODE_OK
-			       : log_fail_errno(cut->err, name, r);
-	}
-	if (rec.session == cut->session) {
-		result = take_recording(cut, &rec);
-	}
+	result = take_recording(cut, &rec);
 	recording_close(&rec);
 	return result;
 }
@@ -484,9 +475,7 @@ int log_cut(const struct log_cut_options *options, FILE *err)
 		cut.session = recording_newest_session(options->dir, entries, count);
 	}
 	for (size_t i = 0; i < count && !cut.is_over && !cut.is_hopeless; i++) {
-		int one = store_name_is_of(entries[i].name, cut.session)
-				  ? take_file(&cut, entries[i].name)
-				  : EXIT_CODE_OK;
+		int one = take_file(&cut, entries[i].name);
 
 		result = result != EXIT_CODE_OK ? result : one;
 	}

@@ -369,19 +369,13 @@ static int take_file(struct envelope_table *t, const char *name)
 	const struct log_envelope_options *op = t->options;
 	struct recording rec;
 	char path[PATH_MAX];
-	int result = EXIT_CODE_OK;
-	int r = store_path(op->dir, name, path, sizeof(path));
+	int result;
+	int r = recording_open_of(&rec, op->dir, name, t->session, op->channels, path);
 
-	r = r < 0 ? r : recording_open(&rec, path, op->channels);
-	if (r < 0) {
-		/* One that has just begun is empty, one that the budget removes is gone. */
-		return r == -ENOENT || (r == -ENODATA && log_is_recording(path))
-			       ? EXIT_CODE_OK
-			       : log_fail_errno(t->err, name, r);
+	if (r <= 0) {
+		return r == 0 ? EXIT_CODE_OK : log_fail_errno(t->err, name, r);
 	}
-	if (rec.session == t->session) {
-		result = take_recording(t, &rec);
-	}
+	result = take_recording(t, &rec);
 	recording_close(&rec);
 	return result;
 }
@@ -399,12 +393,11 @@ static void find_whole_range(struct envelope_table *t, const struct store_entry 
 		uint64_t from;
 		uint64_t to;
 
-		if (store_path(t->options->dir, entries[i].name, path, sizeof(path)) < 0 ||
-		    !store_name_is_of(entries[i].name, t->session) ||
-		    recording_open(&rec, path, NULL) < 0) {
+		if (recording_open_of(&rec, t->options->dir, entries[i].name, t->session, NULL,
+				      path) <= 0) {
 			continue;
 		}
-		if (rec.session == t->session && recording_find_range(&rec, &from, &to) > 0) {
+		if (recording_find_range(&rec, &from, &to) > 0) {
 			first = from < first ? from : first;
 			last = to > last ? to : last;
 		}
@@ -557,9 +550,7 @@ int log_envelope(const struct log_envelope_options *options, FILE *out, FILE *er
 	}
 	t.rows = t.to - t.from < options->rows ? t.to - t.from + 1 : options->rows;
 	for (size_t i = 0; i < count && t.from <= t.to && !t.is_hopeless; i++) {
-		int one = store_name_is_of(entries[i].name, t.session)
-				  ? take_file(&t, entries[i].name)
-				  : EXIT_CODE_OK;
+		int one = take_file(&t, entries[i].name);
 
 		result = result != EXIT_CODE_OK ? result : one;
 	}

@@ -69,6 +69,29 @@ int recording_open(struct recording *rec, const char *path, const char *channels
 	return r;
 }
 
+int recording_open_of(struct recording *rec, const char *dir, const char *name, uint64_t session,
+		      const char *channels, char path[PATH_MAX])
+{
+	int r;
+
+	if (!store_name_is_of(name, session)) {
+		return 0;
+	}
+	r = store_path(dir, name, path, PATH_MAX);
+	r = r < 0 ? r : recording_open(rec, path, channels);
+	if (r == -ENOENT && log_part_to_final(path)) { /* finished just now */
+		r = recording_open(rec, path, channels);
+	}
+	if (r < 0) {
+		return r == -ENOENT || (r == -ENODATA && log_is_recording(path)) ? 0 : r;
+	}
+	if (rec->session != session) {
+		recording_close(rec);
+		return 0;
+	}
+	return 1;
+}
+
 /* The first cycle of the chunk at @offset; UINT64_MAX: there is none. 0 or -errno. */
 static int read_first_cycle(struct recording *rec, uint64_t offset, uint64_t *ret_cycle)
 {

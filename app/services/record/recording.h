@@ -6,6 +6,7 @@
 #ifndef RECORD_RECORDING_H
 #define RECORD_RECORDING_H
 
+#include <limits.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -28,6 +29,11 @@ struct recording {
 /** Open the file at @path and read what is before its first chunk; @channels as columns_create()
  * has them. @path and @rec stay where they are. 0 or -errno. */
 int recording_open(struct recording *rec, const char *path, const char *channels);
+/** The same with the recording @name of @dir, whose path is kept in @path; @session: only if it is
+ * of that one. 1; 0: it is not, or it is gone or empty: the budget removes, the recorder begins and
+ * finishes files meanwhile; -errno. */
+int recording_open_of(struct recording *rec, const char *dir, const char *name, uint64_t session,
+		      const char *channels, char path[PATH_MAX]);
 void recording_close(struct recording *rec);
 
 /** The last of @chunks that begins at cycle @wanted or before it; 0 if none does. 0 or -errno. */
