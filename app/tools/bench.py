@@ -40,7 +40,7 @@ processor time a cycle. About a minute.
 
 cycle, record, dds  the same as `./build.sh measure` of these
 
-Instructions of a cycle, of a recorded sample beside the official MCAP writer, and what DDS delivers.
+Instructions of a cycle; a recorded sample beside the official MCAP writer; what DDS delivers.
 """
 
 

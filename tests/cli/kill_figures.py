@@ -20,7 +20,7 @@ from pathlib import Path
 
 from recording import Bench, wait_until
 from stream_bench import Server, Stream
-from stream_fleet import SLAVES, samples
+from stream_fleet import SLAVES, samples, wait_seconds
 from uplink_bench import GoFake, Uplink
 
 APPLIANCES = 2
@@ -70,11 +70,11 @@ def kill_at_random(seconds: float, victims: list[Server | GoFake], seed: int) ->
     kills = [0] * len(victims)
     end = time.monotonic() + seconds
     while time.monotonic() < end:
-        time.sleep(chance.random() * UP_S)  # faults are at times, not on conditions
+        wait_seconds(chance.random() * UP_S)
         n = chance.randrange(len(victims))
         victims[n].kill()
         kills[n] += 1
-        time.sleep(chance.random() * DOWN_S)
+        wait_seconds(chance.random() * DOWN_S)
         victims[n].start()
     return kills
 

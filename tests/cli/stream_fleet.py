@@ -29,6 +29,11 @@ def cpu_seconds(process: subprocess.Popen[str] | subprocess.Popen[bytes]) -> flo
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
+def wait_seconds(seconds: float) -> None:
+    """What is measured goes on meanwhile, or faults are at times, not on conditions."""
+    time.sleep(seconds)
+
+
 class Appliance:
     def __init__(self, folder: Path, number: int, server: Server) -> None:
         self.name = f"rig{number}"
@@ -81,7 +86,7 @@ def main(count: int, seconds: int) -> None:
 
             def is_quiet() -> bool:
                 newest = server.state().last_seq
-                time.sleep(1)  # what is measured is that nothing comes any more
+                wait_seconds(1)
                 return bool(server.state().last_seq == newest)
 
             wait_until("the last sample in the stream", is_quiet, 120)
