@@ -240,7 +240,7 @@ struct stream_status {
 enum uplink_state {
 	UPLINK_IDLE = 0,
 	UPLINK_SENDING,
-	UPLINK_RETRYING /* the store is not to be had, or rejects */
+	UPLINK_RETRYING /* the store cannot be reached, or rejects */
 };
 
 /* Status of ecdaq-uplink ("uplink/status" in the run directory). [uplink] */

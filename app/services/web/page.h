@@ -36,7 +36,7 @@ int page_parse(const char *text, size_t len, struct page_request *ret);
 void page_add_events(struct page_request *request, const struct event_log *log,
 		     uint64_t cycle[EVENT_LOG_EVENTS]);
 
-/* What the state is told from. */
+/* What page_state() is made from. */
 struct page_status {
 	const struct status_page *page;
 	int page_error; /* 0, or why @page could not be read */

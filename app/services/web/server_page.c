@@ -189,15 +189,15 @@ int server_pages_refresh(struct server *s)
 	return 1;
 }
 
-/* *@wants as @is_on says, and @wanted the number of pages that do. */
-static void want(int *wants, int is_on, uint32_t *wanted)
+/* Switch the subscription @flag of a page on or off, and keep the @count of pages that have it. */
+static void subscribe(int *flag, int is_on, uint32_t *count)
 {
-	if (is_on && !*wants) {
-		(*wanted)++;
-	} else if (!is_on && *wants) {
-		(*wanted)--;
+	if (is_on && !*flag) {
+		(*count)++;
+	} else if (!is_on && *flag) {
+		(*count)--;
 	}
-	*wants = is_on;
+	*flag = is_on;
 }
 
 static void take_request(struct server_pages *p, struct page_client *c)
@@ -212,16 +212,16 @@ static void take_request(struct server_pages *p, struct page_client *c)
 		c->wants_values = request.is_on;
 		break;
 	case PAGE_RECORDINGS:
-		want(&c->wants_recordings, request.is_on, &p->recordings_wanted);
+		subscribe(&c->wants_recordings, request.is_on, &p->recordings_wanted);
 		break;
 	case PAGE_BUS:
-		want(&c->wants_bus, request.is_on, &p->bus_wanted);
+		subscribe(&c->wants_bus, request.is_on, &p->bus_wanted);
 		c->wants_slave = request.is_on && request.has_slave;
 		c->slave = request.slave;
 		c->has_slave = 0;
 		break;
 	case PAGE_FOLDS:
-		want(&c->wants_folds, request.is_on, &p->folds_wanted);
+		subscribe(&c->wants_folds, request.is_on, &p->folds_wanted);
 		break;
 	case PAGE_DRAW:
 		past_stop(p->past, c); /* one that was not answered yet is not needed any more */
@@ -442,9 +442,9 @@ static void opened(struct lws *wsi, struct page_client *c)
 
 static void closed(struct server_pages *p, struct page_client *c)
 {
-	want(&c->wants_recordings, 0, &p->recordings_wanted);
-	want(&c->wants_bus, 0, &p->bus_wanted);
-	want(&c->wants_folds, 0, &p->folds_wanted);
+	subscribe(&c->wants_recordings, 0, &p->recordings_wanted);
+	subscribe(&c->wants_bus, 0, &p->bus_wanted);
+	subscribe(&c->wants_folds, 0, &p->folds_wanted);
 	past_stop(p->past, c);
 }
 

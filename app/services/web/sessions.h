@@ -20,7 +20,7 @@ enum role { ROLE_NONE, ROLE_VIEWER, ROLE_OPERATOR, ROLE_ENGINEER };
 enum {
 	SESSIONS = 32,
 	SESSION_TOKENS = 16,
-	SESSION_WRONG_A_MINUTE = 10, /* wrong tokens; more are told to wait */
+	SESSION_WRONG_A_MINUTE = 10, /* wrong tokens; more get HTTP status 429 */
 };
 #define SESSION_IDLE_NS (INT64_C(1800) * NS_PER_S)
 #define SESSION_LIFE_NS (INT64_C(43200) * NS_PER_S)
