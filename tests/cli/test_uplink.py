@@ -128,14 +128,13 @@ def test_a_link_that_is_down_is_one_line_however_long_it_is(bench: Bench, moto: 
     link.cut()
     uplink = Uplink(bench, moto, link.port)
     uplink.start()
-    page = bench.run_dir / "uplink" / "status"
-    wait_until("a status page", page.exists)
-    pass_time(6)
+    uplink.wait_message("Couldn't connect to server")
+    pass_time(4)
     link.restore()
     wait_until("both recordings", lambda: len(uplink.uploaded()) == 2)
     link.cut()
     paths += record_small(bench)
-    pass_time(3)
+    uplink.wait_message("Couldn't connect to server", 2)
     link.restore()
     wait_until("the third one", lambda: len(uplink.uploaded()) == 3)
     endpoint = f"http://127.0.0.1:{link.port}"
@@ -151,10 +150,10 @@ def test_wrong_credentials_are_one_line_and_renewed_ones_are_used(
     uplink = Uplink(bench, moto)
     uplink.give_credentials(moto.access, "wrong")
     uplink.start()
-    pass_time(5)
+    uplink.wait_message("secret key is wrong")
     assert moto.keys() == []
     uplink.give_credentials("AKIAUNKNOWN", moto.secret)
-    pass_time(5)
+    uplink.wait_message("access key unknown")
     uplink.give_credentials(moto.access, moto.secret)
     wait_until("both recordings", lambda: len(uplink.uploaded()) == 2)
     base = f"http://127.0.0.1:{moto.port}"
@@ -183,7 +182,7 @@ def test_a_clock_that_is_not_set_is_one_line_and_nothing_is_lost(
     link.change = shift
     uplink = Uplink(bench, gofake, link.port)
     uplink.start()
-    pass_time(5)
+    uplink.wait_message("the clock of this machine differs")
     assert gofake.keys() == []
     link.change = lambda data: data
     wait_until("both recordings", lambda: len(uplink.uploaded()) == 2)
@@ -285,8 +284,7 @@ def test_a_bucket_that_is_not_there_is_said(bench: Bench, gofake: Store) -> None
     record_small(bench)
     uplink = Uplink(bench, gofake, uplink_bucket="elsewhere")
     uplink.start()
-    wait_until("a status page", (bench.run_dir / "uplink" / "status").exists)
-    pass_time(3)
+    uplink.wait_message("bucket does not exist")
     base = f"http://127.0.0.1:{gofake.port}/elsewhere"
     assert lines(uplink.stop()) == [
         f"{base}: bucket does not exist: create it, or check uplink.bucket"

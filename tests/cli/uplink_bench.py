@@ -47,7 +47,7 @@ class Store:
         folder.mkdir(parents=True, exist_ok=True)
         self.folder = folder
         self.port = free_port()
-        self.process: subprocess.Popen[bytes] | None = None
+        self.process: subprocess.Popen[str] | None = None
         self.start()
 
     def command(self) -> list[str]:
@@ -235,7 +235,7 @@ class Uplink:
             "record.dir": str(bench.folder),
         } | {k.replace("_", ".", 1): v for k, v in more.items()}
         self.words = [w for name, value in given.items() for w in ("--set", f"{name}={value}")]
-        self.errors = ""
+        self.log = bench.run_dir / "uplink.log"
         self.process: subprocess.Popen[str] | None = None
 
     def give_credentials(self, access: str, secret: str) -> None:
@@ -248,20 +248,23 @@ class Uplink:
         return [UPLINK, "--run-dir", self.bench.run_dir, *self.words, *words]
 
     def start(self) -> None:
-        self.process = self.bench.start(*self.command())
+        with self.log.open("ab") as log:
+            self.process = subprocess.Popen(self.command(), stdout=log, stderr=log, text=True)
+        self.bench.processes.append(self.process)
 
     def kill(self) -> None:
         assert self.process is not None
         self.process.kill()
-        self.errors += self.process.communicate(timeout=SECONDS)[1]
+        self.process.wait(timeout=SECONDS)
 
     def stop(self) -> str:
         """Its messages."""
         assert self.process is not None
         self.process.terminate()
-        self.errors += self.process.communicate(timeout=SECONDS)[1]
-        assert self.process.returncode == 0, self.errors
-        return self.errors
+        self.process.wait(timeout=SECONDS)
+        errors = self.log.read_text()
+        assert self.process.returncode == 0, errors
+        return errors
 
     def finish(self, seconds: float = 2 * SECONDS) -> str:
         """Upload all that is finished; its messages."""
@@ -282,6 +285,10 @@ class Uplink:
 
     def key(self, path: Path) -> str:
         return f"plant/a/rig1/{path.name}"
+
+    def wait_message(self, part: str, count: int = 1) -> None:
+        """Until an attempt has failed with it, or @count: attempts are up to a minute apart."""
+        wait_until(part, lambda: self.log.read_text().count(part) >= count)
 
     def status(self) -> dict[str, Any]:
         done = subprocess.run(
