@@ -86,7 +86,7 @@ Only when named:
   deb-arm64  the Debian packages for arm64: compared with those for amd64, installed, started
   coverage the lines of each parser that its fuzz target reaches; fails below 80 %
   long     hours of bus time and of SYNC0 edges on virtual time
-  boot-long  the image in QEMU: the clock after power-off, the watchdog of a manager that hangs
+  boot-long  the image in QEMU: first start of large disks, DHCP, clock after power-off, watchdog of a hung manager
   wire     SYNC0 on GPIO lines of the image in QEMU; as root, on an idle machine
   update   updates of the image in QEMU, from slot to slot
 

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -39,9 +40,11 @@ def key(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def machine(
     request: pytest.FixtureRequest, image: Path, key: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Machine]:
-    """The machine of a file, set up by its BOOT_FILES, up to its login."""
+    """The machine of a file, set up by its BOOT_FILES, up to its login. What is needed in the space
+    before it starts is the context manager of the file's beside(space)."""
     module = request.module
     space = Space() if getattr(module, "OUTSIDE", False) else None
+    around = ExitStack()
     vm = Machine(
         tmp_path_factory.mktemp("vm"), image, key, getattr(module, "TIMING", "guest"), space
     )
@@ -50,6 +53,8 @@ def machine(
         files["authorized_keys"] = key.with_suffix(".pub").read_text()
     failed_before = request.session.testsfailed
     try:
+        if hasattr(module, "beside"):
+            around.enter_context(module.beside(space))
         vm.write_boot_files(files)
         if getattr(module, "WIRE", False):
             vm.start(options=vm.wire_options(), ahead=AHEAD)
@@ -62,6 +67,7 @@ def machine(
         yield vm
     finally:
         vm.stop()
+        around.close()
         if space is not None:
             space.close()
         if request.session.testsfailed > failed_before or vm.has_console():

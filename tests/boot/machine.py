@@ -24,6 +24,7 @@ TOOLS = TOP / "app" / "tools" / "image"
 BOOT_S = float(os.environ.get("ECDAQ_BOOT_SECONDS", "1800"))
 COMMAND_S = 600.0
 POLL_S = 0.2
+DISK_BYTES = 2 << 30
 ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]|\r")
 # Runs a command ahead of the host's other work, also where the kernel groups that by session.
 AHEAD = (
@@ -98,7 +99,13 @@ class Machine:
     """
 
     def __init__(
-        self, folder: Path, image: Path, key: Path, timing: str, space: Space | None = None
+        self,
+        folder: Path,
+        image: Path,
+        key: Path,
+        timing: str,
+        space: Space | None = None,
+        disk_bytes: int = DISK_BYTES,
     ) -> None:
         self.folder = folder
         self.key = key
@@ -110,7 +117,7 @@ class Machine:
         subprocess.run(["cp", "--sparse=always", image, self.disk], check=True)
         # The data partition has to grow into what the image does not have.
         with self.disk.open("r+b") as disk:
-            disk.truncate(2 << 30)
+            disk.truncate(disk_bytes)
         shutil.copy(IMAGE / f"{NAME}-u-boot.bin", folder / "u-boot.bin")
         self.port = free_port()
         self.process: subprocess.Popen[bytes] | None = None

@@ -23,6 +23,7 @@ DISKS = os.environ.get("ECDAQ_CUT_DISKS", "10000")
 UPDATE_DISKS = os.environ.get("ECDAQ_UPDATE_DISKS", "2000")
 FUZZ_TARGETS = os.environ.get("ECDAQ_FUZZ_TARGETS", "eni esi").split()
 FUZZ_SECONDS = int(os.environ.get("ECDAQ_FUZZ_SECONDS", "3600"))
+FIRST_BOOTS = os.environ.get("ECDAQ_FIRST_BOOTS", "12")
 UPDATE_BOOTS = os.environ.get("ECDAQ_UPDATE_BOOTS", "8")
 
 
@@ -38,6 +39,7 @@ def run(command: list[str], keep: str, root: Path) -> list[str]:
         "ECDAQ_CUT_DISKS": DISKS,
         "ECDAQ_UPDATE_DISKS": UPDATE_DISKS,
         "ECDAQ_UPDATE_BOOTS": UPDATE_BOOTS,
+        "ECDAQ_FIRST_BOOTS": FIRST_BOOTS,
         "ECDAQ_FAULT_TRIALS": TRIALS,
         "PYTHONDONTWRITEBYTECODE": "1",
     }
@@ -214,6 +216,11 @@ ALL = (
         "update-cuts",
         f"{UPDATE_DISKS} disks as a power cut in an update may leave them (ECDAQ_UPDATE_DISKS)",
         pytest("tests/boot/test_95_update_cuts.py", keep=NOT_PYTEST),
+    ),
+    subject(
+        "first-boot",
+        f"First starts of 8 and 512 GB, and {FIRST_BOOTS} that are cut (ECDAQ_FIRST_BOOTS)",
+        pytest("tests/boot/test_37_first_boot.py", keep=NOT_PYTEST),
     ),
     Subject(
         "fuzz",
