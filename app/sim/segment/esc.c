@@ -138,22 +138,28 @@ void esc_force_al_status(struct esc *esc, uint8_t status, uint16_t code)
 
 /* --- the wire --- */
 
-static int read_memory(struct esc *esc, const struct esc_frame *frame, uint16_t addr, uint8_t *buf,
-		       size_t len)
+/* What was read, in @buf or where it is; NULL: nothing. */
+static const uint8_t *read_memory(struct esc *esc, const struct esc_frame *frame, uint16_t addr,
+				  uint8_t *buf, size_t len)
 {
-	size_t registers = 0;
-	int any = 0;
+	const uint8_t *reg;
+	size_t registers;
 
-	if (addr < ESC_REG_PROCESS_RAM) {
-		registers = (size_t)ESC_REG_PROCESS_RAM - addr;
-		registers = registers < len ? registers : len;
-		any = esc_register_read(esc, ESC_ECAT, frame->pu_ns, addr, buf, registers);
+	if (addr >= ESC_REG_PROCESS_RAM) {
+		return esc_ram_read(esc, ESC_ECAT, addr, buf, len) ? buf : NULL;
 	}
-	if (registers < len) {
-		any |= esc_ram_read(esc, ESC_ECAT, (uint16_t)(addr + registers), buf + registers,
-				    len - registers);
+	if (addr + len <= ESC_REG_PROCESS_RAM) {
+		return esc_register_read(esc, ESC_ECAT, frame->pu_ns, addr, buf, len);
 	}
-	return any;
+	registers = (size_t)ESC_REG_PROCESS_RAM - addr;
+	reg = esc_register_read(esc, ESC_ECAT, frame->pu_ns, addr, buf, registers);
+	if (reg != NULL && reg != buf) {
+		memcpy(buf, reg, registers);
+	}
+	return esc_ram_read(esc, ESC_ECAT, ESC_REG_PROCESS_RAM, buf + registers, len - registers) ||
+			       reg != NULL
+		       ? buf
+		       : NULL;
 }
 
 static int write_memory(struct esc *esc, const struct esc_frame *frame, uint16_t addr,
@@ -179,20 +185,30 @@ static void add_wkc(struct ecat_datagram *dg, int n)
 	put_le16(dg->wkc, (uint16_t)(get_le16(dg->wkc) + n));
 }
 
+static void or_bytes(uint8_t *to, const uint8_t *from, size_t len)
+{
+	for (size_t i = 0; i < len; i++) {
+		to[i] |= from[i];
+	}
+}
+
 static void do_read(struct esc *esc, const struct esc_frame *frame, struct ecat_datagram *dg,
 		    int is_broadcast)
 {
-	uint8_t got[ECAT_DATAGRAM_MAX_BYTES];
+	uint8_t room[ECAT_DATAGRAM_MAX_BYTES];
+	const uint8_t *got;
 
-	memcpy(got, dg->data, dg->data_len);
-	if (!read_memory(esc, frame, dg->ado, got, dg->data_len)) {
+	if (dg->ado + dg->data_len > ESC_REG_PROCESS_RAM) {
+		memcpy(room, dg->data, dg->data_len); /* RAM that is refused is left alone */
+	}
+	got = read_memory(esc, frame, dg->ado, room, dg->data_len);
+	if (got == NULL) {
 		return;
 	}
-	if (!is_broadcast) {
+	if (is_broadcast) {
+		or_bytes(dg->data, got, dg->data_len);
+	} else {
 		memcpy(dg->data, got, dg->data_len);
-	}
-	for (size_t i = 0; is_broadcast && i < dg->data_len; i++) {
-		dg->data[i] |= got[i];
 	}
 	add_wkc(dg, 1);
 }

@@ -10,10 +10,16 @@ enum { LOGICAL_BYTES_MAX = ECAT_DATAGRAM_MAX_BYTES };
 /* Registers can be mapped, too (mailbox status); so a read may do what reading a register does. */
 static int read_physical(struct esc *esc, int64_t t_ns, uint16_t addr, uint8_t *buf, size_t len)
 {
+	const uint8_t *reg;
+
 	if (addr >= ESC_REG_PROCESS_RAM) {
 		return esc_ram_read(esc, ESC_ECAT, addr, buf, len);
 	}
-	return esc_register_read(esc, ESC_ECAT, t_ns, addr, buf, len);
+	reg = esc_register_read(esc, ESC_ECAT, t_ns, addr, buf, len);
+	if (reg != NULL && reg != buf) {
+		memcpy(buf, reg, len);
+	}
+	return reg != NULL;
 }
 
 /* Of the registers an FMMU reaches the outputs only (our reading of the data sheet). */

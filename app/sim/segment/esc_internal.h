@@ -37,9 +37,10 @@ void esc_fmmu_access(struct esc *esc, const struct esc_frame *frame, struct ecat
 /* --- esc_register.c --- */
 
 void esc_register_layout(struct esc *esc);
-/** Registers; 1 if at least one byte exists (is writable by the master). */
-int esc_register_read(struct esc *esc, enum esc_side side, int64_t t_ns, uint16_t addr,
-		      uint8_t *buf, size_t len);
+/** What was read: the registers themselves, or @buf, where some do not exist; NULL: none does. */
+const uint8_t *esc_register_read(struct esc *esc, enum esc_side side, int64_t t_ns, uint16_t addr,
+				 uint8_t *buf, size_t len);
+/** 1 if at least one byte is writable by the master. */
 int esc_register_write(struct esc *esc, const struct esc_frame *frame, uint16_t addr,
 		       const uint8_t *buf, size_t len);
 static inline int esc_touches(uint16_t addr, size_t len, unsigned reg, size_t reg_len)

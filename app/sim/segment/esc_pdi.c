@@ -56,6 +56,8 @@ static void acknowledge(struct esc *esc, uint16_t addr, size_t len)
 
 void esc_pdi_read(struct esc *esc, int64_t t_ns, uint16_t addr, void *buf, size_t len)
 {
+	const uint8_t *reg;
+
 	memset(buf, 0, len);
 	if (!esc->is_eeprom_loaded || len == 0) {
 		return;
@@ -68,7 +70,10 @@ void esc_pdi_read(struct esc *esc, int64_t t_ns, uint16_t addr, void *buf, size_
 	if ((size_t)addr + len > ESC_REG_PROCESS_RAM) {
 		len = (size_t)ESC_REG_PROCESS_RAM - addr;
 	}
-	esc_register_read(esc, ESC_PDI, t_ns, addr, buf, len);
+	reg = esc_register_read(esc, ESC_PDI, t_ns, addr, buf, len);
+	if (reg != NULL && reg != buf) {
+		memcpy(buf, reg, len);
+	}
 	acknowledge(esc, addr, len);
 }
 

@@ -104,22 +104,17 @@ static int copy_readable(const struct esc *esc, uint16_t addr, uint8_t *buf, siz
 	return any;
 }
 
-int esc_register_read(struct esc *esc, enum esc_side side, int64_t t_ns, uint16_t addr,
-		      uint8_t *buf, size_t len)
+const uint8_t *esc_register_read(struct esc *esc, enum esc_side side, int64_t t_ns, uint16_t addr,
+				 uint8_t *buf, size_t len)
 {
-	int any;
-
 	refresh(esc, side, t_ns, addr, len);
-	if (len <= BITS_AT_ONCE && esc_bits(esc->readable, addr, len)) {
-		memcpy(buf, esc->reg + addr, len);
-		any = len > 0;
-	} else {
-		any = copy_readable(esc, addr, buf, len);
-	}
 	if (side == ESC_ECAT) {
 		acknowledge_ecat(esc, addr, len);
 	}
-	return any;
+	if (len > 0 && len <= BITS_AT_ONCE && esc_bits(esc->readable, addr, len)) {
+		return esc->reg + addr;
+	}
+	return copy_readable(esc, addr, buf, len) ? buf : NULL;
 }
 
 /* --- writing --- */
