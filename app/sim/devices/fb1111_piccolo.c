@@ -54,19 +54,16 @@ static int64_t earlier(int64_t a, int64_t b)
 
 /* --- the HAL --- */
 
-static void hal_select(void *ctx)
+static uint32_t us_of(int64_t t_ns)
 {
-	pdi_spi_select(&((struct board *)ctx)->spi);
+	return (uint32_t)(t_ns / 1000);
 }
 
-static void hal_deselect(void *ctx)
+static uint32_t hal_access(void *ctx, uint8_t *address, uint16_t address_len, const uint8_t *out,
+			   uint8_t *in, uint16_t len)
 {
-	pdi_spi_deselect(&((struct board *)ctx)->spi);
-}
-
-static void hal_exchange(void *ctx, const uint8_t *out, uint8_t *in, uint16_t len)
-{
-	pdi_spi_exchange(&((struct board *)ctx)->spi, out, in, len);
+	return us_of(
+		pdi_spi_access(&((struct board *)ctx)->spi, address, address_len, out, in, len));
 }
 
 static int hal_eeprom_loaded(void *ctx)
@@ -161,7 +158,7 @@ static void hal_led(void *ctx, int on)
 
 static uint32_t hal_time_us(void *ctx)
 {
-	return (uint32_t)(((struct board *)ctx)->spi.now_ns / 1000);
+	return us_of(((struct board *)ctx)->spi.now_ns);
 }
 
 /*
@@ -177,9 +174,7 @@ static void start_firmware(struct board *b)
 {
 	const struct piccolo_hal hal = {
 		.ctx = b,
-		.spi_select = hal_select,
-		.spi_deselect = hal_deselect,
-		.spi_exchange = hal_exchange,
+		.spi_access = hal_access,
 		.eeprom_loaded = hal_eeprom_loaded,
 		.adc_start = hal_adc_start,
 		.adc_read = hal_adc_read,

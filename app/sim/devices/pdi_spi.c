@@ -12,7 +12,8 @@ enum spi_command {
 	SPI_WRITE = 4,
 	SPI_ADDRESS_EXTENSION = 6,
 	SPI_TERMINATION = 0xff,
-	ADDRESS_OCTETS = 2,
+	ADDRESS_OCTETS = 2, /* one more with the extension */
+	TIME_OCTETS = 8,
 };
 
 void pdi_spi_init(struct pdi_spi *spi, struct esc *esc, int64_t t_ns)
@@ -48,26 +49,32 @@ void pdi_spi_settle(struct pdi_spi *spi, int64_t t_ns)
 	}
 }
 
-static void post(struct pdi_spi *spi)
+static void post(struct pdi_spi *spi, uint16_t address, const uint8_t *data, size_t len)
 {
-	struct pdi_spi_write *w = &spi->write;
 	struct pdi_spi_write *slot;
 
-	if (w->len == 0) {
-		return;
-	}
 	if (spi->posted_count == PDI_SPI_POSTED) {
 		/* More than a real main loop does between two events: the oldest lands early. */
 		pdi_spi_settle(spi, pdi_spi_due_ns(spi));
 	}
 	slot = &spi->posted[(spi->posted_first + spi->posted_count) % PDI_SPI_POSTED];
 	slot->at_ns = spi->now_ns;
-	slot->address = w->address;
-	slot->len = w->len;
-	memcpy(slot->data, w->data, w->len);
+	slot->address = address;
+	slot->len = (uint8_t)len;
+	memcpy(slot->data, data, len);
 	spi->posted_count++;
-	w->address = (uint16_t)(w->address + w->len);
-	w->len = 0;
+}
+
+/* What has come of the write that is going on. */
+static void post_part(struct pdi_spi *spi)
+{
+	struct pdi_spi_write *w = &spi->write;
+
+	if (w->len > 0) {
+		post(spi, w->address, w->data, w->len);
+		w->address = (uint16_t)(w->address + w->len);
+		w->len = 0;
+	}
 }
 
 /* --- one access --- */
@@ -78,6 +85,7 @@ void pdi_spi_select(struct pdi_spi *spi)
 	esc_pdi_read_al_event(spi->esc, spi->now_ns, spi->al_event);
 	spi->is_broken = spi->is_selected;
 	spi->is_selected = 1;
+	spi->command = SPI_NOP;
 	spi->pos = 0;
 	spi->data_pos = 0;
 	spi->is_terminated = 0;
@@ -124,13 +132,15 @@ static uint8_t take_address(struct pdi_spi *spi, uint8_t out)
 }
 
 /* The 64-bit times are taken as a whole with their first octet (data sheet, 0x0910 and 0x0990). */
+static int is_time(uint16_t address)
+{
+	return address >= ESC_REG_DC_RECEIVE_TIME_PORT && address < ESC_REG_DC_SYNC1_CYCLE &&
+	       address % TIME_OCTETS == 0 && address != (ESC_REG_DC_SYNC0_STATUS & ~7);
+}
+
 static void latch(struct pdi_spi *spi)
 {
-	int is_time = spi->address >= ESC_REG_DC_RECEIVE_TIME_PORT &&
-		      spi->address < ESC_REG_DC_SYNC1_CYCLE && spi->address % 8 == 0 &&
-		      spi->address != (ESC_REG_DC_SYNC0_STATUS & ~7);
-
-	if (is_time) {
+	if (is_time(spi->address)) {
 		spi->latched_len = sizeof(spi->latched);
 		esc_pdi_read(spi->esc, spi->now_ns, spi->address, spi->latched,
 			     sizeof(spi->latched));
@@ -161,7 +171,7 @@ static uint8_t take_data(struct pdi_spi *spi, uint8_t out)
 	}
 	if (spi->command == SPI_WRITE) {
 		if (spi->write.len == PDI_SPI_BURST) {
-			post(spi);
+			post_part(spi);
 		}
 		spi->write.data[spi->write.len++] = out;
 	} else {
@@ -200,108 +210,13 @@ static uint8_t transfer(struct pdi_spi *spi, uint8_t out)
 	return in;
 }
 
-/* --- data in one piece, where that is the same as octet by octet --- */
-
-static size_t write_piece(struct pdi_spi *spi, const uint8_t *out, uint8_t *in, size_t len)
-{
-	struct pdi_spi_write *w = &spi->write;
-	size_t room;
-
-	if (w->len == PDI_SPI_BURST) {
-		post(spi);
-	}
-	room = (size_t)PDI_SPI_BURST - w->len;
-	len = len < room ? len : room;
-	memcpy(w->data + w->len, out, len);
-	w->len = (uint8_t)(w->len + len);
-	if (in != NULL) {
-		memset(in, 0, len);
-	}
-	clock_octets(spi, len);
-	return len;
-}
-
-/* RAM is the same at all octets, and the ESC's watchdog is fed by the last one. */
-static size_t read_piece(struct pdi_spi *spi, const uint8_t *out, uint8_t *in, size_t len)
-{
-	size_t n = spi->pos - spi->data_pos;
-	size_t address = spi->address + n;
-
-	if (in == NULL || spi->is_terminated || memchr(out, SPI_TERMINATION, len - 1) != NULL) {
-		return 0;
-	}
-	if (n == 0) {
-		latch(spi);
-	}
-	if (n + len > spi->latched_len &&
-	    (spi->latched_len > 0 || address < ESC_REG_PROCESS_RAM || address + len > UINT16_MAX)) {
-		return 0;
-	}
-	spi->is_terminated = out[len - 1] == SPI_TERMINATION;
-	clock_octets(spi, len - 1);
-	if (spi->latched_len > 0) {
-		memcpy(in, spi->latched + n, len);
-	} else {
-		esc_pdi_read(spi->esc, spi->now_ns, (uint16_t)address, in, len);
-	}
-	clock_octets(spi, 1);
-	return len;
-}
-
-/* The usual address, of three octets. */
-static size_t header_piece(struct pdi_spi *spi, const uint8_t *out, uint8_t *in)
-{
-	uint8_t last = out[2];
-
-	spi->header[0] = out[0];
-	spi->header[1] = out[1];
-	spi->header[2] = last;
-	spi->address = (uint16_t)(out[0] << 5 | out[1] >> 3 | (last >> 5) << 13);
-	spi->is_broken = (last & 3) != 0;
-	begin(spi, last >> 2 & 7u, ADDRESS_OCTETS + 1);
-	if (in != NULL) {
-		memcpy(in, spi->al_event, sizeof(spi->al_event));
-	}
-	clock_octets(spi, sizeof(spi->al_event));
-	return sizeof(spi->al_event);
-}
-
-/* How many octets were exchanged; 0: they have to go one by one. */
-static size_t exchange_piece(struct pdi_spi *spi, const uint8_t *out, uint8_t *in, size_t len)
-{
-	if (!spi->is_selected || spi->is_broken) {
-		return 0;
-	}
-	if (spi->pos == 0 && len >= sizeof(spi->header) && (out[1] & 7) == SPI_ADDRESS_EXTENSION) {
-		return header_piece(spi, out, in);
-	}
-	if (is_header(spi) || spi->pos < spi->data_pos) {
-		return 0;
-	}
-	switch (spi->command) {
-	case SPI_WRITE:
-		return write_piece(spi, out, in, len);
-	case SPI_READ:
-	case SPI_READ_WAIT_STATE:
-		return read_piece(spi, out, in, len);
-	default:
-		return 0;
-	}
-}
-
 void pdi_spi_exchange(struct pdi_spi *spi, const uint8_t *out, uint8_t *in, size_t len)
 {
-	size_t done;
+	for (size_t i = 0; i < len; i++) {
+		uint8_t got = transfer(spi, out[i]);
 
-	for (size_t i = 0; i < len; i += done) {
-		done = exchange_piece(spi, out + i, in != NULL ? in + i : NULL, len - i);
-		if (done == 0) {
-			uint8_t got = transfer(spi, out[i]);
-
-			if (in != NULL) {
-				in[i] = got;
-			}
-			done = 1;
+		if (in != NULL) {
+			in[i] = got;
 		}
 	}
 }
@@ -325,11 +240,81 @@ void pdi_spi_deselect(struct pdi_spi *spi)
 		if (spi->command == SPI_READ || spi->command == SPI_READ_WAIT_STATE) {
 			end_read(spi);
 		} else if (spi->command == SPI_WRITE) {
-			post(spi);
+			post_part(spi);
 		}
 	}
 	if (spi->is_selected && spi->is_broken && *errors < UINT8_MAX) {
 		(*errors)++;
 	}
 	spi->is_selected = 0;
+}
+
+/* --- an access as firmware makes them, where that is the same as octet by octet --- */
+
+/* Select and the three octets of the address, which are those of a whole access. */
+static int64_t begin_whole(struct pdi_spi *spi, uint8_t *address)
+{
+	pdi_spi_settle(spi, spi->now_ns);
+	esc_pdi_read_al_event(spi->esc, spi->now_ns, address);
+	clock_octets(spi, ADDRESS_OCTETS + 1);
+	return spi->now_ns;
+}
+
+/* RAM is the same at all octets, and the ESC's watchdog is fed by the last one. */
+static int can_read_whole(uint16_t address, const uint8_t *out, size_t len)
+{
+	int is_same = is_time(address) ? len <= TIME_OCTETS
+				       : len == 1 || (address >= ESC_REG_PROCESS_RAM &&
+						      address + len <= UINT16_MAX);
+
+	return is_same && out[len - 1] == SPI_TERMINATION &&
+	       memchr(out, SPI_TERMINATION, len - 1) == NULL;
+}
+
+static void read_whole(struct pdi_spi *spi, uint16_t address, uint8_t *in, size_t len)
+{
+	clock_octets(spi, 1);
+	if (is_time(address)) {
+		uint8_t time[TIME_OCTETS];
+
+		esc_pdi_read(spi->esc, spi->now_ns, address, time, sizeof(time));
+		memcpy(in, time, len);
+		clock_octets(spi, len);
+		return;
+	}
+	clock_octets(spi, len - 1);
+	esc_pdi_read(spi->esc, spi->now_ns, address, in, len);
+	clock_octets(spi, 1);
+}
+
+int64_t pdi_spi_access(struct pdi_spi *spi, uint8_t *address, size_t address_len,
+		       const uint8_t *out, uint8_t *in, size_t len)
+{
+	static const uint8_t wait_state = 0xff;
+	int is_usual = !spi->is_selected && address_len == ADDRESS_OCTETS + 1 && len > 0 &&
+		       (address[1] & 7) == SPI_ADDRESS_EXTENSION && (address[2] & 3) == 0;
+	unsigned command = is_usual ? address[2] >> 2 & 7u : SPI_NOP;
+	uint16_t start =
+		is_usual ? (uint16_t)(address[0] << 5 | address[1] >> 3 | (address[2] >> 5) << 13)
+			 : 0;
+	int64_t addressed_ns;
+
+	if (command == SPI_READ_WAIT_STATE && in != NULL && can_read_whole(start, out, len)) {
+		addressed_ns = begin_whole(spi, address);
+		read_whole(spi, start, in, len);
+		return addressed_ns;
+	}
+	if (command == SPI_WRITE && in == NULL && len <= PDI_SPI_BURST) {
+		addressed_ns = begin_whole(spi, address);
+		clock_octets(spi, len);
+		post(spi, start, out, len);
+		return addressed_ns;
+	}
+	pdi_spi_select(spi);
+	pdi_spi_exchange(spi, address, address, address_len);
+	addressed_ns = spi->now_ns;
+	pdi_spi_exchange(spi, &wait_state, NULL, in != NULL);
+	pdi_spi_exchange(spi, out, in, len);
+	pdi_spi_deselect(spi);
+	return addressed_ns;
 }

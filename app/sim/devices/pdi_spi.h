@@ -60,13 +60,17 @@ void pdi_spi_init(struct pdi_spi *spi, struct esc *esc, int64_t t_ns);
 void pdi_spi_idle_until(struct pdi_spi *spi, int64_t t_ns);
 
 void pdi_spi_select(struct pdi_spi *spi);
-/**
- * Octets out and in, one behind the other. @in may be @out, or NULL. What the ESC and the CPU see
- * is the same, to the ns, however they are divided into calls.
- */
+/** Octets out and in, one behind the other. @in may be @out, or NULL. */
 void pdi_spi_exchange(struct pdi_spi *spi, const uint8_t *out, uint8_t *in, size_t len);
 /** Ends the access. A breach of the protocol is counted in 0x030d. */
 void pdi_spi_deselect(struct pdi_spi *spi);
+
+/**
+ * A whole access: select, @address out and in at its place, one wait state on a read, @out and @in,
+ * deselect. @in may be @out; NULL: no read. Returns the CPU's time at the end of the address.
+ */
+int64_t pdi_spi_access(struct pdi_spi *spi, uint8_t *address, size_t address_len,
+		       const uint8_t *out, uint8_t *in, size_t len);
 
 /** When the oldest posted write is due; INT64_MAX: none. */
 int64_t pdi_spi_due_ns(const struct pdi_spi *spi);

@@ -13,14 +13,14 @@
 struct piccolo_hal {
 	void *ctx; /* handed back in every call */
 
-	/** Chip select of the ET1100 low, high. */
-	void (*spi_select)(void *ctx);
-	void (*spi_deselect)(void *ctx);
 	/**
-	 * Clock @len octets out and in, each MSB first, one behind the other. @in may be @out;
-	 * NULL: what comes in is not wanted.
+	 * One access to the ET1100, each octet MSB first, one behind the other: chip select low;
+	 * @address out, what comes in meanwhile into its place; on a read one 0xff, the wait state;
+	 * @len octets @out and @in; chip select high. @in may be @out; NULL: a write. Returns
+	 * time_us() at the end of the address.
 	 */
-	void (*spi_exchange)(void *ctx, const octet_t *out, octet_t *in, uint16_t len);
+	uint32_t (*spi_access)(void *ctx, octet_t *address, uint16_t address_len,
+			       const octet_t *out, octet_t *in, uint16_t len);
 	/** Level of EEPROM_LOADED: 0 means that the ET1100's PDI does not answer yet. */
 	int (*eeprom_loaded)(void *ctx);
 

@@ -10,10 +10,11 @@ enum spi_command {
 	SPI_ADDRESS_EXTENSION = 6 /* a third address octet follows */
 };
 
-enum { SPI_WAIT_STATE = 0xff, SPI_MORE = 0x00, SPI_LAST = 0xff };
+enum { SPI_MORE = 0x00, SPI_LAST = 0xff };
 
 /* The first two address octets bring 0x0220:0x0221 back. */
-static void begin(struct piccolo *p, uint16_t address, enum spi_command command)
+static void access(struct piccolo *p, uint16_t address, enum spi_command command,
+		   const octet_t *out, octet_t *in, uint16_t len)
 {
 	octet_t octets[3];
 
@@ -21,36 +22,27 @@ static void begin(struct piccolo *p, uint16_t address, enum spi_command command)
 	octets[1] = OCTET(((unsigned)address & 0x1fu) << 3 |
 			  (unsigned)(command == SPI_NOP ? SPI_NOP : SPI_ADDRESS_EXTENSION));
 	octets[2] = OCTET(((unsigned)address >> 13) << 5 | (unsigned)command << 2);
-	p->hal.spi_select(p->hal.ctx);
-	p->hal.spi_exchange(p->hal.ctx, octets, octets, command == SPI_NOP ? 2 : 3);
+	p->accessed_us =
+		p->hal.spi_access(p->hal.ctx, octets, command == SPI_NOP ? 2 : 3, out, in, len);
 	p->al_event = octets_get16(octets);
-	p->accessed_us = p->hal.time_us(p->hal.ctx);
 }
 
 /* The master's 0xff with the last octet keeps the ET1100 from fetching one more. */
 void piccolo_spi_read(struct piccolo *p, uint16_t address, octet_t *data, uint16_t len)
 {
-	static const octet_t wait_state[1] = { SPI_WAIT_STATE };
-
 	memset(data, SPI_MORE, len * sizeof(*data));
 	data[len - 1u] = SPI_LAST;
-	begin(p, address, SPI_READ_WAIT_STATE);
-	p->hal.spi_exchange(p->hal.ctx, wait_state, 0, 1);
-	p->hal.spi_exchange(p->hal.ctx, data, data, len);
-	p->hal.spi_deselect(p->hal.ctx);
+	access(p, address, SPI_READ_WAIT_STATE, data, data, len);
 }
 
 void piccolo_spi_write(struct piccolo *p, uint16_t address, const octet_t *data, uint16_t len)
 {
-	begin(p, address, SPI_WRITE);
-	p->hal.spi_exchange(p->hal.ctx, data, 0, len);
-	p->hal.spi_deselect(p->hal.ctx);
+	access(p, address, SPI_WRITE, data, 0, len);
 }
 
 void piccolo_spi_poll(struct piccolo *p)
 {
-	begin(p, 0, SPI_NOP);
-	p->hal.spi_deselect(p->hal.ctx);
+	access(p, 0, SPI_NOP, 0, 0, 0);
 }
 
 void piccolo_esc_read(struct piccolo *p, uint16_t address, octet_t *data, uint16_t len)

@@ -58,10 +58,8 @@ static void esc_write(struct board *b, uint16_t address, uint8_t value)
 
 /* --- SPI --- */
 
-static void spi_select(void *ctx)
+static void spi_select(struct board *b)
 {
-	struct board *b = ctx;
-
 	b->breaches.select += b->is_selected != 0;
 	b->breaches.before_loaded += !b->is_loaded;
 	b->breaches.unmasked += !b->is_masked && !b->is_in_isr;
@@ -75,10 +73,8 @@ static unsigned command(const struct board *b)
 	return b->pos > 1 && (b->header[1] & 7u) == 6u ? b->header[2] >> 2 & 7u : b->header[1] & 7u;
 }
 
-static void spi_deselect(void *ctx)
+static void spi_deselect(struct board *b)
 {
-	struct board *b = ctx;
-
 	b->breaches.select += !b->is_selected;
 	if (b->pos > 3 && command(b) == 3) {
 		b->breaches.termination += !b->is_last_out;
@@ -119,15 +115,29 @@ static uint8_t spi_transfer(struct board *b, uint8_t out)
 	return in;
 }
 
-static void spi_exchange(void *ctx, const uint8_t *out, uint8_t *in, uint16_t len)
+static void spi_exchange(struct board *b, const uint8_t *out, uint8_t *in, uint16_t len)
 {
 	for (unsigned i = 0; i < len; i++) {
-		uint8_t got = spi_transfer(ctx, out[i]);
+		uint8_t got = spi_transfer(b, out[i]);
 
 		if (in != NULL) {
 			in[i] = got;
 		}
 	}
+}
+
+static uint32_t spi_access(void *ctx, uint8_t *address, uint16_t address_len, const uint8_t *out,
+			   uint8_t *in, uint16_t len)
+{
+	static const uint8_t wait_state = 0xff;
+	struct board *b = ctx;
+
+	spi_select(b);
+	spi_exchange(b, address, address, address_len);
+	spi_exchange(b, &wait_state, NULL, in != NULL);
+	spi_exchange(b, out, in, len);
+	spi_deselect(b);
+	return b->us;
 }
 
 /* --- the rest of the board --- */
@@ -243,9 +253,7 @@ void board_init(struct board *b)
 {
 	const struct piccolo_hal hal = {
 		.ctx = b,
-		.spi_select = spi_select,
-		.spi_deselect = spi_deselect,
-		.spi_exchange = spi_exchange,
+		.spi_access = spi_access,
 		.eeprom_loaded = eeprom_loaded,
 		.adc_start = adc_start,
 		.adc_read = adc_read,

@@ -194,7 +194,7 @@ TEST(pdi_spi, a_dc_time_is_read_as_one_moment)
 	CHECK(time < UINT64_C(0x00ffffffffffffff));
 }
 
-/* --- in blocks, and octet by octet --- */
+/* --- whole accesses, and octet by octet --- */
 
 /* The master sets SyncManager 2 (written by it) and 3 (read by it) up. */
 static void add_sync_managers(struct pins *p)
@@ -217,14 +217,23 @@ static void add_sync_managers(struct pins *p)
 	CHECK_EQ(get_le16(dg.wkc), 1);
 }
 
+struct access {
+	uint8_t out[60];
+	size_t len;
+	size_t address_len;
+	int is_read; /* a wait state comes after the address */
+};
+
 /* An access as firmware makes them, and now and then one as it should not. */
-static size_t random_access(struct prng *prng, uint8_t *out, size_t room)
+static void random_access(struct prng *prng, struct access *a)
 {
 	static const uint16_t places[] = { 0x0120, 0x0220, 0x0910, 0x0990, 0x098e, 0x0440,
 					   0x0f80, 0x1000, 0x17ff, 0x1800, 0x1c00, 0x2ff8 };
 	unsigned place = places[prng_below(prng, sizeof(places) / sizeof(places[0]))];
 	unsigned command = prng_below(prng, 3) == 0 ? 4 : 3;
-	size_t len = 4 + (size_t)prng_below(prng, room - 4);
+	size_t len = 4 + (size_t)prng_below(prng, prng_below(prng, 2) ? 16 : sizeof(a->out) - 4);
+	uint8_t *out = a->out;
+	size_t least;
 
 	place += prng_below(prng, 4) == 0 ? (unsigned)prng_below(prng, 16) : 0;
 	command = prng_below(prng, 20) == 0 ? (unsigned)prng_below(prng, 8) : command;
@@ -234,66 +243,78 @@ static size_t random_access(struct prng *prng, uint8_t *out, size_t room)
 	for (size_t i = 3; i < len; i++) {
 		out[i] = (uint8_t)(command == 4 ? prng_below(prng, 256) : 0);
 	}
-	out[3] = command == 3 ? 0xff : out[3];
 	out[len - 1] = prng_below(prng, 10) != 0 ? 0xff : out[len - 1];
 	if (prng_below(prng, 20) == 0) {
 		out[prng_below(prng, len)] = 0xff;
 	}
-	return prng_below(prng, 20) == 0 ? (size_t)prng_below(prng, len) : len;
+	a->address_len = prng_below(prng, 20) == 0 ? 2 : 3;
+	a->is_read = (command == 3) != (prng_below(prng, 20) == 0);
+	if (a->is_read) {
+		out[a->address_len] = 0xff;
+	}
+	a->len = prng_below(prng, 20) == 0 ? (size_t)prng_below(prng, len) : len;
+	least = a->address_len + (a->is_read ? 1u : 0u);
+	a->len = a->len < least ? least : a->len;
 }
 
-static void exchange_in_parts(struct pins *p, struct prng *prng, const uint8_t *out, uint8_t *in,
-			      size_t len)
+/* Returns the time at the end of the address. */
+static int64_t exchange_octets(struct pins *p, const struct access *a, uint8_t *in)
 {
-	size_t part;
+	int64_t addressed_ns = p->spi.now_ns;
 
-	memcpy(in, out, len);
 	pdi_spi_select(&p->spi);
-	for (size_t i = 0; i < len; i += part) {
-		part = 1 + (size_t)prng_below(prng, len - i);
-		pdi_spi_exchange(&p->spi, in + i, in + i, part);
+	for (size_t i = 0; i < a->len; i++) {
+		pdi_spi_exchange(&p->spi, a->out + i, in + i, 1);
+		addressed_ns = i + 1 == a->address_len ? p->spi.now_ns : addressed_ns;
 	}
 	pdi_spi_deselect(&p->spi);
+	return addressed_ns;
 }
 
-static void exchange_octets(struct pins *p, const uint8_t *out, uint8_t *in, size_t len)
+/* As the firmware does it; what it gives as the wait state comes from the model. */
+static int64_t access_whole(struct pins *p, const struct access *a, uint8_t *in)
 {
-	pdi_spi_select(&p->spi);
-	for (size_t i = 0; i < len; i++) {
-		pdi_spi_exchange(&p->spi, out + i, in + i, 1);
+	size_t data = a->address_len + (a->is_read ? 1u : 0u);
+
+	memcpy(in, a->out, a->len);
+	if (a->is_read) {
+		in[a->address_len] = 0;
 	}
-	pdi_spi_deselect(&p->spi);
+	return pdi_spi_access(&p->spi, in, a->address_len, in + data, a->is_read ? in + data : NULL,
+			      a->len - data);
 }
 
-TEST(pdi_spi, blocks_are_the_same_as_octets_to_the_last_bit)
+TEST(pdi_spi, whole_accesses_are_the_same_as_octets_to_the_last_bit)
 {
-	static struct pins blocks;
+	static struct pins whole;
 	static struct pins single;
 	struct prng prng = { 3 };
 	uint64_t errors_seen = 0;
 
-	begin(&blocks);
-	add_sync_managers(&blocks);
-	single = blocks;
-	single.esc.sii = blocks.esc.sii; /* neither writes it */
+	begin(&whole);
+	add_sync_managers(&whole);
+	single = whole;
+	single.esc.sii = whole.esc.sii; /* neither writes it */
 	single.spi.esc = &single.esc;
 	for (unsigned n = 0; n < 20000; n++) {
-		uint8_t out[60];
-		uint8_t in[2][60];
-		size_t len = random_access(&prng, out, sizeof(out));
+		struct access a;
+		uint8_t in[2][sizeof(a.out)];
+		size_t data;
 
-		exchange_in_parts(&blocks, &prng, out, in[0], len);
-		exchange_octets(&single, out, in[1], len);
-		CHECK_MEM(in[0], in[1], len);
-		CHECK_EQ(blocks.spi.now_ns, single.spi.now_ns);
-		CHECK_EQ(blocks.spi.tenths, single.spi.tenths);
-		CHECK_EQ(blocks.spi.octets, single.spi.octets);
-		CHECK_EQ(pdi_spi_due_ns(&blocks.spi), pdi_spi_due_ns(&single.spi));
-		CHECK_EQ(errors(&blocks), errors(&single));
-		CHECK_MEM(&blocks.esc, &single.esc, sizeof(blocks.esc));
-		errors_seen += errors(&blocks) > 0;
-		blocks.esc.reg[ESC_REG_PDI_ERROR] = single.esc.reg[ESC_REG_PDI_ERROR] = 0;
+		random_access(&prng, &a);
+		CHECK_EQ(access_whole(&whole, &a, in[0]), exchange_octets(&single, &a, in[1]));
+		data = a.address_len + (a.is_read ? 1u : 0u);
+		CHECK_MEM(in[0], in[1], a.address_len);
+		CHECK_MEM(in[0] + data, a.is_read ? in[1] + data : a.out + data, a.len - data);
+		CHECK_EQ(whole.spi.now_ns, single.spi.now_ns);
+		CHECK_EQ(whole.spi.tenths, single.spi.tenths);
+		CHECK_EQ(whole.spi.octets, single.spi.octets);
+		CHECK_EQ(pdi_spi_due_ns(&whole.spi), pdi_spi_due_ns(&single.spi));
+		CHECK_EQ(errors(&whole), errors(&single));
+		CHECK_MEM(&whole.esc, &single.esc, sizeof(whole.esc));
+		errors_seen += errors(&whole) > 0;
+		whole.esc.reg[ESC_REG_PDI_ERROR] = single.esc.reg[ESC_REG_PDI_ERROR] = 0;
 	}
 	CHECK(errors_seen > 100);
-	CHECK(blocks.esc.sm[2].completed + blocks.esc.sm[3].completed > 100);
+	CHECK(whole.esc.sm[2].completed + whole.esc.sm[3].completed > 100);
 }
