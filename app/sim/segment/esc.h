@@ -114,10 +114,8 @@ struct esc_mailbox_fault {
 };
 
 struct esc_fmmu {
-	uint32_t logical_start;
-	uint16_t len;
-	uint8_t logical_start_bit;
-	uint8_t logical_end_bit;
+	int64_t first_bit; /* of the logical addresses */
+	int32_t bits;
 	uint16_t physical_start;
 	uint8_t physical_start_bit;
 	uint8_t type; /* 1 read, 2 write */

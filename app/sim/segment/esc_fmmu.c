@@ -40,43 +40,17 @@ struct overlap {
 	size_t bits;
 };
 
-/* As most are of a line's: by whole bytes. */
-static int is_elsewhere(const struct esc_fmmu *f, uint32_t start, size_t len)
-{
-	return f->logical_start >= (uint64_t)start + len ||
-	       start >= (uint64_t)f->logical_start + f->len;
-}
-
-static int overlaps_by_bits(const struct esc_fmmu *f, uint32_t start, size_t len,
-			    struct overlap *ret)
-{
-	uint64_t f_first = (uint64_t)f->logical_start * 8 + f->logical_start_bit;
-	uint64_t f_end = ((uint64_t)f->logical_start + f->len - 1) * 8 + f->logical_end_bit + 1u;
-	uint64_t d_first = (uint64_t)start * 8;
-	uint64_t d_end = d_first + len * 8;
-	uint64_t from = f_first > d_first ? f_first : d_first;
-	uint64_t to = f_end < d_end ? f_end : d_end;
-
-	if (from >= to) {
-		return 0;
-	}
-	*ret = (struct overlap){ .datagram_bit = (size_t)(from - d_first),
-				 .physical_bit = (size_t)(from - f_first) + f->physical_start_bit,
-				 .bits = (size_t)(to - from) };
-	return 1;
-}
-
 static int overlaps(const struct esc_fmmu *f, uint32_t start, size_t len, struct overlap *ret)
 {
-	uint32_t offset = f->logical_start - start;
+	int64_t first = f->first_bit - (int64_t)start * 8;
+	int64_t end = first + f->bits;
+	int64_t from = first > 0 ? first : 0;
+	int64_t to = end < (int64_t)len * 8 ? end : (int64_t)len * 8;
 
-	/* All of it is there, as usual. */
-	if (f->is_bytewise && f->logical_start >= start && offset + (size_t)f->len <= len) {
-		*ret = (struct overlap){ .datagram_bit = (size_t)offset * 8,
-					 .bits = (size_t)f->len * 8 };
-		return 1;
-	}
-	return overlaps_by_bits(f, start, len, ret);
+	*ret = (struct overlap){ .datagram_bit = (size_t)from,
+				 .physical_bit = (size_t)(from - first) + f->physical_start_bit,
+				 .bits = (size_t)(to - from) };
+	return from < to;
 }
 
 static uint16_t physical_address(const struct esc_fmmu *f, const struct overlap *o)
@@ -164,7 +138,7 @@ void esc_fmmu_access(struct esc *esc, const struct esc_frame *frame, struct ecat
 		const struct esc_fmmu *f = &esc->fmmu[esc_take_lowest(&left)];
 		struct overlap o;
 
-		if (is_elsewhere(f, start, dg->data_len) || !overlaps(f, start, dg->data_len, &o)) {
+		if (!overlaps(f, start, dg->data_len, &o)) {
 			continue;
 		}
 		if (is_write && (f->type & FMMU_WRITE)) {

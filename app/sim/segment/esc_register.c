@@ -220,23 +220,19 @@ static void configure_fmmu(struct esc *esc, unsigned n)
 	const uint8_t *r = &esc->reg[ESC_REG_FMMU + n * ESC_FMMU_BYTES];
 	struct esc_fmmu *f = &esc->fmmu[n];
 
-	f->logical_start = get_le32(r);
-	f->len = get_le16(r + 4);
-	f->logical_start_bit = r[6] & 7;
-	f->logical_end_bit = r[7] & 7;
+	f->first_bit = (int64_t)get_le32(r) * 8 + (r[6] & 7);
+	f->bits = get_le16(r + 4) * 8 - (r[6] & 7) - (7 - (r[7] & 7));
 	f->physical_start = get_le16(r + 8);
 	f->physical_start_bit = r[10] & 7;
 	f->type = r[11] & 3;
-	f->is_active = (r[12] & 1) && f->len > 0 &&
-		       (f->len > 1 || f->logical_end_bit >= f->logical_start_bit);
+	f->is_active = (r[12] & 1) && f->bits > 0;
 	esc->fmmu_active &= (uint16_t)~(1u << n);
 	esc->fmmu_writing &= (uint16_t)~(1u << n);
 	if (f->is_active) {
 		esc->fmmu_active |= (uint16_t)(1u << n);
 		esc->fmmu_writing |= (uint16_t)((f->type & FMMU_WRITE ? 1u : 0) << n);
 	}
-	f->is_bytewise =
-		f->logical_start_bit == 0 && f->logical_end_bit == 7 && f->physical_start_bit == 0;
+	f->is_bytewise = f->first_bit % 8 == 0 && f->bits % 8 == 0 && f->physical_start_bit == 0;
 }
 
 static void units_written(struct esc *esc, uint16_t addr, size_t len)
