@@ -92,6 +92,7 @@ struct esc_sm {
 	uint8_t newest;   /* buffered: last complete one */
 	uint8_t reader;   /* buffered: the one the reader has */
 	uint8_t activate; /* 0x0806 as last seen */
+	uint8_t marks;    /* of its status: what was completed last */
 };
 
 /* How the application's mailbox misbehaves; it looks here itself (devices/mailbox.c). */

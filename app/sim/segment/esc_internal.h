@@ -21,6 +21,8 @@ int esc_ram_write(struct esc *esc, enum esc_side side, int64_t t_ns, uint16_t ad
 		  const uint8_t *buf, size_t len);
 /** The SM registers of SM @n were written: take them over. */
 void esc_sm_configure(struct esc *esc, unsigned n, enum esc_side side);
+/** The status of the SMs at @addr, as it is now. */
+void esc_sm_to_registers(struct esc *esc, uint16_t addr, size_t len);
 /** The digital outputs at 0x0f00 were written up to before @end: what an SM over them does. */
 void esc_sm_outputs_written(struct esc *esc, int64_t t_ns, uint16_t addr, size_t len);
 /** The area of an active SM at @addr as it would be read back, for bits that a write leaves alone.

@@ -32,10 +32,9 @@ static unsigned number_of(const struct esc *esc, const struct esc_sm *sm)
 	return (unsigned)(sm - esc->sm);
 }
 
-static void show_status(struct esc *esc, const struct esc_sm *sm)
+static uint8_t status(const struct esc *esc, const struct esc_sm *sm)
 {
-	uint8_t *status = &esc->reg[ESC_REG_SM + number_of(esc, sm) * ESC_SM_BYTES + SM_STATUS];
-	uint8_t value = *status & (SM_STATUS_WRITTEN | SM_STATUS_READ);
+	uint8_t value = sm->marks;
 
 	if (sm->is_mailbox) {
 		value |= sm->is_full ? SM_STATUS_FULL : 0;
@@ -47,16 +46,22 @@ static void show_status(struct esc *esc, const struct esc_sm *sm)
 		value |= sm->is_reader_open ? SM_STATUS_READER_OPEN : 0;
 		value |= sm->is_writer_open ? SM_STATUS_WRITER_OPEN : 0;
 	}
-	*status = value;
+	return value;
+}
+
+void esc_sm_to_registers(struct esc *esc, uint16_t addr, size_t len)
+{
+	unsigned n = addr > ESC_REG_SM ? ((unsigned)addr - ESC_REG_SM) / ESC_SM_BYTES : 0;
+
+	for (; n < esc->features.sm_count && ESC_REG_SM + n * ESC_SM_BYTES < addr + len; n++) {
+		esc->reg[ESC_REG_SM + n * ESC_SM_BYTES + SM_STATUS] = status(esc, &esc->sm[n]);
+	}
 }
 
 /* Status bits 0 and 1 say what was completed last, until the other side begins. */
-static void mark_status(struct esc *esc, struct esc_sm *sm, uint8_t set, uint8_t clear)
+static void mark(struct esc_sm *sm, unsigned set, unsigned clear)
 {
-	uint8_t *status = &esc->reg[ESC_REG_SM + number_of(esc, sm) * ESC_SM_BYTES + SM_STATUS];
-
-	*status = (uint8_t)((*status & ~clear) | set);
-	show_status(esc, sm);
+	sm->marks = (uint8_t)((sm->marks & ~clear) | set);
 }
 
 /* --- events: one side's are set when the other has completed, and taken back when it begins --- */
@@ -97,7 +102,7 @@ static void reset(struct esc *esc, struct esc_sm *sm)
 	sm->reader = 2;
 	clear_event(esc, sm, ESC_PDI);
 	clear_event(esc, sm, ESC_ECAT);
-	mark_status(esc, sm, 0, SM_STATUS_WRITTEN | SM_STATUS_READ);
+	mark(sm, 0, SM_STATUS_WRITTEN | SM_STATUS_READ);
 }
 
 static size_t ram_end(const struct esc *esc)
@@ -162,7 +167,6 @@ void esc_sm_configure(struct esc *esc, unsigned n, enum esc_side side)
 	if (was_active && !sm->is_active && (sm->control & SM_WATCHDOG_TRIGGER)) {
 		esc_watchdog_stop(esc);
 	}
-	show_status(esc, sm);
 }
 
 /* --- buffers --- */
@@ -203,7 +207,7 @@ static int sm_read_whole(struct esc *esc, struct esc_sm *sm, enum esc_side side,
 	clear_event(esc, sm, side);
 	memcpy(buf, esc->ram + buffer_offset(sm, sm->reader), sm->len);
 	set_event(esc, sm, side);
-	mark_status(esc, sm, SM_STATUS_READ, SM_STATUS_WRITTEN);
+	mark(sm, SM_STATUS_READ, SM_STATUS_WRITTEN);
 	return 1;
 }
 
@@ -220,7 +224,7 @@ static int sm_read(struct esc *esc, struct esc_sm *sm, enum esc_side side, size_
 		sm->is_reader_open = 1;
 		sm->reader = !sm->is_mailbox && sm->has_data ? sm->newest : sm->reader;
 		clear_event(esc, sm, side);
-		mark_status(esc, sm, 0, SM_STATUS_WRITTEN);
+		mark(sm, 0, SM_STATUS_WRITTEN);
 	}
 	if (!sm->is_reader_open) {
 		return 0;
@@ -230,14 +234,12 @@ static int sm_read(struct esc *esc, struct esc_sm *sm, enum esc_side side, size_
 		sm->is_reader_open = 0;
 		sm->is_full = 0;
 		set_event(esc, sm, side);
-		mark_status(esc, sm, SM_STATUS_READ, 0);
+		mark(sm, SM_STATUS_READ, 0);
 	}
 	return 1;
 }
 
-/* @clear: of the status. */
-static void close_writer(struct esc *esc, struct esc_sm *sm, enum esc_side side, int64_t t_ns,
-			 uint8_t clear)
+static void close_writer(struct esc *esc, struct esc_sm *sm, enum esc_side side, int64_t t_ns)
 {
 	sm->is_writer_open = 0;
 	sm->is_full = sm->is_mailbox;
@@ -245,7 +247,7 @@ static void close_writer(struct esc *esc, struct esc_sm *sm, enum esc_side side,
 	sm->newest = sm->writer;
 	sm->has_data = 1;
 	set_event(esc, sm, side);
-	mark_status(esc, sm, SM_STATUS_WRITTEN, clear);
+	mark(sm, SM_STATUS_WRITTEN, 0);
 	if (side == ESC_ECAT && (sm->control & SM_WATCHDOG_TRIGGER)) {
 		esc_watchdog_trigger(esc, t_ns);
 	}
@@ -260,8 +262,6 @@ struct writer {
 static int sm_write(struct esc *esc, struct esc_sm *sm, const struct writer *by, size_t at,
 		    const uint8_t *buf, size_t len)
 {
-	uint8_t clear = 0;
-
 	if (sm->is_locked || !is_writer(sm, by->side) || (sm->is_mailbox && sm->is_full) ||
 	    (by->side == ESC_PDI && sm->is_mailbox && by->t_ns < esc->mailbox_stuck_until_ns)) {
 		return 0;
@@ -270,18 +270,14 @@ static int sm_write(struct esc *esc, struct esc_sm *sm, const struct writer *by,
 		sm->is_writer_open = 1;
 		sm->writer = sm->is_mailbox ? 0 : free_buffer(sm);
 		clear_event(esc, sm, by->side);
-		/* An area written as a whole is closed at once, which shows the status. */
-		clear = SM_STATUS_READ;
-		if (len < sm->len) {
-			mark_status(esc, sm, 0, clear);
-		}
+		mark(sm, 0, SM_STATUS_READ);
 	}
 	if (!sm->is_writer_open) {
 		return 0;
 	}
 	memcpy(esc->ram + buffer_offset(sm, sm->writer) + at, buf, len);
 	if (at + len == sm->len) {
-		close_writer(esc, sm, by->side, by->t_ns, clear);
+		close_writer(esc, sm, by->side, by->t_ns);
 	}
 	return 1;
 }
@@ -306,12 +302,15 @@ static struct esc_sm *sm_at(struct esc *esc, size_t addr, size_t *len)
 	return NULL;
 }
 
-/* The SM that has exactly this area, as process data are accessed; NULL: look at the pieces. */
+/* The SM that has exactly this area, as process data are accessed, whose SMs are the last; NULL:
+ * look at the pieces. */
 static struct esc_sm *sm_of(struct esc *esc, uint16_t addr, size_t len)
 {
-	for (unsigned left = esc->sm_apart; left != 0;) {
-		struct esc_sm *sm = &esc->sm[esc_take_lowest(&left)];
+	for (unsigned left = esc->sm_apart, n; left != 0; left &= ~(1u << n)) {
+		struct esc_sm *sm;
 
+		n = 31u - (unsigned)__builtin_clz(left);
+		sm = &esc->sm[n];
 		if (sm->start == addr) {
 			return sm->len == len ? sm : NULL;
 		}
@@ -319,16 +318,13 @@ static struct esc_sm *sm_of(struct esc *esc, uint16_t addr, size_t len)
 	return NULL;
 }
 
-int esc_ram_read(struct esc *esc, enum esc_side side, uint16_t addr, uint8_t *buf, size_t len)
+__attribute__((cold)) static int read_pieces(struct esc *esc, enum esc_side side, uint16_t addr,
+					     uint8_t *buf, size_t len)
 {
 	size_t end = ram_end(esc) < (size_t)addr + len ? ram_end(esc) : (size_t)addr + len;
-	struct esc_sm *whole = sm_of(esc, addr, len);
 	size_t piece;
 	int any = 0;
 
-	if (whole != NULL) {
-		return sm_read(esc, whole, side, 0, buf, len);
-	}
 	for (size_t at = addr; at < end; at += piece) {
 		struct esc_sm *sm;
 
@@ -344,31 +340,44 @@ int esc_ram_read(struct esc *esc, enum esc_side side, uint16_t addr, uint8_t *bu
 	return any;
 }
 
-int esc_ram_write(struct esc *esc, enum esc_side side, int64_t t_ns, uint16_t addr,
-		  const uint8_t *buf, size_t len)
+int esc_ram_read(struct esc *esc, enum esc_side side, uint16_t addr, uint8_t *buf, size_t len)
+{
+	struct esc_sm *whole = sm_of(esc, addr, len);
+
+	return whole != NULL ? sm_read(esc, whole, side, 0, buf, len)
+			     : read_pieces(esc, side, addr, buf, len);
+}
+
+__attribute__((cold)) static int write_pieces(struct esc *esc, const struct writer *by,
+					      uint16_t addr, const uint8_t *buf, size_t len)
 {
 	size_t end = ram_end(esc) < (size_t)addr + len ? ram_end(esc) : (size_t)addr + len;
-	struct writer by = { .side = side, .t_ns = t_ns };
-	struct esc_sm *whole = sm_of(esc, addr, len);
 	size_t piece;
 	int any = 0;
 
-	if (whole != NULL) {
-		return sm_write(esc, whole, &by, 0, buf, len);
-	}
 	for (size_t at = addr; at < end; at += piece) {
 		struct esc_sm *sm;
 
 		piece = end - at;
 		sm = sm_at(esc, at, &piece);
 		if (sm != NULL) {
-			any |= sm_write(esc, sm, &by, at - sm->start, buf + (at - addr), piece);
+			any |= sm_write(esc, sm, by, at - sm->start, buf + (at - addr), piece);
 		} else {
 			memcpy(esc->ram + (at - ESC_REG_PROCESS_RAM), buf + (at - addr), piece);
 			any = 1;
 		}
 	}
 	return any;
+}
+
+int esc_ram_write(struct esc *esc, enum esc_side side, int64_t t_ns, uint16_t addr,
+		  const uint8_t *buf, size_t len)
+{
+	const struct writer by = { .side = side, .t_ns = t_ns };
+	struct esc_sm *whole = sm_of(esc, addr, len);
+
+	return whole != NULL ? sm_write(esc, whole, &by, 0, buf, len)
+			     : write_pieces(esc, &by, addr, buf, len);
 }
 
 const uint8_t *esc_ram_last_written(struct esc *esc, uint16_t addr)
@@ -391,7 +400,7 @@ void esc_sm_outputs_written(struct esc *esc, int64_t t_ns, uint16_t addr, size_t
 		if (sm->is_active && sm->start >= ESC_REG_DIGITAL_OUTPUTS &&
 		    sm->start + sm->len <= ESC_REG_DIGITAL_OUTPUTS + 4 &&
 		    esc_touches(addr, len, sm->start + sm->len - 1u, 1)) {
-			mark_status(esc, sm, SM_STATUS_WRITTEN, 0);
+			mark(sm, SM_STATUS_WRITTEN, 0);
 			if (sm->control & SM_WATCHDOG_TRIGGER) {
 				esc_watchdog_trigger(esc, t_ns);
 			}

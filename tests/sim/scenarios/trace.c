@@ -13,6 +13,7 @@
 #include "devices/plant.h"
 #include "devices/wago_750_354.h"
 #include "harness/test.h"
+#include "segment/esc_internal.h"
 #include "sim/harness/virtual_master.h"
 #include "wire/esc_reg.h"
 
@@ -91,8 +92,9 @@ static void add_sync_managers(const struct esc *esc)
 
 /* Registers that are made when they are read (AL and ECAT events, DL status, the clock's) are left
  * out: what they are made of is not. */
-static void add_memory(const struct esc *esc)
+static void add_memory(struct esc *esc)
 {
+	esc_sm_to_registers(esc, ESC_REG_SM, ESC_LIMIT_SM * ESC_SM_BYTES);
 	add_bytes(CONTROLLERS, esc->reg + ESC_REG_DL_STATUS + 2,
 		  ESC_REG_ECAT_EVENT_REQUEST - ESC_REG_DL_STATUS - 2);
 	add_bytes(CONTROLLERS, esc->reg + ESC_REG_RX_ERROR_COUNTER,
@@ -101,7 +103,7 @@ static void add_memory(const struct esc *esc)
 	add_bytes(CONTROLLERS, esc->ram, sizeof(esc->ram));
 }
 
-static void add_controller(const struct esc *esc, int64_t now_ns)
+static void add_controller(struct esc *esc, int64_t now_ns)
 {
 	add(CONTROLLERS, (uint64_t)esc->al_event << 32 | esc->ecat_event);
 	add(CONTROLLERS, esc_system_time(esc, now_ns));
