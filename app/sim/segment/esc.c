@@ -228,58 +228,61 @@ static void do_read_write(struct esc *esc, const struct esc_frame *frame, struct
 	add_wkc(dg, 2 * write_memory(esc, frame, dg->ado, came, dg->data_len));
 }
 
-static int is_addressed(const struct esc *esc, const struct ecat_datagram *dg)
-{
-	uint16_t station = get_le16(esc->reg + ESC_REG_STATION_ADDRESS);
-	uint16_t alias = get_le16(esc->reg + ESC_REG_STATION_ALIAS);
-	int is_alias_on = esc->reg[ESC_REG_DL_CONTROL + 3] & 1;
+/* Auto-increment and broadcast addresses count the slaves they have passed. */
+static const struct command {
+	enum { TO_NOBODY, TO_POSITION, TO_STATION, TO_ALL } to;
+	enum { DOES_NOTHING, DOES_READ, DOES_WRITE, DOES_BOTH, DOES_LOGICAL, DOES_MULTIPLE } does;
+	int counts;
+} commands[] = {
+	[ECAT_CMD_APRD] = { TO_POSITION, DOES_READ, 1 },
+	[ECAT_CMD_APWR] = { TO_POSITION, DOES_WRITE, 1 },
+	[ECAT_CMD_APRW] = { TO_POSITION, DOES_BOTH, 1 },
+	[ECAT_CMD_FPRD] = { TO_STATION, DOES_READ, 0 },
+	[ECAT_CMD_FPWR] = { TO_STATION, DOES_WRITE, 0 },
+	[ECAT_CMD_FPRW] = { TO_STATION, DOES_BOTH, 0 },
+	[ECAT_CMD_BRD] = { TO_ALL, DOES_READ, 1 },
+	[ECAT_CMD_BWR] = { TO_ALL, DOES_WRITE, 1 },
+	[ECAT_CMD_BRW] = { TO_ALL, DOES_BOTH, 1 },
+	[ECAT_CMD_LRD] = { TO_ALL, DOES_LOGICAL, 0 },
+	[ECAT_CMD_LWR] = { TO_ALL, DOES_LOGICAL, 0 },
+	[ECAT_CMD_LRW] = { TO_ALL, DOES_LOGICAL, 0 },
+	[ECAT_CMD_ARMW] = { TO_POSITION, DOES_MULTIPLE, 1 },
+	[ECAT_CMD_FRMW] = { TO_STATION, DOES_MULTIPLE, 0 },
+};
 
-	switch ((enum ecat_cmd)dg->cmd) {
-	case ECAT_CMD_APRD:
-	case ECAT_CMD_APWR:
-	case ECAT_CMD_APRW:
-	case ECAT_CMD_ARMW:
-		return dg->adp == 0;
-	case ECAT_CMD_FPRD:
-	case ECAT_CMD_FPWR:
-	case ECAT_CMD_FPRW:
-	case ECAT_CMD_FRMW:
-		return dg->adp == station || (is_alias_on && dg->adp == alias);
-	case ECAT_CMD_BRD:
-	case ECAT_CMD_BWR:
-	case ECAT_CMD_BRW:
-	case ECAT_CMD_LRD:
-	case ECAT_CMD_LWR:
-	case ECAT_CMD_LRW:
-		return 1;
-	case ECAT_CMD_NOP:
-		break;
+static int is_addressed(const struct esc *esc, const struct ecat_datagram *dg,
+			const struct command *command)
+{
+	if (command->to == TO_STATION) {
+		return dg->adp == get_le16(esc->reg + ESC_REG_STATION_ADDRESS) ||
+		       ((esc->reg[ESC_REG_DL_CONTROL + 3] & 1) &&
+			dg->adp == get_le16(esc->reg + ESC_REG_STATION_ALIAS));
 	}
-	return 0;
+	return command->to == TO_ALL || (command->to == TO_POSITION && dg->adp == 0);
 }
 
-/* Auto-increment and broadcast addresses count the slaves they have passed. */
-static void increment_address(struct ecat_datagram *dg)
+static void execute(struct esc *esc, const struct esc_frame *frame, struct ecat_datagram *dg,
+		    const struct command *command)
 {
-	switch ((enum ecat_cmd)dg->cmd) {
-	case ECAT_CMD_APRD:
-	case ECAT_CMD_APWR:
-	case ECAT_CMD_APRW:
-	case ECAT_CMD_ARMW:
-	case ECAT_CMD_BRD:
-	case ECAT_CMD_BWR:
-	case ECAT_CMD_BRW:
-		dg->adp++;
-		put_le16(dg->data - ECAT_DATAGRAM_HEADER_BYTES + 2, dg->adp);
+	int is_broadcast = command->to == TO_ALL;
+
+	switch (command->does) {
+	case DOES_NOTHING:
 		break;
-	case ECAT_CMD_NOP:
-	case ECAT_CMD_FPRD:
-	case ECAT_CMD_FPWR:
-	case ECAT_CMD_FPRW:
-	case ECAT_CMD_FRMW:
-	case ECAT_CMD_LRD:
-	case ECAT_CMD_LWR:
-	case ECAT_CMD_LRW:
+	case DOES_READ:
+		do_read(esc, frame, dg, is_broadcast);
+		break;
+	case DOES_WRITE:
+		do_write(esc, frame, dg);
+		break;
+	case DOES_BOTH:
+		do_read_write(esc, frame, dg, is_broadcast);
+		break;
+	case DOES_LOGICAL:
+		esc_fmmu_access(esc, frame, dg);
+		break;
+	case DOES_MULTIPLE: /* one reads, and the others write */
+		do_read(esc, frame, dg, 0);
 		break;
 	}
 }
@@ -287,60 +290,34 @@ static void increment_address(struct ecat_datagram *dg)
 /* Pending ECAT events that 0x0200 lets through, of all slaves, come back with each datagram. */
 static void add_irq(const struct esc *esc, struct ecat_datagram *dg)
 {
-	uint16_t mask = get_le16(esc->reg + ESC_REG_ECAT_EVENT_MASK);
+	uint16_t event = (uint16_t)esc->ecat_event & get_le16(esc->reg + ESC_REG_ECAT_EVENT_MASK);
 
-	dg->irq |= (uint16_t)(esc->ecat_event & mask);
-	put_le16(dg->data - 2, dg->irq);
+	if (event != 0) {
+		dg->irq |= event;
+		put_le16(dg->data - 2, dg->irq);
+	}
 }
 
 void esc_datagram(struct esc *esc, const struct esc_frame *frame, struct ecat_datagram *dg)
 {
-	int addressed = is_addressed(esc, dg);
+	const struct command *command = &commands[ECAT_CMD_NOP];
 
 	if (dg->data_len > ECAT_DATAGRAM_MAX_BYTES) {
 		return;
 	}
-	add_irq(esc, dg);
-
-	switch ((enum ecat_cmd)dg->cmd) {
-	case ECAT_CMD_NOP:
-		return;
-	case ECAT_CMD_APRD:
-	case ECAT_CMD_FPRD:
-	case ECAT_CMD_BRD:
-		if (addressed) {
-			do_read(esc, frame, dg, dg->cmd == ECAT_CMD_BRD);
-		}
-		break;
-	case ECAT_CMD_APWR:
-	case ECAT_CMD_FPWR:
-	case ECAT_CMD_BWR:
-		if (addressed) {
-			do_write(esc, frame, dg);
-		}
-		break;
-	case ECAT_CMD_APRW:
-	case ECAT_CMD_FPRW:
-	case ECAT_CMD_BRW:
-		if (addressed) {
-			do_read_write(esc, frame, dg, dg->cmd == ECAT_CMD_BRW);
-		}
-		break;
-	case ECAT_CMD_LRD:
-	case ECAT_CMD_LWR:
-	case ECAT_CMD_LRW:
-		esc_fmmu_access(esc, frame, dg);
-		break;
-	case ECAT_CMD_ARMW:
-	case ECAT_CMD_FRMW:
-		if (addressed) {
-			do_read(esc, frame, dg, 0);
-		} else {
-			do_write(esc, frame, dg);
-		}
-		break;
+	if (dg->cmd < sizeof(commands) / sizeof(commands[0])) {
+		command = &commands[dg->cmd];
 	}
-	increment_address(dg);
+	add_irq(esc, dg);
+	if (is_addressed(esc, dg, command)) {
+		execute(esc, frame, dg, command);
+	} else if (command->does == DOES_MULTIPLE) {
+		do_write(esc, frame, dg);
+	}
+	if (command->counts) {
+		dg->adp++;
+		put_le16(dg->data - ECAT_DATAGRAM_HEADER_BYTES + 2, dg->adp);
+	}
 }
 
 /* --- its own events --- */
