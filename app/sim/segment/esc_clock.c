@@ -49,16 +49,18 @@ static int64_t when_passed(const struct esc_clock *c, __int128 left)
 {
 	__int128 speed = RATE_ONE + c->rate;
 	int64_t dt = (int64_t)(left >> RATE_BITS);
+	__int128 over = (__int128)dt * c->rate - (left & (RATE_ONE - 1)); /* dt * speed - left */
 	int64_t step;
 
 	do {
-		step = (int64_t)((left - dt * speed) >> RATE_BITS);
+		step = (int64_t)(-over >> RATE_BITS);
 		dt += step;
+		over += step * speed;
 	} while (step > 1 || step < -1);
-	while (dt * speed < left) {
+	for (; over < 0; over += speed) {
 		dt++;
 	}
-	while ((dt - 1) * speed >= left) {
+	for (; over >= speed; over -= speed) {
 		dt--;
 	}
 	return dt;
