@@ -41,9 +41,8 @@ lock_value()
 
 download()
 {
-	printf '%s==%s --hash=sha256:%s\n' "$package" "$version" "$sha256" > "$work/requirements.txt"
-	if ! "$python" -m pip download --quiet --no-deps --no-binary "$package" --require-hashes \
-		--dest "$work" --requirement "$work/requirements.txt" > "$work/pip.log" 2>&1; then
+	if ! "$python" "$here/fetch_archive.py" "$package" "$version" "$file" "$sha256" "$work" \
+		> "$work/pip.log" 2>&1; then
 		if grep -q 'DO NOT MATCH THE HASHES' "$work/pip.log"; then
 			die "$file: the package registry gave an archive with another SHA-256 than libgpiod.lock names"
 		fi

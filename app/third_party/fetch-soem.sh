@@ -51,13 +51,10 @@ wanted_stamp()
 	cat "$lock" "$here/fetch-soem.sh" "$patches"/*.patch 2>/dev/null | sha256sum | cut -d ' ' -f 1
 }
 
-# pip checks the hash before it runs anything of the archive. It then asks the package for its
-# metadata, which takes a few seconds and is of no use here; the archive itself is what we keep.
 download()
 {
-	printf '%s==%s --hash=sha256:%s\n' "$package" "$version" "$sha256" > "$work/requirements.txt"
-	if ! "$python" -m pip download --quiet --no-deps --no-binary "$package" --require-hashes \
-		--dest "$work" --requirement "$work/requirements.txt" > "$work/pip.log" 2>&1; then
+	if ! "$python" "$here/fetch_archive.py" "$package" "$version" "$file" "$sha256" "$work" \
+		> "$work/pip.log" 2>&1; then
 		if grep -q 'DO NOT MATCH THE HASHES' "$work/pip.log"; then
 			die "$file: the package registry gave an archive with another SHA-256 than soem.lock names"
 		fi

@@ -46,7 +46,7 @@ class Place:
             "soem/osal/osal.h": "\r\n",
             "soem/osal/linux/osal.c": "",
             "soem/oshw/win32/wpcap/pcap.h": "",
-            "setup.py": "",
+            "setup.py": "raise SystemExit('setup.py was run')\n",
         }
         with tarfile.open(self.archive, "w:gz") as archive:
             for name, text in files.items():
@@ -140,6 +140,17 @@ def test_a_registry_that_gives_another_archive_is_refused(place: Place) -> None:
     result = place.fetch(PIP_NO_INDEX="1", PIP_FIND_LINKS=str(shelf))
     expect_one_line(result, "another SHA-256")
     assert not place.target.exists()
+
+
+def test_the_archive_is_fetched_without_running_anything_of_it(place: Place) -> None:
+    # pip would ask setup.py for the metadata.
+    shelf = place.root / "shelf"
+    shelf.mkdir()
+    place.archive.rename(shelf / place.archive.name)
+    result = place.fetch(PIP_NO_INDEX="1", PIP_FIND_LINKS=str(shelf))
+    assert result.returncode == 0, result.stderr
+    assert (place.root / "cache/ecdaq" / place.archive.name).is_file()
+    assert (place.target / "soem/main.c").is_file()
 
 
 def test_an_unreachable_registry_is_reported(place: Place) -> None:
