@@ -186,14 +186,21 @@ help_help()
 	usage
 }
 
-prepare_build()
+# prepare_programs PURPOSE...: what `run` starts, and not the programs that hand data to servers.
+prepare_programs()
 {
 	need_packages build "$@"
 	want_packages dds ecdaq-dds
 	want_packages web ecdaq-web
+	need_sources
+}
+
+prepare_build()
+{
+	prefetch_packages build dds web stream uplink "$@"
+	prepare_programs "$@"
 	want_packages stream ecdaq-stream
 	want_packages uplink ecdaq-uplink
-	need_sources
 }
 
 # What the tests need on top of that.
@@ -241,14 +248,17 @@ do_test()
 do_run()
 {
 	"$root/app/tools/run-segment.sh" --check "$@"
-	prepare_build run
+	prefetch_packages build dds web run
+	prepare_programs run
 	build_flavour release programs
 	exec "$root/app/tools/run-segment.sh" "$@"
 }
 
 do_sim()
 {
-	prepare_build
+	prefetch_packages build
+	need_packages build
+	need_sources
 	build_flavour release programs
 	exec "$stage/bin/ecdaq-sim" "$@"
 }

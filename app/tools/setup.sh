@@ -174,6 +174,41 @@ report_missing()
 	exit 1
 }
 
+# update_lists: once, the first package that is missing needs it.
+update_lists()
+{
+	[ -z "${lists_are_new:-}" ] || return 0
+	run_step "reading Debian's package lists" "$apt_log" as_root apt-get update -q || return 1
+	lists_are_new=yes
+}
+
+# install_packages NAME...: output in $apt_log. CMake looks again for what it has not found.
+install_packages()
+{
+	update_lists && run_step "installing packages" "$apt_log" as_root env DEBIAN_FRONTEND=noninteractive \
+		apt-get install -q -y --no-install-recommends -o DPkg::Lock::Timeout=300 "$@" || return 1
+	rm -f "$root"/build/*/configured
+}
+
+# prefetch_packages PURPOSE...: what is missing, the optional included, in one go: each start of apt takes seconds.
+# Where that fails, need_packages and want_packages find out for which purpose, and say it.
+prefetch_packages()
+{
+	missing=$(missing_packages "$@")
+	if [ -z "$missing" ] || ! is_supported_debian; then
+		return 0
+	fi
+	if [ "$(id -u)" != 0 ] && ! command -v sudo > /dev/null 2>&1; then
+		return 0
+	fi
+	names=$(printf '%s\n' "$missing" | cut -f 1 | tr '\n' ' ')
+	note "installing $names"
+	apt_log=$(mktemp)
+	# shellcheck disable=SC2086 # a list of names
+	install_packages $names || note "apt-get cannot install all of them at once: one purpose after the other"
+	rm -f "$apt_log"
+}
+
 # need_packages PURPOSE...: install what is missing, or list it and exit.
 need_packages()
 {
@@ -188,9 +223,7 @@ need_packages()
 	note "installing $names"
 	apt_log=$(mktemp)
 	# shellcheck disable=SC2086 # a list of names
-	if ! { run_step "reading Debian's package lists" "$apt_log" as_root apt-get update -q &&
-		run_step "installing packages" "$apt_log" as_root env DEBIAN_FRONTEND=noninteractive \
-			apt-get install -q -y --no-install-recommends -o DPkg::Lock::Timeout=300 $names; }; then
+	if ! install_packages $names; then
 		tail -n 5 "$apt_log" >&2
 		rm -f "$apt_log"
 		report_missing "$missing" "apt-get failed (its last lines are above)"
@@ -243,16 +276,22 @@ make_venv()
 	touch "$venv/.complete"
 }
 
-# need_pip: sets PYTHON to one with pip, for an archive that is not in the cache.
+# need_pip: sets PYTHON to one with pip, for an archive that is not in the cache. Where the machine has no pip,
+# the wheel that ensurepip would install runs as it is, through a script in the cache.
 need_pip()
 {
-	PYTHON=$(find_python) || die "no Python 3.11 or newer with venv and ensurepip"
+	base_python=$(find_python) || die "no Python 3.11 or newer with venv and ensurepip"
+	PYTHON=$base_python
 	if ! "$PYTHON" -m pip --version > /dev/null 2>&1; then
+		wheel=$("$PYTHON" -c 'import ensurepip, glob, os, sysconfig
+own = os.path.join(os.path.dirname(ensurepip.__file__), "_bundled")
+print(*glob.glob(os.path.join(sysconfig.get_config_var("WHEEL_PKG_DIR") or own, "pip-*.whl"))[:1])')
 		mkdir -p "$cache"
-		[ -x "$cache/pip/bin/pip" ] ||
-			run_step "making a Python environment with pip" "$cache/venv.log" \
-				"$PYTHON" -m venv "$cache/pip" || die "cannot make $cache/pip (see $cache/venv.log)"
-		PYTHON=$cache/pip/bin/python
+		PYTHON=$cache/python-with-pip
+		printf '#!/bin/sh\nPYTHONPATH="%s" exec "%s" "$@"\n' "$wheel" "$base_python" > "$PYTHON.$$"
+		chmod +x "$PYTHON.$$"
+		mv "$PYTHON.$$" "$PYTHON"
+		"$PYTHON" -m pip --version > /dev/null 2>&1 || die "$base_python has no pip, and ensurepip none to install"
 	fi
 	export PYTHON
 }

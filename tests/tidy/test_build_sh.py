@@ -133,15 +133,45 @@ def test_a_wrong_call_is_reported_before_anything_is_installed_or_built(tmp_path
     assert not list(tmp_path.iterdir())
 
 
+def tools_without(folder: Path, *names: str) -> Path:
+    """A folder for PATH with what this machine has, but for @names."""
+    tools = folder / "bin"
+    tools.mkdir()
+    for place in ("/usr/bin", "/bin"):
+        for tool in Path(place).iterdir():
+            if tool.name not in names and not (tools / tool.name).is_symlink():
+                (tools / tool.name).symlink_to(tool)
+    return tools
+
+
+def test_the_package_lists_are_read_once_and_all_is_installed_at_once(tmp_path: Path) -> None:
+    if os.geteuid() != 0:
+        pytest.skip("not permitted: packages are installed as root")
+    tools = tools_without(tmp_path, "ninja", "idlc", "apt-get")
+    (tools / "apt-get").write_text(f'#!/bin/sh\necho "$*" >> {tmp_path}/calls\n')
+    (tools / "apt-get").chmod(0o755)
+    release = tmp_path / "os-release"
+    release.write_text("ID=debian\nVERSION_ID=12\n")
+    result = build_sh("build", PATH=str(tools), ECDAQ_OS_RELEASE=str(release))
+    assert result.returncode == 1
+    assert "still not found after installing" in result.stderr
+    calls = (tmp_path / "calls").read_text().splitlines()
+    assert [call.split()[0] for call in calls[:2]] == ["update", "install"]
+    assert {"ninja-build", "cyclonedds-tools"} <= set(calls[1].split())
+    assert sum(call.startswith("update") for call in calls) == 1
+
+
+def test_run_installs_nothing_that_only_other_programs_need() -> None:
+    text = (ROOT / "build.sh").read_text()
+    for function in ("prepare_programs", "do_run", "do_sim"):
+        body = text[text.index(f"{function}()\n") :]
+        assert not re.search(r"stream|uplink|prepare_build|need_venv", body[: body.index("\n}")])
+
+
 def test_where_nothing_can_be_installed_what_is_missing_is_listed_with_its_reason(
     tmp_path: Path,
 ) -> None:
-    tools = tmp_path / "bin"
-    tools.mkdir()
-    for folder in ("/usr/bin", "/bin"):
-        for tool in Path(folder).iterdir():
-            if tool.name not in ("ninja", "patch") and not (tools / tool.name).is_symlink():
-                (tools / tool.name).symlink_to(tool)
+    tools = tools_without(tmp_path, "ninja", "patch")
     release = tmp_path / "os-release"
     release.write_text("ID=other\n")
     result = build_sh("build", PATH=str(tools), ECDAQ_OS_RELEASE=str(release))
