@@ -19,7 +19,7 @@ usage: ./build.sh VERB [OPTION...]
   fuzz     search for inputs that break a parser
   lint     formatting, static analysis, shell and Python checks
   measure  measure on this machine and write the pages of app/doc/results/
-  bench    measure ecdaq beside other EtherCAT masters, and how fast virtual time is
+  bench    measure ecdaq beside other EtherCAT masters, how fast virtual time is, and the set-up
   clean    remove what was built
   deb      build Debian packages of the programs, for a PC or a board with Debian 12
   image    build the disk image of the SBC, or of the QEMU machine
@@ -38,6 +38,7 @@ environment of every verb:
   ECDAQ_SOEM_ARCHIVE  local copy of the archive in app/third_party/soem.lock (default: downloaded)
   ECDAQ_LIBGPIOD_ARCHIVE  local copy of the archive in app/third_party/libgpiod.lock
   PIP_*, pip.conf     pip's own configuration applies
+  ECDAQ_STEP_TIMES    file that gets a line "MILLISECONDS STEP" for each step of the set-up and the build
   ECDAQ_OS_RELEASE    file that identifies the system (default: /etc/os-release)
 USAGE
 }
@@ -315,6 +316,11 @@ do_bench()
 	esac
 	if python=$(find_python); then
 		"$python" "$root/app/tools/bench.py" --check "$@"
+	fi
+	if [ "$1" = setup ]; then
+		need_packages deb
+		need_venv
+		exec "$PYTHON" "$root/app/tools/bench.py" "$@"
 	fi
 	prepare_tests run
 	want_packages bench "what else is measured with"

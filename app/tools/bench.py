@@ -20,6 +20,12 @@ ROOT = Path(__file__).resolve().parents[2]
 SLAVES_MOST = 128  # what the loops have room for
 CYCLES_MOST = 50000  # what the sample ring holds
 CYCLES = {"peers": 4000, "sim": 20000}
+# Options of the other subjects.
+OTHERS = {
+    "peers": ("seeds", "before"),
+    "sim": ("rounds", "interface"),
+    "setup": ("slaves", "cycles", "rounds", "interface", "seeds", "before", "json"),
+}
 SLAVES = {"peers": [2, 16, 64], "sim": [2, 16, 64, 128]}
 
 HELP = """\
@@ -37,6 +43,13 @@ sim  how fast virtual time is
 Runs the whole master with simulated slaves on virtual time, seed by seed and many seeds on all
 cores at once, and writes app/doc/results/sim.md: virtual seconds in a second, instructions and
 processor time a cycle. About a minute.
+
+setup  from nothing to OP
+
+Runs `./build.sh run` and `./build.sh build` in a Debian 12 that has nothing of what they need,
+with an empty cache, and writes app/doc/results/setup.md: seconds until OP, step by step, and the
+times of the groups of tests and of the slowest ten as the last `./build.sh test` left them. As
+root; about 3 minutes; run it on an idle machine.
 
 cycle, record, dds  the same as `./build.sh measure` of these
 
@@ -73,8 +86,7 @@ def interface(text: str) -> str:
 
 
 def check_options(parser: Parser, options: argparse.Namespace) -> None:
-    others = ("seeds", "before") if options.what == "peers" else ("rounds", "interface")
-    for name in others:
+    for name in OTHERS[options.what]:
         if getattr(options, name) is not None:
             parser.error(f"--{name}: not an option of {options.what}")
     if options.before and not (options.before / "tests/cost/cost_virtual").exists():
@@ -83,17 +95,17 @@ def check_options(parser: Parser, options: argparse.Namespace) -> None:
         parser.error("--interface and --slaves exclude each other")
     if options.interface and os.geteuid() != 0:
         parser.error("--interface: only as root")
-    options.cycles = options.cycles or CYCLES[options.what]
+    options.cycles = options.cycles or CYCLES.get(options.what)
 
 
 def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
     parser = Parser(
         prog="./build.sh bench",
-        usage="./build.sh bench peers|sim [OPTION...], or cycle|record|dds",
+        usage="./build.sh bench peers|sim|setup [OPTION...], or cycle|record|dds",
         description=HELP,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("what", metavar="peers|sim", nargs="?", help="what to measure")
+    parser.add_argument("what", metavar="peers|sim|setup", nargs="?", help="what to measure")
     parser.add_argument(
         "--slaves",
         type=numbers,
@@ -128,8 +140,8 @@ def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
     # build.sh calls this before it prepares anything.
     parser.add_argument("--check", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args(arguments)
-    if options.what not in CYCLES:
-        there_are = "peers sim cycle record dds"  # the last three are not for this program
+    if options.what not in OTHERS:
+        there_are = "peers sim setup cycle record dds"  # the last three are not for this program
         parser.error(f"name what to measure: {there_are}" if options.what is None
                      else f"no subject '{options.what}'; there are: {there_are}")  # fmt: skip
     check_options(parser, options)
@@ -206,11 +218,30 @@ def measure_virtual(options: argparse.Namespace, arguments: Sequence[str]) -> in
     return 0
 
 
+def measure_setup(options: argparse.Namespace, arguments: Sequence[str]) -> int:
+    from bench import setup
+    from measure.page import NotMeasuredError, write_index, write_page
+    from measure.subjects import PAGES, SETUP
+
+    command = " ".join(["./build.sh bench", *arguments])
+    try:
+        subject = replace(SETUP, commands=(command,), measure=setup.lines_of)
+        page = write_page(ROOT, subject, options.page)
+    except NotMeasuredError as why:
+        print(f"build.sh: bench: {why}", file=sys.stderr)
+        return 1
+    if not options.page:
+        write_index(ROOT, PAGES)
+    print(f"setup: wrote {page}", flush=True)
+    return 0
+
+
 def main(arguments: Sequence[str]) -> int:
     options = parse_arguments(arguments)
     if options.check:
         return 0
-    return {"peers": measure, "sim": measure_virtual}[options.what](options, arguments)
+    whats = {"peers": measure, "sim": measure_virtual, "setup": measure_setup}
+    return whats[options.what](options, arguments)
 
 
 if __name__ == "__main__":

@@ -55,10 +55,11 @@ interrupt_step()
 
 # run_step TEXT LOG COMMAND...: runs a command with its output in LOG and shows progress; returns its
 # exit code. The command has a process group of its own (but for sudo, which asks the terminal), so
-# that a signal to this shell ends all of it.
+# that a signal to this shell ends all of it. $ECDAQ_STEP_TIMES, if set, gets a line "MILLISECONDS TEXT".
 run_step()
 {
 	text=$1 log=$2 status=0
+	step_start_ms=$(date +%s%3N)
 	shift 2
 	if [ "$1" = as_root ]; then
 		"$@" > "$log" 2>&1 &
@@ -77,6 +78,8 @@ run_step()
 	wait "$reporter" 2> /dev/null || true
 	trap - INT TERM HUP
 	[ ! -t 2 ] || printf '\r\033[K' >&2
+	[ -z "${ECDAQ_STEP_TIMES:-}" ] ||
+		printf '%s\n' "$(($(date +%s%3N) - step_start_ms)) $text" >> "$ECDAQ_STEP_TIMES"
 	return "$status"
 }
 

@@ -23,6 +23,7 @@ from bench.figures import (
 )
 from bench.page import wrapped
 from bench.running import Load
+from bench.setup import Times, read_steps, table
 
 PERIOD_NS = 1_000_000
 
@@ -139,3 +140,12 @@ def test_others_and_stolen_time_disturb_a_round() -> None:
 def test_ratios_are_wrapped() -> None:
     lines = wrapped(["a" * 40, "b" * 40, "c" * 40])
     assert lines == [f"  {'a' * 40}, {'b' * 40}", f"  {'c' * 40}"]
+
+
+def test_steps_of_the_set_up_add_up_to_the_whole() -> None:
+    steps = read_steps(["1500 fetching soem", "30000 compiling release", "500 fetching soem"])
+    assert steps == {"fetching soem": 2.0, "compiling release": 30.0}
+    lines = table({"run": Times(steps, 33.0), "build": Times({"compiling release": 60.0}, 60.5)})
+    assert [line.split()[-2:] for line in lines] == [
+        ["run", "build"], ["2.0", "-"], ["30.0", "60.0"], ["1.0", "0.5"], ["33.0", "60.5"],
+    ]  # fmt: skip

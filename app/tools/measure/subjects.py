@@ -257,4 +257,7 @@ PEERS = Subject(
 SIM = Subject(
     "sim", "How fast virtual time is", ("./build.sh bench sim",), lambda _: [], verb="bench"
 )
-PAGES = (*ALL, PEERS, SIM)
+SETUP = Subject(
+    "setup", "From nothing to OP", ("./build.sh bench setup",), lambda _: [], verb="bench"
+)
+PAGES = (*ALL, PEERS, SIM, SETUP)
