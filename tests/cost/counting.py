@@ -30,6 +30,8 @@ class Count:
     inclusive: dict[str, int]
     # Of each function alone; of those shared with what is not counted: too much.
     own: dict[str, int]
+    # How often each function was called, in the whole run.
+    times: dict[str, int]
     # What the program printed.
     output: str
 
@@ -42,6 +44,7 @@ class Profile:
         # By caller and callee: cost of the calls.
         self.calls: dict[tuple[str, str], int] = {}
         self.total = 0
+        self.times: dict[str, int] = {}
         names: dict[str, str] = {}
         function = callee = ""
         for line in text.splitlines():
@@ -49,6 +52,8 @@ class Profile:
                 # Recursion and clones: 'name'2, name.part.0.
                 name = names.setdefault(match[2], re.split(r"[.']", match[3] or "")[0])
                 function, callee = (function, name) if match[1] else (name, "")
+            elif match := re.match(r"calls=(\d+) ", line):
+                self.times[callee] = self.times.get(callee, 0) + int(match[1])
             elif match := re.match(r"(?:totals|summary): (\d+)$", line):
                 self.total = max(self.total, int(match[1]))
             elif match := re.match(r"\d+ (\d+)$", line):
@@ -92,4 +97,4 @@ def count(program: str, *arguments: str | int) -> Count:
             raise RuntimeError(f"{' '.join(command)}: {run.returncode}\n{run.stdout}{run.stderr}")
         profile = Profile(file.read_text())
     aside = sum(cost for (_, callee), cost in profile.calls.items() if callee == "cost_aside")
-    return Count(profile.total - aside, profile.inclusive(), profile.own, run.stdout)
+    return Count(profile.total - aside, profile.inclusive(), profile.own, profile.times, run.stdout)

@@ -30,7 +30,7 @@ CHUNK_HEAD = 9 + 40
 PARTS = {
     "encode": ("layout_encode", "messages_encode_cycle"),
     "CRC-32": ("libdeflate_crc32",),
-    "index": ("mcap_chunk_index_build",),
+    "index": ("mcap_chunk_index_add", "mcap_chunk_index_finish"),
     "compress": ("ZSTD_compress2",),
 }
 

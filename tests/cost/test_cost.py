@@ -65,6 +65,20 @@ def test_the_cycle_stays_below_its_bound() -> None:
         assert costs[f"cycle {slaves} still"] <= 2500 + 40 * slaves
 
 
+def test_the_recorder_asks_the_rings_little() -> None:
+    """Five reads each step of five cycles: is there more, samples, are they whole, is there more, and
+    is there an event. Whether their producer lives it asks while no sample comes, and ten times a
+    second."""
+    counted, settled = 1000, 2000
+    times = count("record", 2, counted).times
+    cycles = counted + settled
+    reads = times.get("foreign_read", 0)
+    questions = times.get("ring_is_replaced", 0) + times.get("ring_is_orphaned", 0)
+    print(f"{reads} reads and {questions} questions of {cycles} cycles")
+    assert 0 < reads <= 5.2 * cycles / 5
+    assert questions <= 2 * cycles / 100
+
+
 def test_a_count_repeats_exactly() -> None:
     first, second = (count("cycle", 2, 64, "still").instructions for _ in range(2))
     assert first == second > 0

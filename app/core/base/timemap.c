@@ -63,12 +63,42 @@ static int by_number(const void *a, const void *b)
 	return (x > y) - (x < y);
 }
 
-static int by_real(const void *a, const void *b)
+/* The upper median of @n numbers, 1 or more, whose order is changed: Hoare's selection. A sort of
+ * all slopes would be a twelfth of the recorder's processor time. */
+static double median(double *v, size_t n)
 {
-	double x = *(const double *)a;
-	double y = *(const double *)b;
+	size_t low = 0;
+	size_t high = n - 1;
 
-	return (x > y) - (x < y);
+	while (low < high) {
+		double pivot = v[low + (high - low) / 2];
+		size_t i = low;
+		size_t j = high;
+
+		for (;;) {
+			double other;
+
+			while (v[i] < pivot) {
+				i++;
+			}
+			while (v[j] > pivot) {
+				j--;
+			}
+			if (i >= j) {
+				break;
+			}
+			other = v[i];
+			v[i++] = v[j];
+			v[j--] = other;
+		}
+		/* Up to j none is above the pivot, behind it none below. */
+		if (n / 2 <= j) {
+			high = j;
+		} else {
+			low = j + 1;
+		}
+	}
+	return v[n / 2];
 }
 
 static int by_offset(const void *a, const void *b)
@@ -171,8 +201,7 @@ static double fit_rate(struct timemap *map)
 	if (n == 0) {
 		return map->rate_fit;
 	}
-	qsort(map->slope, n, sizeof(map->slope[0]), by_real);
-	rate = map->slope[n / 2];
+	rate = median(map->slope, n);
 	map->rate_fit = rate > RATE_LIMIT ? RATE_LIMIT : rate < -RATE_LIMIT ? -RATE_LIMIT : rate;
 	return map->rate_fit;
 }

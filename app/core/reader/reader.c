@@ -16,7 +16,8 @@ struct reader {
 	char *path;
 	struct ring_reader *ring; /* NULL: none open */
 	struct channel_table *table;
-	int is_done; /* the open ring is not read any more: wait for another one */
+	int is_done;  /* the open ring is not read any more: wait for another one */
+	int has_news; /* samples were read since it was empty last: its producer lives */
 	int starts_at_newest;
 	int error;             /* as reader_error() has it */
 	char version_text[96]; /* reader_problem() of -EPROTONOSUPPORT */
@@ -109,6 +110,7 @@ static enum reader_result begin(struct reader *r)
 	ring_reader_destroy(r->ring);
 	r->ring = NULL;
 	r->is_done = 0;
+	r->has_news = 0;
 	r->error = ring_reader_open(r->path, &r->ring);
 	if (r->error < 0) {
 		return refuse(r);
@@ -153,8 +155,10 @@ enum reader_result reader_next(struct reader *r, uint64_t *ret_lost)
 		switch (ring_read(r->ring, r->payload, PAYLOAD_BYTES_MAX, ret_lost)) {
 		case RING_OK:
 			take_header(r);
+			r->has_news = 1;
 			return READER_SAMPLE;
 		case RING_LOST:
+			r->has_news = 1;
 			return READER_LOST;
 		case RING_CLOSED:
 			return end(r, 0);
@@ -166,7 +170,8 @@ enum reader_result reader_next(struct reader *r, uint64_t *ret_lost)
 		if (is_last) {
 			return end(r, -EPIPE);
 		}
-		if (!ring_is_replaced(r->ring) && !ring_is_orphaned(r->ring)) {
+		if (r->has_news || (!ring_is_replaced(r->ring) && !ring_is_orphaned(r->ring))) {
+			r->has_news = 0;
 			return READER_EMPTY;
 		}
 		/* Once more: what was pushed before the producer went is read. */

@@ -35,11 +35,12 @@ enum reader_start {
 };
 
 enum reader_result {
-	READER_SAMPLE,  /* the next sample: reader_header(), reader_image() */
-	READER_LOST,    /* too slow: *ret_lost samples were overwritten unread */
-	READER_EMPTY,   /* nothing new yet */
-	READER_BEGUN,   /* a session has begun: reader_table() */
-	READER_ENDED,   /* the session has ended and all of it was read; reader_error(): how */
+	READER_SAMPLE, /* the next sample: reader_header(), reader_image() */
+	READER_LOST,   /* too slow: *ret_lost samples were overwritten unread */
+	READER_EMPTY, /* nothing new yet; right after samples it is not asked whether more will come
+		       */
+	READER_BEGUN, /* a session has begun: reader_table() */
+	READER_ENDED, /* the session has ended and all of it was read; reader_error(): how */
 	READER_WAITING, /* no session yet, or no other one; reader_error(): why */
 };
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "record/mcap_chunk.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,12 +16,23 @@ enum {
 	INDEX_HEAD_BYTES = MCAP_HEAD_BYTES + 2 + 4 /* record head, channel, length of the array */
 };
 
+/* A message: where it is in the chunk. */
+struct entry {
+	uint64_t log_time_ns;
+	uint32_t offset;
+	uint16_t id;
+};
+
+static_assert(MCAP_LIMIT_RECORD_BYTES <= UINT32_MAX, "entry.offset");
+
 struct mcap_chunk_index {
 	struct mcap_chunk_channel *channel; /* those seen, ascending once built */
 	size_t channel_count;
 	size_t channel_capacity;
-	uint32_t *slot; /* by channel id: 1 + its place in channel[]; 0: not seen */
-	uint32_t *fill; /* by place: next free byte in bytes */
+	uint32_t *slot;      /* by channel id: 1 + its place in channel[]; 0: not seen */
+	uint32_t *fill;      /* by place: next free byte in bytes */
+	struct entry *entry; /* in the order of the chunk */
+	size_t entry_capacity;
 	struct mcap_buf bytes;
 	uint64_t start_ns;
 	uint64_t end_ns;
@@ -73,6 +85,7 @@ struct mcap_chunk_index *mcap_chunk_index_create(void)
 		free(ix);
 		return NULL;
 	}
+	mcap_chunk_index_clear(ix);
 	return ix;
 }
 
@@ -82,13 +95,14 @@ void mcap_chunk_index_destroy(struct mcap_chunk_index *ix)
 		return;
 	}
 	mcap_buf_done(&ix->bytes);
+	free(ix->entry);
 	free(ix->channel);
 	free(ix->fill);
 	free(ix->slot);
 	free(ix);
 }
 
-static void clear(struct mcap_chunk_index *ix)
+void mcap_chunk_index_clear(struct mcap_chunk_index *ix)
 {
 	for (size_t i = 0; i < ix->channel_count; i++) {
 		ix->slot[ix->channel[i].id] = 0;
@@ -133,33 +147,31 @@ static int is_sound(const struct mcap_inner *inner)
 	return mcap_parse_record(&item) == 0;
 }
 
-static int count_messages(struct mcap_chunk_index *ix, const uint8_t *records, size_t records_len)
+static int grow_entries(struct mcap_chunk_index *ix)
 {
-	struct mcap_inner inner;
-	size_t offset = 0;
-	int r;
+	size_t capacity = ix->entry_capacity * 2 + 256;
+	struct entry *entry = realloc(ix->entry, capacity * sizeof(ix->entry[0]));
 
-	while ((r = mcap_chunk_next(records, records_len, &offset, &inner)) > 0) {
-		uint16_t id;
-		uint64_t log_time_ns;
-
-		if (inner.opcode != MCAP_OP_MESSAGE) {
-			if (!is_sound(&inner)) {
-				return -EBADMSG;
-			}
-			continue;
-		}
-		id = get_le16(inner.content);
-		log_time_ns = get_le64(inner.content + 6);
-		if (ix->slot[id] == 0 && add_channel(ix, id) < 0) {
-			return -ENOMEM;
-		}
-		ix->channel[ix->slot[id] - 1].messages++;
-		ix->messages++;
-		ix->start_ns = log_time_ns < ix->start_ns ? log_time_ns : ix->start_ns;
-		ix->end_ns = log_time_ns > ix->end_ns ? log_time_ns : ix->end_ns;
+	if (entry == NULL) {
+		return -ENOMEM;
 	}
-	return r;
+	ix->entry = entry;
+	ix->entry_capacity = capacity;
+	return 0;
+}
+
+int mcap_chunk_index_add(struct mcap_chunk_index *ix, uint16_t id, uint64_t log_time_ns,
+			 size_t offset)
+{
+	if ((ix->messages == ix->entry_capacity && grow_entries(ix) < 0) ||
+	    (ix->slot[id] == 0 && add_channel(ix, id) < 0)) {
+		return -ENOMEM;
+	}
+	ix->entry[ix->messages++] = (struct entry){ log_time_ns, (uint32_t)offset, id };
+	ix->channel[ix->slot[id] - 1].messages++;
+	ix->start_ns = log_time_ns < ix->start_ns ? log_time_ns : ix->start_ns;
+	ix->end_ns = log_time_ns > ix->end_ns ? log_time_ns : ix->end_ns;
+	return 0;
 }
 
 static int by_id(const void *a, const void *b)
@@ -171,7 +183,9 @@ static int by_id(const void *a, const void *b)
 /* Heads of all index records, with room for their entries. */
 static void lay_out(struct mcap_chunk_index *ix)
 {
-	qsort(ix->channel, ix->channel_count, sizeof(ix->channel[0]), by_id);
+	if (ix->channel_count > 0) {
+		qsort(ix->channel, ix->channel_count, sizeof(ix->channel[0]), by_id);
+	}
 	for (size_t i = 0; i < ix->channel_count; i++) {
 		struct mcap_chunk_channel *ch = &ix->channel[i];
 		size_t start = ix->bytes.len;
@@ -188,39 +202,43 @@ static void lay_out(struct mcap_chunk_index *ix)
 	}
 }
 
+int mcap_chunk_index_finish(struct mcap_chunk_index *ix)
+{
+	mcap_buf_clear(&ix->bytes);
+	lay_out(ix);
+	if (ix->bytes.error < 0) {
+		return ix->bytes.error;
+	}
+	for (size_t i = 0; i < ix->messages; i++) {
+		const struct entry *entry = &ix->entry[i];
+		uint32_t *fill = &ix->fill[ix->slot[entry->id] - 1];
+
+		put_le64(ix->bytes.data + *fill, entry->log_time_ns);
+		put_le64(ix->bytes.data + *fill + 8, entry->offset);
+		*fill += ENTRY_BYTES;
+	}
+	return 0;
+}
+
 int mcap_chunk_index_build(struct mcap_chunk_index *ix, const uint8_t *records, size_t records_len)
 {
 	struct mcap_inner inner;
 	size_t offset = 0;
 	int r;
 
-	clear(ix);
-	r = count_messages(ix, records, records_len);
-	if (ix->messages == 0) {
-		ix->start_ns = 0;
-	}
-	if (r < 0) {
-		return r;
-	}
-	if (ix->channel_count == 0) {
-		return 0;
-	}
-	lay_out(ix);
-	if (ix->bytes.error < 0) {
-		return ix->bytes.error;
-	}
-	while (mcap_chunk_next(records, records_len, &offset, &inner) > 0) {
-		uint32_t *fill;
-
+	mcap_chunk_index_clear(ix);
+	while ((r = mcap_chunk_next(records, records_len, &offset, &inner)) > 0) {
 		if (inner.opcode != MCAP_OP_MESSAGE) {
-			continue;
+			r = is_sound(&inner) ? 0 : -EBADMSG;
+		} else {
+			r = mcap_chunk_index_add(ix, get_le16(inner.content),
+						 get_le64(inner.content + 6), inner.offset);
 		}
-		fill = &ix->fill[ix->slot[get_le16(inner.content)] - 1];
-		put_le64(ix->bytes.data + *fill, get_le64(inner.content + 6));
-		put_le64(ix->bytes.data + *fill + 8, inner.offset);
-		*fill += ENTRY_BYTES;
+		if (r < 0) {
+			return r;
+		}
 	}
-	return 0;
+	return r < 0 ? r : mcap_chunk_index_finish(ix);
 }
 
 const uint8_t *mcap_chunk_index_bytes(const struct mcap_chunk_index *ix, size_t *ret_len)
@@ -238,7 +256,7 @@ const struct mcap_chunk_channel *mcap_chunk_index_channels(const struct mcap_chu
 
 uint64_t mcap_chunk_index_start_ns(const struct mcap_chunk_index *ix)
 {
-	return ix->start_ns;
+	return ix->messages == 0 ? 0 : ix->start_ns;
 }
 
 uint64_t mcap_chunk_index_end_ns(const struct mcap_chunk_index *ix)
@@ -281,8 +299,8 @@ int64_t mcap_chunk_put(struct mcap_buf *out, const struct mcap_chunk_index *mess
 	size_t content_at;
 	int64_t content_len;
 
-	mcap_buf_u64(out, messages->start_ns);
-	mcap_buf_u64(out, messages->end_ns);
+	mcap_buf_u64(out, mcap_chunk_index_start_ns(messages));
+	mcap_buf_u64(out, mcap_chunk_index_end_ns(messages));
 	mcap_buf_u64(out, records_len);
 	mcap_buf_u32(out, libdeflate_crc32(0, records, records_len));
 	mcap_buf_string(out, zstd != NULL ? "zstd" : "");

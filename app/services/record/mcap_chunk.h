@@ -32,7 +32,16 @@ size_t mcap_chunk_content_len(size_t record_len, size_t compression_len);
 struct mcap_chunk_index *mcap_chunk_index_create(void);
 void mcap_chunk_index_destroy(struct mcap_chunk_index *ix);
 
-/** Count the messages of @records by channel. 0, -EBADMSG (a malformed record), -ENOMEM. */
+/** No message is in it, as after creation. */
+void mcap_chunk_index_clear(struct mcap_chunk_index *ix);
+/** The chunk has a message of channel @id at @offset, behind those added before. 0, -ENOMEM: it is
+ * not added. */
+int mcap_chunk_index_add(struct mcap_chunk_index *ix, uint16_t id, uint64_t log_time_ns,
+			 size_t offset);
+/** Build it of what was added; more may be added, and it be built again. 0, -ENOMEM. */
+int mcap_chunk_index_finish(struct mcap_chunk_index *ix);
+
+/** All three for the messages of @records. 0, -EBADMSG (a malformed record), -ENOMEM. */
 int mcap_chunk_index_build(struct mcap_chunk_index *ix, const uint8_t *records, size_t records_len);
 
 /** The message index records of what was built: channels in ascending order. */

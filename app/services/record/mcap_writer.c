@@ -222,6 +222,11 @@ int mcap_writer_message(struct mcap_writer *w, const struct mcap_message *m)
 		return -ENOBUFS;
 	}
 	at = repeat_definitions(w) == 0 ? mcap_buf_grow(&w->chunk, whole) : NULL;
+	if (at != NULL && mcap_chunk_index_add(w->messages, m->channel_id, m->log_time_ns,
+					       w->chunk.len - whole) < 0) {
+		w->chunk.len -= whole;
+		at = NULL;
+	}
 	if (at == NULL) {
 		w->chunk.error = 0; /* the messages in it are still good */
 		if (w->chunk.len == w->repeated_len) {
@@ -255,7 +260,7 @@ int mcap_writer_close_chunk(struct mcap_writer *w)
 	if (w->chunk.len == 0) {
 		return 0;
 	}
-	r = mcap_chunk_index_build(w->messages, w->chunk.data, w->chunk.len);
+	r = mcap_chunk_index_finish(w->messages);
 	if (r < 0) {
 		return r;
 	}
@@ -277,7 +282,9 @@ int mcap_writer_close_chunk(struct mcap_writer *w)
 		w->repeat_at = w->offset + (uint64_t)MCAP_REPEAT_FACTOR * w->repeated_len;
 		w->repeated_len = 0;
 	}
-	return mcap_index_chunk(&w->index, &place, w->messages);
+	r = mcap_index_chunk(&w->index, &place, w->messages);
+	mcap_chunk_index_clear(w->messages);
+	return r;
 }
 
 int mcap_writer_metadata(struct mcap_writer *w, const char *name, const struct mcap_pair *pairs,

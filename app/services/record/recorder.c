@@ -16,13 +16,14 @@
 #include "record/sample_feed.h"
 #include "record/sink.h"
 
-#define LOOK_NS (NS_PER_S / 10) /* for a ring, and between two looks at the status page */
+#define LOOK_NS (NS_PER_S / 10) /* for another ring, and between two looks at the status page */
 enum { EVENTS_A_STEP = 256, SAMPLES_A_STEP = 2048 };
 
 struct recorder {
 	struct recorder_options opt;
 	struct sink *sink;
 	struct feed *feed[SINK_RINGS];
+	int64_t opened_ns[SINK_RINGS]; /* looked for the ring last */
 	struct reader *reader;
 	struct sample_feed *samples; /* NULL: no session */
 	struct record_status *page;  /* shared, or own while there is no run directory */
@@ -44,6 +45,14 @@ __attribute__((format(printf, 2, 3))) static void say(const struct recorder *rec
 	rec->opt.report(rec->opt.report_ctx, line);
 }
 
+/* Look for the rings beside the samples at the next use, and not in some time. */
+static void look_for_feeds(struct recorder *rec)
+{
+	for (int i = 0; i < SINK_RINGS; i++) {
+		rec->opened_ns[i] = INT64_MIN / 2;
+	}
+}
+
 int recorder_create(const struct recorder_options *opt, struct recorder **ret_recorder, char *error,
 		    size_t error_bytes)
 {
@@ -58,6 +67,7 @@ int recorder_create(const struct recorder_options *opt, struct recorder **ret_re
 	rec->page = &rec->own;
 	rec->looked_ns = INT64_MIN / 2;
 	rec->told_ns = INT64_MIN / 2;
+	look_for_feeds(rec);
 	rec->feed[SINK_EVENTS] = feed_create(FEED_EVENTS, opt->events_path, FEED_AT_OLDEST);
 	rec->feed[SINK_SYNC0_EVENTS] =
 		feed_create(FEED_EVENTS, opt->sync0_events_path, FEED_AT_OLDEST);
@@ -163,9 +173,14 @@ const struct record_status *recorder_status(const struct recorder *rec)
 
 static struct feed *open_feed(struct recorder *rec, enum sink_ring which)
 {
-	struct feed_mark mark = sink_mark(rec->sink, which);
+	int64_t now = now_ns(rec);
 
-	(void)feed_open(rec->feed[which], &mark);
+	if (now - rec->opened_ns[which] >= LOOK_NS) {
+		struct feed_mark mark = sink_mark(rec->sink, which);
+
+		rec->opened_ns[which] = now;
+		(void)feed_open(rec->feed[which], &mark);
+	}
 	return rec->feed[which];
 }
 
@@ -216,6 +231,7 @@ static void look_for_session(struct recorder *rec)
 		reader_skip_session(rec->reader);
 		return;
 	}
+	look_for_feeds(rec);
 	say(rec, "recording session %" PRIu64 " to %s", sample_feed_number(rec->samples),
 	    rec->opt.dir);
 	if (sample_feed_missed_start(rec->samples) > 0) {
@@ -313,6 +329,7 @@ static int end_session(struct recorder *rec, const char *reason)
 {
 	int r;
 
+	look_for_feeds(rec);
 	while (take_events(rec, EVENTS_ALL) == EVENTS_A_STEP) {
 	}
 	take_sync0(rec);

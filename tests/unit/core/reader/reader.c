@@ -99,6 +99,7 @@ TEST(reader, a_ring_that_was_replaced_unclosed_is_read_to_its_end_first)
 	expect_sample(&b, 0);
 	begin(&b, 2, 16);
 	expect_sample(&b, 1);
+	expect(&b, READER_EMPTY); /* its samples have just shown that the process lives */
 	expect(&b, READER_ENDED);
 	CHECK_EQ(reader_error(b.reader), -EPIPE);
 	CHECK_STR(reader_error_to_str(-EPIPE), "its ecdaqd ended without closing it");
@@ -124,6 +125,7 @@ TEST(reader, a_session_ends_when_its_process_has_ended)
 	CHECK_EQ(waitpid(pid, &status, 0), pid);
 	expect(&b, READER_BEGUN);
 	expect_sample(&b, 0);
+	expect(&b, READER_EMPTY);
 	expect(&b, READER_ENDED);
 	CHECK_EQ(reader_error(b.reader), -EPIPE);
 	expect(&b, READER_WAITING);
