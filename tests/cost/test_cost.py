@@ -66,9 +66,9 @@ def test_the_cycle_stays_below_its_bound() -> None:
 
 
 def test_the_recorder_asks_the_rings_little() -> None:
-    """Five reads each step of five cycles: is there more, samples, are they whole, is there more, and
-    is there an event. Whether their producer lives it asks while no sample comes, and ten times a
-    second."""
+    """Five reads each step of five cycles: is there more, samples, are they whole, is there more,
+    and is there an event. Whether their producer lives it asks while no sample comes, and ten times
+    a second."""
     counted, settled = 1000, 2000
     times = count("record", 2, counted).times
     cycles = counted + settled
