@@ -15,6 +15,8 @@ import ecdaq
 import numpy as np
 import pandas
 import pytest
+from ecdaq.container import FormError
+from ecdaq.messages import TIME, Joined, join
 from made import (
     BIN,
     KIT,
@@ -382,3 +384,29 @@ def test_two_producers_in_one_folder_are_two_sessions(tmp_path: Path) -> None:
     folder = make(tmp_path / "records", ("--cycles", "10"))
     make(folder, ("--cycles", "10"))
     assert len(ecdaq.read(folder).gaps) == 1
+
+
+def test_parts_are_joined_as_they_come_alike_or_not() -> None:
+    alike = [
+        {TIME: np.arange(n, n + 700), "x": np.full(700, float(n))} for n in range(0, 2100, 700)
+    ]
+    other = {TIME: np.arange(2100, 2103), "x": np.array([1, 2, 3], np.int16)}
+    less = {TIME: np.arange(2103, 2104)}
+    for parts in (alike, [*alike, other], [*alike, other, less, *alike], [less, *alike]):
+        joined = Joined(0)
+        for part in parts:
+            joined.add(part)
+        found, expected = joined.columns(), join(parts)
+        assert found.keys() == expected.keys()
+        for name, values in expected.items():
+            assert found[name].dtype == values.dtype and found[name].tolist() == values.tolist()
+
+
+def test_a_record_that_is_cut_off_is_no_chunk(recorded: Callable[..., Path]) -> None:
+    (file,) = ecdaq.read(recorded("--cycles", "300"))._files
+    chunk = file.chunks[0]
+    record = file.source.read(chunk.offset, chunk.length)
+    assert len(file.read_chunk(chunk, record)) == chunk.size
+    for size in (0, 8, 40, chunk.content_at, len(record) - 1):
+        with pytest.raises(FormError, match="no chunk at byte"):
+            file.read_chunk(chunk, memoryview(record)[:size])

@@ -8,6 +8,7 @@ say, are taken one by one.
 
 from __future__ import annotations
 
+import functools
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -20,9 +21,10 @@ from ecdaq.definitions import Rows
 OP_MESSAGE = 0x05
 HEAD = struct.Struct("<BQH")  # opcode, length, channel
 RECORD_HEAD_BYTES = 9
+LAST_BYTES = 4
 TIME_OFFSET = HEAD.size + 4  # log time, after the sequence number
 DATA_OFFSET = RECORD_HEAD_BYTES + 22
-ROWS_AT_ONCE = 512
+ROWS_AT_ONCE = 1024
 # A cycle of more messages than this is taken message by message.
 PATTERN_RECORDS = 2048
 PATTERN_RECORDS_LEAST = 16
@@ -47,10 +49,22 @@ def record_bytes(pattern: Pattern) -> int:
     return sum(RECORD_HEAD_BYTES + length for _, length, _ in pattern)
 
 
+@functools.lru_cache(256)
+def heads_of(pattern: Pattern) -> list[tuple[int, np.uint64, np.uint32]]:
+    """Of each record its length, and the first eight and the last four of the eleven bytes of
+    opcode, length and channel."""
+    found = []
+    for opcode, length, channel in pattern:
+        head = HEAD.pack(opcode, length, channel)
+        numbers = (int.from_bytes(part, "little") for part in (head[:8], head[-LAST_BYTES:]))
+        found.append((length, np.uint64(next(numbers)), np.uint32(next(numbers))))
+    return found
+
+
 class Scanner:
     """Goes through the content of chunks."""
 
-    def __init__(self, data: bytes, usual: Pattern = ()) -> None:
+    def __init__(self, data: bytes | memoryview, usual: Pattern = ()) -> None:
         self.data = data
         self.octets = np.frombuffer(data, np.uint8)
         self.usual = usual  # the newest that was repeated
@@ -71,16 +85,17 @@ class Scanner:
     def repetitions(self, at: int, pattern: Pattern) -> int:
         """How often @pattern follows itself from @at on."""
         stride = record_bytes(pattern)
+        heads = heads_of(pattern)
         total = 0
         while (rows := min(ROWS_AT_ONCE, (len(self.data) - at) // stride)) > 0:
             same = np.ones(rows, bool)
             offset = at
-            for opcode, length, channel in pattern:
-                # The eleven bytes of opcode, length and channel, as two numbers.
-                head = HEAD.pack(opcode, length, channel)
-                for dtype, place in (("<u8", 0), ("<u4", HEAD.size - 4)):
-                    found = np.ndarray((rows,), dtype, self.octets, offset + place, (stride,))
-                    same &= found == np.frombuffer(head, dtype, 1, place)
+            for length, first, last in heads:
+                found = np.ndarray((rows,), "<u8", self.octets, offset, (stride,))
+                same &= found == first
+                place = offset + HEAD.size - LAST_BYTES
+                found = np.ndarray((rows,), "<u4", self.octets, place, (stride,))
+                same &= found == last
                 offset += RECORD_HEAD_BYTES + length
             count = rows if same.all() else int(same.argmin())
             total += count

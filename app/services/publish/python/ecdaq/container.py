@@ -22,8 +22,10 @@ MAGIC = b"\x89MCAP0\r\n"
 HEAD = struct.Struct("<BQ")  # opcode, length of the content
 FOOTER = struct.Struct("<QQI")
 CHUNK = struct.Struct("<QQQI")  # start, end, uncompressed size, CRC
+CHUNK_START = struct.Struct("<BQQQQ")  # with the record's head, up to the CRC
 CHUNK_INDEX = struct.Struct("<QQQQI")
 SIZES = struct.Struct("<QQ")
+COUNT = struct.Struct("<HQ")  # channel, messages
 STATISTICS = struct.Struct("<QHIIIIQQI")
 TAIL_BYTES = HEAD.size + FOOTER.size + len(MAGIC)
 OP_FOOTER, OP_SCHEMA, OP_CHANNEL, OP_CHUNK, OP_CHUNK_INDEX = 0x02, 0x03, 0x04, 0x06, 0x08
@@ -31,6 +33,11 @@ OP_STATISTICS, OP_METADATA, OP_METADATA_INDEX, OP_DATA_END, OP_LAST = 0x0B, 0x0C
 LIMIT_CHUNK_BYTES = 1 << 28
 # One read of chunks.
 READ_BYTES = 1 << 20
+
+
+Octets = bytes | memoryview
+# Compressed bytes and the size that they have decompressed, to these.
+Tool = Callable[[Octets, int], Octets]
 
 
 class FormError(Exception):
@@ -108,6 +115,21 @@ class Chunk:
     compression: str
     compressed: int
 
+    @property
+    def content_at(self) -> int:
+        """Where the content begins in the record."""
+        return HEAD.size + CHUNK.size + U32.size + len(self.compression) + U64.size
+
+    @property
+    def head(self) -> bytes:
+        """The record before the content, without the CRC."""
+        times = self.start_ns, self.end_ns, self.size
+        name = self.compression.encode("ascii", "replace")
+        return b"".join((
+            CHUNK_START.pack(OP_CHUNK, self.length - HEAD.size, *times),
+            U32.pack(len(name)), name, U64.pack(self.compressed),
+        ))  # fmt: skip
+
 
 @dataclass
 class Contents:
@@ -119,6 +141,7 @@ class Contents:
     chunks: list[Chunk] = field(default_factory=list)
     metadata: list[tuple[int, int, str]] = field(default_factory=list)  # offset, length, name
     counted: tuple[int, int, int, int] | None = None  # messages, chunks, first and last log time
+    of_topic: dict[int, int] = field(default_factory=dict)  # messages, as far as it is stated
 
     def define(self, opcode: int, content: bytes, is_final: bool) -> None:
         """Take a schema or channel; one that is there already is replaced if @is_final."""
@@ -150,7 +173,7 @@ def parse_chunk_index(content: bytes) -> Chunk:
     return Chunk(offset, length, start, end, size, compression, compressed)
 
 
-def parse_chunk_head(content: bytes, offset: int, length: int) -> tuple[Chunk, int, int]:
+def parse_chunk_head(content: Octets, offset: int, length: int) -> tuple[Chunk, int, int]:
     """The chunk, the CRC of its content, and where that begins in the record's own content."""
     try:
         start, end, size, crc = CHUNK.unpack_from(content)
@@ -161,11 +184,11 @@ def parse_chunk_head(content: bytes, offset: int, length: int) -> tuple[Chunk, i
     return Chunk(offset, length, start, end, size, compression, compressed), crc, at + U64.size
 
 
-def chunk_compression(content: bytes, at: int) -> tuple[str, int]:
+def chunk_compression(content: Octets, at: int) -> tuple[str, int]:
     """The name of a compression at @at, and where it ends."""
     (length,) = U32.unpack_from(content, at)
     end = at + U32.size + length
-    return content[at + U32.size : end].decode("ascii", "replace"), end
+    return bytes(content[at + U32.size : end]).decode("ascii", "replace"), end
 
 
 def records(data: bytes, start: int = 0) -> Iterator[tuple[int, bytes]]:
@@ -182,7 +205,7 @@ def records(data: bytes, start: int = 0) -> Iterator[tuple[int, bytes]]:
         at += length
 
 
-def decompressor(compression: str) -> Callable[[bytes, int], bytes]:
+def decompressor(compression: str) -> Tool:
     """A function of the compressed bytes and the size they must have. One for each thread."""
     if compression == "":
         return lambda data, _size: data
@@ -193,7 +216,7 @@ def decompressor(compression: str) -> Callable[[bytes, int], bytes]:
             raise MissingExtraError("zstandard", "zstd") from error
         tool = zstandard.ZstdDecompressor()
 
-        def from_zstd(data: bytes, size: int) -> bytes:
+        def from_zstd(data: Octets, size: int) -> Octets:
             try:
                 if zstandard.frame_content_size(data) not in (-1, size):
                     raise FormError("a chunk has another size than its head says")
@@ -208,7 +231,7 @@ def decompressor(compression: str) -> Callable[[bytes, int], bytes]:
         except ImportError as error:
             raise MissingExtraError("lz4", "lz4") from error
 
-        def from_lz4(data: bytes, size: int) -> bytes:
+        def from_lz4(data: Octets, size: int) -> Octets:
             try:
                 return lz4.frame.LZ4FrameDecompressor().decompress(data, size + 1)
             except (RuntimeError, EOFError) as error:
@@ -216,6 +239,20 @@ def decompressor(compression: str) -> Callable[[bytes, int], bytes]:
 
         return from_lz4
     raise FormError(f"compression {compression!r} is not supported")
+
+
+class Room:
+    """Memory for the content of chunks, used again and again: new memory costs more than what is
+    done in it."""
+
+    def __init__(self) -> None:
+        self._octets = memoryview(bytearray())
+
+    def of(self, count: int) -> memoryview:
+        """@count bytes, until the next call."""
+        if len(self._octets) < count:
+            self._octets = memoryview(bytearray(count))
+        return self._octets[:count]
 
 
 class Window:
@@ -293,8 +330,12 @@ class McapFile:
                 offset, length = fields.number(U64), fields.number(U64)
                 found.metadata.append((offset, length, fields.text()))
             elif opcode == OP_STATISTICS:
-                messages, _, _, _, _, chunks, first, last, _ = Fields(content).take(STATISTICS)
+                fields = Fields(content)
+                messages, _, _, _, _, chunks, first, last, length = fields.take(STATISTICS)
                 found.counted = messages, chunks, first, last
+                found.of_topic = dict(
+                    COUNT.iter_unpack(fields.octets(length - length % COUNT.size))
+                )
         if found.counted is None or found.counted[1] != len(found.chunk_records):
             raise FormError("the summary does not list all chunks")
         return found
@@ -324,7 +365,7 @@ class McapFile:
                 found.chunks.append(chunk)
             at = content + length
         for chunk in found.chunks[:1]:  # what is repeated in a chunk is covered by its CRC
-            data = self.read_chunk(chunk, self.source.read(chunk.offset, chunk.length))
+            data = bytes(self.read_chunk(chunk, self.source.read(chunk.offset, chunk.length)))
             for opcode, record in records(data):
                 if opcode in (OP_SCHEMA, OP_CHANNEL):
                     found.define(opcode, record, is_final=True)
@@ -342,15 +383,14 @@ class McapFile:
             raise self.fail(error) from error
         return sorted(found, key=lambda chunk: chunk.offset)
 
-    def read_chunk(
-        self, chunk: Chunk, record: bytes, tool: Callable[[bytes, int], bytes] | None = None
-    ) -> bytes:
+    def read_chunk(self, chunk: Chunk, record: Octets, tool: Tool | None = None) -> Octets:
         """The content of @chunk, whose @record has been read, decompressed and checked."""
-        opcode, length = HEAD.unpack_from(record)
-        head, crc, start = parse_chunk_head(record[HEAD.size :], chunk.offset, chunk.length)
-        start += HEAD.size
-        if opcode != OP_CHUNK or length + HEAD.size != len(record) or head != chunk:
+        start = chunk.content_at
+        head = bytes(record[:start])
+        is_same = head[: CHUNK_START.size] + head[CHUNK_START.size + U32.size :] == chunk.head
+        if not is_same or len(record) != start + chunk.compressed:
             raise FormError(f"no chunk at byte {chunk.offset} as the summary has it")
+        (crc,) = U32.unpack_from(head, CHUNK_START.size)
         if chunk.size > LIMIT_CHUNK_BYTES:
             raise FormError(f"a chunk of {chunk.size} bytes, {LIMIT_CHUNK_BYTES} are the limit")
         tool = tool or decompressor(chunk.compression)
@@ -371,24 +411,27 @@ class McapFile:
         if batch:
             yield batch
 
-    def read(self, batch: list[Chunk]) -> bytes:
-        """The content of the chunks of @batch, one after the other."""
+    def read(self, batch: list[Chunk], room: Room) -> memoryview:
+        """The content of the chunks of @batch, one after the other, in @room."""
         start = batch[0].offset
         end = batch[-1].offset + batch[-1].length
         data = memoryview(self.source.read(start, end - start))
-        tools: dict[str, Callable[[bytes, int], bytes]] = {}
-        parts = []
+        tools: dict[str, Tool] = {}
         try:
+            found = room.of(sum(min(chunk.size, LIMIT_CHUNK_BYTES) for chunk in batch))
+            at = 0
             for chunk in batch:
                 if chunk.compression not in tools:
                     tools[chunk.compression] = decompressor(chunk.compression)
-                record = bytes(data[chunk.offset - start :][: chunk.length])
+                record = data[chunk.offset - start :][: chunk.length]
                 if len(record) < HEAD.size:
                     raise FormError(f"no chunk at byte {chunk.offset}")
-                parts.append(self.read_chunk(chunk, record, tools[chunk.compression]))
+                content = self.read_chunk(chunk, record, tools[chunk.compression])
+                found[at : at + chunk.size] = content
+                at += chunk.size
         except FormError as error:
             raise self.fail(error) from error
-        return b"".join(parts)
+        return found
 
     def metadata(self, name: str) -> dict[str, str]:
         """The newest metadata record of this name; {} if there is none."""

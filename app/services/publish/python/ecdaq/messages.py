@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from ecdaq.blocks import Block, Pattern, Scanner
-from ecdaq.container import Chunk, FormError, McapFile, Topic
+from ecdaq.container import Chunk, FormError, McapFile, Room, Topic
 from ecdaq.definitions import Definition, DefinitionError, Layout
 from ecdaq.errors import RecordingError
 from ecdaq.sources import NAME, Source
@@ -20,6 +21,8 @@ from ecdaq.sources import NAME, Source
 TIME = "log_time_ns"
 # Fields of every slave's message that are not channels.
 COMMON = ("cycle", "dc_time_ns", "flags", "good")
+# Rows that room is made for at once.
+ROWS_LEAST, ROWS_MOST = 1024, 1 << 26
 LAYOUTS_KEPT = 16  # of one channel and size
 Columns = dict[str, np.ndarray]
 
@@ -46,10 +49,11 @@ class Channel:
     def value(self, raw: np.ndarray) -> np.ndarray:
         if self.is_integer:
             return raw
+        if (self.scale, self.offset) == (1, 0):
+            return raw.astype(np.float64, copy=False)
         found = raw.astype(np.float64)
-        if (self.scale, self.offset) != (1, 0):
-            found *= self.scale
-            found += self.offset
+        found *= self.scale
+        found += self.offset
         return found
 
 
@@ -152,13 +156,13 @@ class RecordedFile(McapFile):
         return definition.layout(block.rows.octets_of(0))
 
     def read_columns(
-        self, batch: list[Chunk], wanted: Mapping[int, Iterable[str] | None]
+        self, batch: list[Chunk], wanted: Mapping[int, Iterable[str] | None], room: Room
     ) -> dict[int, list[Columns]]:
         """Of the channels of @wanted their fields (None: all), with TIME, as far as they are in
-        @batch: parts in the order of the file."""
+        @batch: parts in the order of the file. @room: of this thread."""
         found: dict[int, list[Columns]] = {number: [] for number in wanted}
         try:
-            scanner = Scanner(self.read(batch), self._usual)
+            scanner = Scanner(self.read(batch, room), self._usual)
             for block in scanner.blocks():
                 if block.channel not in wanted:
                     continue
@@ -209,13 +213,65 @@ def join(parts: list[Columns]) -> Columns:
     return found
 
 
+class Joined:
+    """Parts put one behind the other while they come, each copied once."""
+
+    def __init__(self, expected: int) -> None:
+        self._room = min(max(expected, ROWS_LEAST), ROWS_MOST)
+        self._columns: Columns = {}
+        self._count = 0
+        self._parts: list[Columns] = []  # not alike: join() does it
+
+    def _is_alike(self, part: Columns) -> bool:
+        return part.keys() == self._columns.keys() and all(
+            (v.dtype, v.shape[1:]) == (self._columns[k].dtype, self._columns[k].shape[1:])
+            for k, v in part.items()
+        )
+
+    def add(self, part: Columns) -> None:
+        count = len(part[TIME])
+        if not self._columns and not self._parts:
+            self._columns = self._new(part)
+        if not self._parts and not self._is_alike(part):
+            self._parts = [self._taken()]
+        if self._parts:
+            self._parts.append(part)
+            return
+        if self._count + count > self._room:
+            self._room = max(2 * self._room, self._count + count)
+            old = self._taken()
+            self._columns = self._new(old)
+            for name, values in old.items():
+                self._columns[name][: self._count] = values
+        for name, values in part.items():
+            self._columns[name][self._count : self._count + count] = values
+        self._count += count
+
+    def _new(self, like: Columns) -> Columns:
+        return {k: np.empty((self._room, *v.shape[1:]), v.dtype) for k, v in like.items()}
+
+    def _taken(self) -> Columns:
+        return {name: values[: self._count] for name, values in self._columns.items()}
+
+    def columns(self) -> Columns:
+        return join(self._parts) if self._parts else self._taken()
+
+
 Task = tuple[RecordedFile, list[Chunk], Mapping[int, Iterable[str] | None]]
 
 
-def run(tasks: list[Task]) -> list[dict[int, list[Columns]]]:
+def run(tasks: list[Task]) -> Iterator[dict[int, list[Columns]]]:
     """read_columns() of all tasks, on all processors; results in the order of @tasks."""
+    local = threading.local()
+
+    def read(task: Task) -> dict[int, list[Columns]]:
+        if not hasattr(local, "room"):
+            local.room = Room()
+        return task[0].read_columns(task[1], task[2], local.room)
+
     workers = min(8, os.cpu_count() or 1, len(tasks))
     if workers < 2:
-        return [file.read_columns(batch, wanted) for file, batch, wanted in tasks]
+        yield from map(read, tasks)
+        return
     with ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(lambda task: task[0].read_columns(task[1], task[2]), tasks))
+        yield from pool.map(read, tasks)

@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 
 from ecdaq import export
-from ecdaq.container import Chunk
+from ecdaq.container import Chunk, Room
 from ecdaq.errors import RecordingError
-from ecdaq.messages import COMMON, TIME, Channel, Columns, RecordedFile, Task, join, run
+from ecdaq.messages import COMMON, TIME, Channel, Columns, Joined, RecordedFile, Task, join, run
 from ecdaq.sine import Signal
 from ecdaq.sources import find
 from ecdaq.table import Column, Gap, Limits, SessionRows, SlaveSamples, Table, build, clip
@@ -299,7 +299,7 @@ class Recording:
 
         def of_chunk(number: int) -> tuple[int, int]:
             if number not in known:
-                found = file.read_columns([file.chunks[number]], wanted)
+                found = file.read_columns([file.chunks[number]], wanted, Room())
                 values = [part[column] for parts in found.values() for part in parts]
                 # A chunk without samples: as the one before.
                 known[number] = (
@@ -325,17 +325,26 @@ class Recording:
 
     def _load(self) -> Table:
         by_file = list(self._tasks())
-        results = iter(run([task for _, tasks in by_file for task in tasks]))
-        by_session: dict[int, dict[str, list[Columns]]] = {}
+        expected: dict[tuple[int, str], int] = {}
+        for file, _ in by_file:
+            for number, count in file.contents.of_topic.items():
+                if (topic := file.contents.topics.get(number)) is not None:
+                    key = file.session, topic.metadata.get("slave", "")
+                    expected[key] = expected.get(key, 0) + count
+        results = run([task for _, tasks in by_file for task in tasks])
+        by_session: dict[int, dict[str, Joined]] = {}
         for file, tasks in by_file:
             slaves = by_session.setdefault(file.session, {})
             for found in itertools.islice(results, len(tasks)):
                 for number, parts in found.items():
                     slave = file.contents.topics[number].metadata["slave"]
-                    slaves.setdefault(slave, []).extend(self._values(file, slave, p) for p in parts)
+                    if parts and slave not in slaves:
+                        slaves[slave] = Joined(expected.get((file.session, slave), 0))
+                    for part in parts:
+                        slaves[slave].add(self._values(file, slave, part))
         sessions = []
         for session, slaves in by_session.items():
-            samples = [self._samples(slave, join(p)) for slave, p in slaves.items() if p]
+            samples = [self._samples(slave, joined.columns()) for slave, joined in slaves.items()]
             if samples:
                 sessions.append(SessionRows(session, samples))
         return clip(build(sessions, self.units), self._limits)
@@ -357,9 +366,16 @@ class Recording:
             raise RecordingError(self._files[0].name, f"{slave}: a cycle or time beyond 2**63")
         dc, good = columns.pop("dc_time_ns"), columns.pop("good")
         return SlaveSamples(
-            slave, cycle.astype(np.int64), utc.astype(np.int64), dc.astype(np.int64),
+            slave, signed(cycle), signed(utc), signed(dc),
             np.ones(len(good), bool) if self._raw else good, columns,
         )  # fmt: skip
+
+
+def signed(values: np.ndarray) -> np.ndarray:
+    """As int64, which all of them are known to fit in."""
+    return (
+        values.view(np.int64) if values.dtype == np.uint64 else values.astype(np.int64, copy=False)
+    )
 
 
 def first_index(count: int, is_past: Callable[[int], bool]) -> int:

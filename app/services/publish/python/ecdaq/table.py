@@ -257,7 +257,10 @@ def join_values(found: list[Column]) -> np.ndarray:
     kind = np.result_type(*known) if known else found[0].values.dtype if found else np.dtype(float)
     parts = [c.values.astype(kind, copy=False) for c in found]
     if kind.kind == "f":
-        parts = [np.where(c.valid, p, np.nan) for c, p in zip(found, parts, strict=True)]
+        parts = [
+            p if c.valid.all() else np.where(c.valid, p, np.nan)
+            for c, p in zip(found, parts, strict=True)
+        ]
     return concatenate(parts)
 
 
