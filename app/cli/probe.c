@@ -19,8 +19,10 @@
 #include <sys/socket.h>
 #include <sys/statfs.h>
 #include <sys/statvfs.h>
-#include <sys/timex.h>
 #include <unistd.h>
+
+#include "base/clock.h"
+#include "base/platform.h"
 
 static int path_of(const struct probe *p, char path[PROBE_PATH_BYTES], const char *format,
 		   va_list args) __attribute__((format(printf, 3, 0)));
@@ -289,15 +291,18 @@ static int call_addresses(const char *nic, char text[PROBE_TEXT_BYTES])
 
 static int call_clock(const char *object, char text[PROBE_TEXT_BYTES])
 {
-	struct timex tx = { .modes = 0 };
+	const struct platform platform = platform_posix();
+	struct clock_quality quality;
+	int r = platform.clock_quality(platform.ctx, &quality);
 
 	(void)object;
-	if (adjtimex(&tx) < 0) {
-		return -errno;
+	if (r < 0) {
+		return r;
 	}
 	snprintf(text, PROBE_TEXT_BYTES,
-		 "synchronised %d\nerror_us %ld\ntai_offset_s %d\nutc_s %" PRId64 "\n",
-		 (tx.status & STA_UNSYNC) == 0, tx.maxerror, tx.tai, (int64_t)tx.time.tv_sec);
+		 "synchronised %d\nerror_us %" PRId64 "\ntai_offset_s %d\nutc_s %" PRId64 "\n",
+		 quality.is_disciplined, quality.error_ns / 1000, quality.tai_offset_s,
+		 (platform.tai_ns(platform.ctx) - quality.tai_offset_s * NS_PER_S) / NS_PER_S);
 	return 0;
 }
 

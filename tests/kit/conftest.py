@@ -18,8 +18,10 @@ sys.path.insert(0, str(KIT))
 def recorded(tmp_path: Path) -> Callable[..., Path]:
     """Records what test_ring_producer makes of the options; the folder."""
 
-    def record(*options: str, settings: tuple[str, ...] = (), folder: str = "records") -> Path:
-        return make(tmp_path / folder, options, settings)
+    def record(
+        *options: str, settings: tuple[str, ...] = (), folder: str = "records", clock: str = ""
+    ) -> Path:
+        return make(tmp_path / folder, options, settings, clock)
 
     return record
 

@@ -9,7 +9,7 @@ import struct
 import subprocess
 import tempfile
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,13 +28,25 @@ PERIOD_NS = 1_000_000
 MAGIC = b"\x89MCAP0\r\n"
 
 
-def run(*command: str | Path) -> None:
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+def run(*command: str | Path, env: Mapping[str, str] = os.environ) -> None:
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=120, check=False, env=env
+    )
     assert done.returncode == 0, done.stderr
 
 
-def make(folder: Path, options: Sequence[str], settings: Sequence[str] = ()) -> Path:
-    """Record one session into @folder."""
+def clock_environment(clock: str) -> dict[str, str]:
+    """Of a program that finds @clock ("" as it is): see tests/cli/clock_quality.c."""
+    shim = PRODUCER.parent / "libtest_clock_quality.so"
+    return dict(os.environ) | (
+        {"LD_PRELOAD": str(shim), "ECDAQ_TEST_CLOCK": clock} if clock else {}
+    )
+
+
+def make(
+    folder: Path, options: Sequence[str], settings: Sequence[str] = (), clock: str = ""
+) -> Path:
+    """Record one session into @folder. @clock: of the host."""
     for program in (PRODUCER, BIN / "ecdaq-record"):
         if not program.exists():
             pytest.fail(f"{program} is not there: run ./build.sh build")
@@ -43,7 +55,8 @@ def make(folder: Path, options: Sequence[str], settings: Sequence[str] = ()) -> 
     try:
         run(PRODUCER, run_dir, *options)
         words = [w for s in ("record.reserve=0B", *settings) for w in ("--set", s)]
-        run(BIN / "ecdaq-record", "--run-dir", run_dir, "--dir", folder, "--once", *words)
+        command = [BIN / "ecdaq-record", "--run-dir", run_dir, "--dir", folder, "--once", *words]
+        run(*command, env=clock_environment(clock))
     finally:
         shutil.rmtree(run_dir)
     return folder

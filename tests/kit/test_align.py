@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
 import ecdaq
 import numpy as np
 import pytest
-from made import PERIOD_NS
+from ecdaq.clock import ClockAt, clock_of
+from made import BIN, PERIOD_NS, files
 
 TAI_NS = 1_900_000_000 * 10**9
 # The second appliance begins so much later: 1234 cycles and 0.4 of one.
@@ -19,9 +21,11 @@ CYCLES = 5000
 Make = Callable[..., Path]
 
 
-def of(recorded: Make, name: str, tai_ns: int, first: int, *more: str) -> ecdaq.Recording:
+def of(
+    recorded: Make, name: str, tai_ns: int, first: int, *more: str, clock: str = ""
+) -> ecdaq.Recording:
     words = ("--cycles", str(CYCLES), "--first", str(first), "--tai", str(tai_ns), *more)
-    return ecdaq.read(recorded(*words, folder=name))
+    return ecdaq.read(recorded(*words, folder=name, clock=clock))
 
 
 @pytest.fixture
@@ -88,3 +92,59 @@ def test_appliances_without_a_common_time_are_refused(recorded: Make) -> None:
         ecdaq.align({"left": left, "right": right})
     with pytest.raises(ValueError, match="two appliances"):
         ecdaq.align({"left": left})
+
+
+# As chrony leaves it, and as phc2sys does: error and estimate in us, TAI offset.
+CHRONY, PTP = "12000 800 0", "500 0 0"
+
+
+def test_the_error_of_both_hosts_clocks_is_in_the_stated_error(recorded: Make) -> None:
+    left = of(recorded, "left", TAI_NS, 1000, clock=CHRONY)
+    right = of(recorded, "right", TAI_NS + LATER_NS, 1, clock=PTP)
+    free = of(recorded, "free", TAI_NS + LATER_NS, 1, clock="unset")
+    assert (left.clock.error_ns, left.clock.estimate_ns) == (12_000_000, 800_000)
+    assert (right.clock.error_ns, right.clock.estimate_ns) == (500_000, 0)
+    assert left.clock.is_disciplined
+    assert left.clock.total_ns == left.clock.uncertainty_ns + 12_000_000 > 12_000_000
+    assert not free.clock.is_disciplined
+    assert (free.clock.error_ns, free.clock.estimate_ns, free.clock.total_ns) == (None, None, None)
+
+    aligned = ecdaq.align({"left": left, "right": right})
+    error_ns = aligned.error_ns["right"]
+    assert aligned.undisciplined == [] and "disciplines" not in repr(aligned)
+    assert (error_ns >= 12_500_000 + 30_000).all() and (error_ns < 13_500_000).all()
+
+    loose = ecdaq.align({"left": left, "free": free})
+    assert loose.undisciplined == ["free"]
+    assert loose.to_pandas().attrs["undisciplined"] == ["free"]
+    assert "free: nothing disciplines its clock" in repr(loose)
+    assert (loose.error_ns["free"] >= 12_030_000).all()
+    assert (loose.error_ns["free"] < 13_000_000).all()
+
+
+def test_a_recording_that_does_not_state_the_clock_is_taken_for_undisciplined() -> None:
+    messages = {
+        "log_time_ns": np.array([10, 20], np.uint64), "uncertainty_ns": np.array([5, 7]),
+        "tai_offset_s": np.array([37, 37]), "steps": np.array([0, 1]),
+    }  # fmt: skip
+    clock = clock_of(messages, "old.mcap")
+    assert clock == ecdaq.Clock(7, None, None, 37, 1)
+    messages["clock_error_ns"] = np.array([None, 3], object)
+    messages["clock_estimate_ns"] = np.array([2, 3])
+    assert clock_of(messages, "mixed.mcap") == ecdaq.Clock(7, None, 3, 37, 1)
+    at = ClockAt(messages, "mixed.mcap", np.array([9, 15, 21]))
+    assert at.is_disciplined.tolist() == [False, False, True]
+    assert at.error_ns.tolist() == [0, 3, 3] and at.uncertainty_ns.tolist() == [5, 7, 7]
+
+
+def info(path: Path) -> str:
+    words = [BIN / "ecdaq", "log", "info", path]
+    return subprocess.run(words, capture_output=True, text=True, check=True).stdout
+
+
+def test_the_clock_is_in_the_metadata_at_start_and_end(recorded: Make) -> None:
+    said = info(*files(recorded("--cycles", "300", clock=CHRONY)))
+    assert said.count("  clock_error_ns: 12000000\n") == 2
+    assert said.count("  clock: disciplined (chrony, linuxptp)") == 2
+    said = info(*files(recorded("--cycles", "300", folder="free", clock="unset")))
+    assert said.count("  clock: nothing disciplines the host's clock") == 2

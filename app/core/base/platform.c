@@ -38,23 +38,39 @@ static int posix_sleep_until(void *ctx, mono_t deadline)
 	return -r;
 }
 
+static int posix_clock_quality(void *ctx, struct clock_quality *ret)
+{
+	struct timex tx = { .modes = 0 };
+
+	(void)ctx;
+	if (adjtimex(&tx) < 0) {
+		return -errno;
+	}
+	*ret = (struct clock_quality){ .is_disciplined = (tx.status & STA_UNSYNC) == 0,
+				       .error_ns = (int64_t)tx.maxerror * 1000,
+				       .estimate_ns = (int64_t)tx.esterror * 1000,
+				       .tai_offset_s = tx.tai };
+	return 0;
+}
+
 struct platform platform_posix(void)
 {
 	return (struct platform){
 		.now = posix_now,
 		.tai_ns = posix_tai,
 		.sleep_until = posix_sleep_until,
+		.clock_quality = posix_clock_quality,
 		.ctx = NULL,
 	};
 }
 
 int platform_tai_offset_s(int32_t *ret_offset_s)
 {
-	struct timex tx = { .modes = 0 };
+	struct clock_quality quality;
+	int r = posix_clock_quality(NULL, &quality);
 
-	if (adjtimex(&tx) < 0) {
-		return -errno;
+	if (r == 0) {
+		*ret_offset_s = quality.tai_offset_s;
 	}
-	*ret_offset_s = tx.tai;
-	return 0;
+	return r;
 }

@@ -12,6 +12,15 @@
 
 #include "clock.h"
 
+/* What the kernel states of the host's clock (adjtimex), by what disciplines it: chrony, or ptp4l
+ * and phc2sys of linuxptp. */
+struct clock_quality {
+	int is_disciplined;   /* not STA_UNSYNC */
+	int64_t error_ns;     /* CLOCK_TAI is so far off at most (maxerror) */
+	int64_t estimate_ns;  /* probably (esterror) */
+	int32_t tai_offset_s; /* TAI - UTC; 0: nothing has set it and CLOCK_TAI equals UTC */
+};
+
 struct platform {
 	/** The monotonic clock. Context: any, RT-safe. */
 	mono_t (*now)(void *ctx);
@@ -22,6 +31,8 @@ struct platform {
 	 * In virtual time this advances the clock to @deadline plus a seeded wake latency.
 	 */
 	int (*sleep_until)(void *ctx, mono_t deadline);
+	/** 0 or -errno (ret untouched). NULL: not known. Context: any but the cycle. */
+	int (*clock_quality)(void *ctx, struct clock_quality *ret);
 	void *ctx;
 };
 

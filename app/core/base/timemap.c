@@ -45,6 +45,8 @@ struct timemap *timemap_create(int32_t tai_offset_s)
 
 	if (map != NULL) {
 		map->state.tai_offset_s = tai_offset_s;
+		map->state.clock_error_ns = -1;
+		map->state.clock_estimate_ns = -1;
 		map->tai_offset_next_s = tai_offset_s;
 	}
 	return map;

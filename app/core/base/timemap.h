@@ -25,6 +25,10 @@ struct timemap_state {
 				   host's error */
 	int64_t step_ns;        /* size of the newest step, positive: UTC jumped forward */
 	uint64_t steps;         /* times the map stepped */
+	/* Of the host's clock against UTC, at most and probably, as reader/utc.h was told; -1:
+	 * nothing disciplines it, or not known. */
+	int64_t clock_error_ns;
+	int64_t clock_estimate_ns;
 	int32_t tai_offset_s; /* TAI - UTC in use; 0: the kernel's is unset and CLOCK_TAI is UTC */
 };
 

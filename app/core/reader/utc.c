@@ -21,6 +21,8 @@ struct utc {
 	uint64_t period_ns;
 	enum time_base base;
 	int32_t tai_offset_s;
+	int64_t clock_error_ns; /* as in timemap_state */
+	int64_t clock_estimate_ns;
 	int has_reported;
 	int64_t reported_dc_ns;
 	uint64_t reported_steps;
@@ -35,6 +37,8 @@ struct utc *utc_create(const struct sample_meta *meta)
 	}
 	utc->period_ns = meta->period_ns;
 	utc->tai_offset_s = meta->tai_offset_s;
+	utc->clock_error_ns = -1;
+	utc->clock_estimate_ns = -1;
 	utc->map = timemap_create(meta->tai_offset_s);
 	if (utc->map == NULL) {
 		free(utc);
@@ -125,6 +129,8 @@ enum utc_change utc_changed(struct utc *utc, struct timemap_state *ret_state)
 	utc->has_reported = 1;
 	utc->reported_dc_ns = state.dc_ns;
 	utc->reported_steps = state.steps;
+	state.clock_error_ns = utc->clock_error_ns;
+	state.clock_estimate_ns = utc->clock_estimate_ns;
 	*ret_state = state;
 	return has_stepped ? UTC_STEPPED : UTC_UPDATED;
 }
@@ -138,6 +144,13 @@ void utc_note_tai_offset(struct utc *utc, int32_t tai_offset_s)
 {
 	utc->tai_offset_s = tai_offset_s;
 	timemap_note_tai_offset(utc->map, tai_offset_s);
+}
+
+void utc_note_clock(struct utc *utc, const struct clock_quality *quality)
+{
+	utc_note_tai_offset(utc, quality->tai_offset_s);
+	utc->clock_error_ns = quality->is_disciplined ? quality->error_ns : -1;
+	utc->clock_estimate_ns = quality->is_disciplined ? quality->estimate_ns : -1;
 }
 
 const char *utc_quality(const struct timemap_state *state)

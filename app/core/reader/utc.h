@@ -7,6 +7,7 @@
 #ifndef READER_UTC_H
 #define READER_UTC_H
 
+#include "base/platform.h"
 #include "base/sample.h"
 #include "base/timemap.h"
 
@@ -35,6 +36,9 @@ enum utc_change utc_changed(struct utc *utc, struct timemap_state *ret_state);
 int64_t utc_of_tai(const struct utc *utc, int64_t tai_ns);
 /** The kernel's TAI offset now (adjtimex). Call it about once a second. */
 void utc_note_tai_offset(struct utc *utc, int32_t tai_offset_s);
+
+/** What the kernel states of the host's clock now, its TAI offset too. Instead of the former. */
+void utc_note_clock(struct utc *utc, const struct clock_quality *quality);
 
 /** "tai"; "utc": the kernel's TAI offset is not set; "unset": the wall clock was never set. */
 const char *utc_quality(const struct timemap_state *state);

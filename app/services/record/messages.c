@@ -97,6 +97,11 @@ static const struct {
 					"number of steps so far" },
 				      { "int32", "long", "tai_offset_s",
 					"TAI minus UTC; 0: unset, CLOCK_TAI is taken for UTC" },
+				      { "int64", "long long", "clock_error_ns",
+					"of the host's clock against UTC at most; -1: nothing "
+					"disciplines it, or not known" },
+				      { "int64", "long long", "clock_estimate_ns",
+					"the same, probably" },
 			      } },
 	[MESSAGE_SYNC0] = { "/ecdaq/sync0",
 			    "Sync0",
@@ -294,6 +299,8 @@ size_t messages_encode_timemap(const struct timemap_state *s, uint8_t *buf)
 	cdr_put(&c, (uint64_t)s->step_ns, 8);
 	cdr_put(&c, s->steps, 8);
 	cdr_put(&c, (uint32_t)s->tai_offset_s, 4);
+	cdr_put(&c, (uint64_t)s->clock_error_ns, 8);
+	cdr_put(&c, (uint64_t)s->clock_estimate_ns, 8);
 	return c.len;
 }
 

@@ -216,6 +216,12 @@ static int put_timemap(struct mcap_writer *w, const char *name, const struct tim
 	add_signed(&n, "step_ns", s->step_ns);
 	add_unsigned(&n, "steps", s->steps);
 	add_signed(&n, "tai_offset_s", s->tai_offset_s);
+	add_signed(&n, "clock_error_ns", s->clock_error_ns);
+	add_signed(&n, "clock_estimate_ns", s->clock_estimate_ns);
+	add_text(&n, "clock",
+		 s->clock_error_ns < 0
+			 ? "nothing disciplines the host's clock: its error is not known"
+			 : "disciplined (chrony, linuxptp): at most clock_error_ns off UTC");
 	return mcap_writer_metadata(w, name, n.pair, n.count);
 }
 

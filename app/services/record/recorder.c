@@ -211,6 +211,17 @@ int recorder_ring_error(const struct recorder *rec)
 	}
 }
 
+static void note_clock(struct recorder *rec)
+{
+	const struct platform *platform = &rec->opt.platform;
+	struct clock_quality quality;
+
+	if (platform->clock_quality != NULL &&
+	    platform->clock_quality(platform->ctx, &quality) == 0) {
+		sample_feed_note_clock(rec->samples, &quality);
+	}
+}
+
 /* Look for a session, ten times a second. */
 static void look_for_session(struct recorder *rec)
 {
@@ -232,20 +243,12 @@ static void look_for_session(struct recorder *rec)
 		return;
 	}
 	look_for_feeds(rec);
+	note_clock(rec);
 	say(rec, "recording session %" PRIu64 " to %s", sample_feed_number(rec->samples),
 	    rec->opt.dir);
 	if (sample_feed_missed_start(rec->samples) > 0) {
 		say(rec, "came late: %" PRIu64 " samples had left the ring before",
 		    sample_feed_missed_start(rec->samples));
-	}
-}
-
-static void note_tai_offset(struct sample_feed *samples)
-{
-	int32_t tai_offset_s;
-
-	if (platform_tai_offset_s(&tai_offset_s) == 0) {
-		sample_feed_note_tai_offset(samples, tai_offset_s);
 	}
 }
 
@@ -392,7 +395,7 @@ enum recorder_result recorder_step(struct recorder *rec)
 	if (now - rec->told_ns >= LOOK_NS) {
 		rec->told_ns = now;
 		if (rec->samples != NULL) {
-			note_tai_offset(rec->samples);
+			note_clock(rec);
 		}
 		if (result != RECORDER_ENDED) {
 			tell(rec, state_of(rec));

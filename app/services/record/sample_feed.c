@@ -104,9 +104,9 @@ void sample_feed_rewind(struct sample_feed *s)
 	go_to_start(s);
 }
 
-void sample_feed_note_tai_offset(struct sample_feed *s, int32_t tai_offset_s)
+void sample_feed_note_clock(struct sample_feed *s, const struct clock_quality *quality)
 {
-	utc_note_tai_offset(s->utc, tai_offset_s);
+	utc_note_clock(s->utc, quality);
 }
 
 static int map_sample(struct sample_feed *s, const struct sample_header *h)

@@ -7,6 +7,7 @@
 #define RECORD_SAMPLE_FEED_H
 
 #include "base/event.h"
+#include "base/platform.h"
 #include "base/sync0.h"
 #include "reader/reader.h"
 #include "record/sink.h"
@@ -46,7 +47,7 @@ int sample_feed_event(struct sample_feed *s, const struct event *ev, uint64_t se
 /** A result of ecdaq-sync0, the same. */
 int sample_feed_sync0(struct sample_feed *s, const struct sync0_result *result, uint64_t sequence);
 
-/** The kernel's TAI offset is @tai_offset_s. */
-void sample_feed_note_tai_offset(struct sample_feed *s, int32_t tai_offset_s);
+/** What the kernel states of the host's clock. */
+void sample_feed_note_clock(struct sample_feed *s, const struct clock_quality *quality);
 
 #endif

@@ -259,7 +259,8 @@ static void read_sync0(struct source *s)
 /* What need not be done at every step. */
 static void follow(struct source *s, int64_t now_ns)
 {
-	int32_t tai_offset_s;
+	const struct platform platform = platform_posix();
+	struct clock_quality quality;
 
 	if (now_ns - s->followed_ns < FOLLOW_NS) {
 		return;
@@ -267,8 +268,8 @@ static void follow(struct source *s, int64_t now_ns)
 	s->followed_ns = now_ns;
 	(void)feed_open(s->events, NULL);
 	(void)feed_open(s->sync0, NULL);
-	if (s->utc != NULL && platform_tai_offset_s(&tai_offset_s) == 0) {
-		utc_note_tai_offset(s->utc, tai_offset_s);
+	if (s->utc != NULL && platform.clock_quality(platform.ctx, &quality) == 0) {
+		utc_note_clock(s->utc, &quality);
 	}
 }
 

@@ -196,3 +196,30 @@ TEST(utc, invalid_times_do_no_harm)
 	}
 	utc_destroy(b.utc);
 }
+
+TEST(utc, what_disciplines_the_hosts_clock_is_in_the_map)
+{
+	struct clock_quality quality = {
+		.is_disciplined = 1, .error_ns = 12000000, .estimate_ns = 800000, .tai_offset_s = 37
+	};
+	struct timemap_state state;
+	struct bench b;
+
+	bench_open(&b, 37);
+	run(&b, YEAR_2026_NS + 37 * NS_PER_S, 10);
+	CHECK_EQ(utc_changed(b.utc, &state), UTC_UPDATED);
+	CHECK_EQ(state.clock_error_ns, -1); /* nobody has said anything */
+	CHECK_EQ(state.clock_estimate_ns, -1);
+	utc_note_clock(b.utc, &quality);
+	run(&b, YEAR_2026_NS + 37 * NS_PER_S, 1500);
+	CHECK_EQ(utc_changed(b.utc, &state), UTC_UPDATED);
+	CHECK_EQ(state.clock_error_ns, 12000000);
+	CHECK_EQ(state.clock_estimate_ns, 800000);
+	quality.is_disciplined = 0;
+	utc_note_clock(b.utc, &quality);
+	run(&b, YEAR_2026_NS + 37 * NS_PER_S, 1500);
+	CHECK_EQ(utc_changed(b.utc, &state), UTC_UPDATED);
+	CHECK_EQ(state.clock_error_ns, -1);
+	CHECK_EQ(state.clock_estimate_ns, -1);
+	utc_destroy(b.utc);
+}

@@ -24,6 +24,7 @@ from ecdaq.errors import (
 
 if TYPE_CHECKING:
     from ecdaq.aligned import Aligned, align
+    from ecdaq.clock import Clock
     from ecdaq.link import Channel, Channels, Link, connect
     from ecdaq.recording import Recording, read
     from ecdaq.series import Gaps, Series
@@ -34,6 +35,7 @@ __all__ = [
     "Aligned",
     "Channel",
     "Channels",
+    "Clock",
     "Gap",
     "Gaps",
     "InterfaceError",
@@ -57,6 +59,7 @@ __version__ = "0.1.0"
 # Imported when first used: reading needs no DDS, and DDS no numpy.
 _MODULES = {
     "aligned": ("Aligned", "align"),
+    "clock": ("Clock",),
     "link": ("Channel", "Channels", "Link", "connect"),
     "recording": ("Recording", "read"),
     "series": ("Gaps", "Series"),

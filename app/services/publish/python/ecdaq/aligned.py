@@ -16,11 +16,10 @@ from typing import Any
 import numpy as np
 
 from ecdaq import export
-from ecdaq.errors import RecordingError
+from ecdaq.clock import TIMEMAP, ClockAt
 from ecdaq.recording import Recording
 from ecdaq.table import Column, Gap, Table, blank
 
-TIMEMAP = "/ecdaq/timemap"
 # A sample is that of a row if it is no further away than this share of its appliance's period.
 NEAREST = 0.5
 # In place of a distance.
@@ -33,14 +32,16 @@ class Aligned:
 
     @table: channels as "APPLIANCE.CHANNEL"; where an appliance has no sample near a row, they are
     missing. Of each other appliance @distance_ns has the UTC of its sample minus that of the row,
-    and @error_ns how far this difference can be off: what both time maps state of themselves
-    (uncertainty_ns of /ecdaq/timemap). Neither has the error of the hosts' clocks: PTP or NTP
-    state that.
+    and @error_ns how far this difference can be off: the sum of what both time maps state of
+    themselves (uncertainty_ns of /ecdaq/timemap) and of their hosts' clocks (clock_error_ns).
+    @undisciplined: the appliances whose clocks nothing disciplines, for some rows at least; the
+    error of these clocks is not known, and not in @error_ns.
     """
 
     table: Table
     distance_ns: dict[str, np.ndarray]
     error_ns: dict[str, np.ndarray]
+    undisciplined: list[str]
 
     def __repr__(self) -> str:
         parts = [f"{len(self.table)} rows of {len(self.distance_ns) + 1} appliances"]
@@ -50,6 +51,8 @@ class Aligned:
                 f"{name}: {len(near)} samples, at most {int(near.max(initial=0))} ns away, "
                 f"+-{int(error.max(initial=0))} ns"
             )
+        for name in self.undisciplined:
+            parts.append(f"{name}: nothing disciplines its clock, whose error is not in these")
         return f"<ecdaq aligned: {'; '.join(parts)}>"
 
     def has(self, name: str) -> np.ndarray:
@@ -62,21 +65,12 @@ class Aligned:
         for name, distance in self.distance_ns.items():
             frame[f"{name}.distance_ns"] = np.where(self.has(name), distance, np.nan)
             frame[f"{name}.error_ns"] = self.error_ns[name]
+        frame.attrs["undisciplined"] = self.undisciplined
         return frame
 
 
-def uncertainty_ns(recording: Recording, utc_ns: np.ndarray) -> np.ndarray:
-    """What the recording's time map states for each of these times: the larger one of the messages
-    before and behind it."""
-    messages = recording.topic(TIMEMAP)
-    if len(messages["log_time_ns"]) == 0:
-        raise RecordingError(recording.files[0], "no time map in the selected time")
-    at = messages["log_time_ns"].astype(np.int64)
-    order = np.argsort(at, kind="stable")
-    at, stated = at[order], messages["uncertainty_ns"][order]
-    behind = np.searchsorted(at, utc_ns)
-    before = np.clip(behind - 1, 0, len(at) - 1)
-    return np.maximum(stated[before], stated[np.clip(behind, 0, len(at) - 1)])
+def clock_at(recording: Recording, utc_ns: np.ndarray) -> ClockAt:
+    return ClockAt(recording.topic(TIMEMAP), recording.files[0], utc_ns)
 
 
 def nearest(times: np.ndarray, wanted: np.ndarray) -> np.ndarray:
@@ -145,7 +139,8 @@ def align(recordings: Mapping[str, Recording]) -> Aligned:
     base = tables[first]
     rows = order[first][(base.utc_ns[order[first]] >= low) & (base.utc_ns[order[first]] <= high)]
     wanted = base.utc_ns[rows]
-    own_ns = uncertainty_ns(recordings[first], wanted)
+    clocks = {name: clock_at(recording, wanted) for name, recording in recordings.items()}
+    own = clocks[first]
     has = np.ones(len(rows), bool)
     columns = [taken(first, c, rows, has) for c in base.columns.values()]
     distances: dict[str, np.ndarray] = {}
@@ -159,10 +154,11 @@ def align(recordings: Mapping[str, Recording]) -> Aligned:
         has = np.abs(distance) <= NEAREST * period_ns
         columns += [taken(name, c, order[name][at], has) for c in table.columns.values()]
         distances[name] = np.where(has, distance, NO_SAMPLE)
-        errors[name] = own_ns + uncertainty_ns(recordings[name], wanted)
+        errors[name] = sum(c.uncertainty_ns + c.error_ns for c in (own, clocks[name]))
     found = Table(
         base.session[rows], base.cycle[rows], wanted, base.dc_time_ns[rows],
         {c.name: c for c in columns},
         [named(gap, name) for name, table in tables.items() for gap in table.gaps],
     )  # fmt: skip
-    return Aligned(found, distances, errors)
+    undisciplined = [name for name, clock in clocks.items() if not clock.is_disciplined.all()]
+    return Aligned(found, distances, errors, undisciplined)

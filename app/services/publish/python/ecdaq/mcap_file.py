@@ -67,6 +67,8 @@ int64 uncertainty_ns  # of utc_ns against the host's clock
 int64 step_ns  # size of the newest step of the host's clock
 uint64 steps  # number of steps so far
 int32 tai_offset_s  # TAI minus UTC; 0: unset, CLOCK_TAI is taken for UTC
+int64 clock_error_ns  # not published: -1
+int64 clock_estimate_ns  # not published: -1
 """
 SEPARATOR = "=" * 80 + "\n"
 HEADER_DEFINITIONS = (
@@ -76,7 +78,7 @@ HEADER_DEFINITIONS = (
 # stamp, an empty frame_id, padding; cycle, dc_time_ns, flags, good
 HEAD = "<4sIIIB3xQqIB"
 CYCLE_BYTES = struct.Struct("<4sQqqqqiiiiIHHI")  # and the octets of slaves_bad
-TIMEMAP_BYTES = struct.Struct("<4sqqqqqQi")
+TIMEMAP_BYTES = struct.Struct("<4sqqqqqQi4xqq")
 EVENT_BYTES = struct.Struct("<4sqqQQqiiiH")
 # ROS type and struct letter for 1, 2, 4, 8 bytes.
 UNSIGNED = [("uint8", "B"), ("uint16", "H"), ("uint32", "I"), ("uint64", "Q")]
@@ -226,7 +228,7 @@ def encode_event(event: Any) -> bytes:
 def encode_timemap(m: Any) -> bytes:
     return TIMEMAP_BYTES.pack(
         CDR_LE, m.dc_ns, m.utc_ns, m.rate_ppb, m.uncertainty_ns, m.step_ns, m.steps,
-        m.tai_offset_s,
+        m.tai_offset_s, -1, -1,
     )  # fmt: skip
 
 

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from ecdaq import export
+from ecdaq.clock import TIMEMAP, Clock, clock_of
 from ecdaq.container import Chunk, Room
 from ecdaq.errors import RecordingError
 from ecdaq.messages import COMMON, TIME, Channel, Columns, Joined, RecordedFile, Task, join, run
@@ -212,6 +213,11 @@ class Recording:
         columns = self.topic("/ecdaq/event")
         names = list(columns)
         return [dict(zip(names, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+    @property
+    def clock(self) -> Clock:
+        """How well the time is known: of the time map, and of the host's clock."""
+        return clock_of(self.topic(TIMEMAP), self.files[0])
 
     # Other formats
 
