@@ -293,6 +293,24 @@ static void put_info(FILE *out, const struct status_page *page)
 		page->is_simulated != 0);
 }
 
+static void put_uplink(FILE *out, const struct uplink_status *page)
+{
+	static const char state[] = "ecdaq_uplink_state";
+
+	PUT_FIGURES(out, of_uplink, page);
+	put_gauge(out, "ecdaq_uplink_uploaded_timestamp_seconds",
+		  "Unix time of the newest upload; 0: none since the start.",
+		  (double)GET(page->uploaded_utc_s));
+	put_gauge(out, "ecdaq_uplink_waiting_timestamp_seconds",
+		  "Unix time at which the oldest recording that waits was begun; 0: none waits.",
+		  (double)GET(page->waiting_utc_s));
+	put_head(out, state, "gauge", "1: the state that the upload is in.");
+	for (uint32_t s = UPLINK_IDLE; s <= UPLINK_RETRYING; s++) {
+		fprintf(out, "%s{state=\"%s\"} %d\n", state, uplink_state_to_str(s),
+			GET(page->state) == s);
+	}
+}
+
 static void put_services(FILE *out, const struct report *report)
 {
 	const struct {
@@ -322,16 +340,12 @@ static void put_services(FILE *out, const struct report *report)
 		PUT_FIGURES(out, of_stream, report->stream);
 	}
 	if (report->uplink != NULL) {
-		PUT_FIGURES(out, of_uplink, report->uplink);
-		put_gauge(out, "ecdaq_uplink_uploaded_timestamp_seconds",
-			  "Unix time of the newest upload; 0: none since the start.",
-			  (double)GET(report->uplink->uploaded_utc_s));
+		put_uplink(out, report->uplink);
 	}
 }
 
-static void put_all(FILE *out, const struct report *report)
+static void put_master(FILE *out, const struct status_page *page)
 {
-	const struct status_page *page = report->page;
 	const struct cycle_stats *st = &page->cycle;
 
 	put_info(out, page);
@@ -342,12 +356,18 @@ static void put_all(FILE *out, const struct report *report)
 	put_histogram(out, "ecdaq_round_trip_seconds", "Frame out to frame back.", &st->round_trip);
 	put_histogram(out, "ecdaq_work_seconds", "Wake to end of work.", &st->work);
 	put_slaves(out, page);
-	put_services(out, report);
+}
+
+/* Of services that have run: they do without ecdaqd, too, an upload above all. */
+static int has_service(const struct report *report)
+{
+	return report->record != NULL || report->dds != NULL || report->stream != NULL ||
+	       report->uplink != NULL || report->sync0 != NULL;
 }
 
 static enum exit_code write_to(struct cli *cli, FILE *out)
 {
-	const struct status_page *page;
+	const struct status_page *page = NULL;
 	struct report report;
 	int r = source_try_status(cli, &page);
 
@@ -355,14 +375,16 @@ static enum exit_code write_to(struct cli *cli, FILE *out)
 		return source_status(cli, &page); /* reports why */
 	}
 	put_gauge(out, "ecdaq_up", "1: ecdaqd runs.", r == 0 && page_is_alive(page->pid));
-	if (r < 0) {
-		return EXIT_CODE_OK;
+	report_gather(cli, r < 0 ? NULL : page, source_record(cli), &report);
+	if (r == 0) {
+		put_master(out, page);
+		source_status_close(page);
 	}
-	report_gather(cli, page, source_record(cli), &report);
-	put_all(out, &report);
+	if (r == 0 || has_service(&report)) {
+		put_services(out, &report);
+	}
 	report_release(&report);
 	source_record_close(report.record);
-	source_status_close(page);
 	return EXIT_CODE_OK;
 }
 

@@ -26,7 +26,7 @@ void report_gather(struct cli *cli, const struct status_page *page,
 	struct report report = { .page = page, .record = record };
 	struct samples samples;
 
-	report.is_running = page_is_alive(page->pid);
+	report.is_running = page != NULL && page_is_alive(page->pid);
 	report.is_recorder_running = record != NULL && page_is_alive(record->pid);
 	report.dds = source_dds(cli);
 	report.is_dds_running = report.dds != NULL && page_is_alive(report.dds->pid);
@@ -37,7 +37,8 @@ void report_gather(struct cli *cli, const struct status_page *page,
 	report.sync0 = sync0_source_try(cli);
 	report.is_sync0_running = report.sync0 != NULL && page_is_alive(report.sync0->pid);
 	if (samples_try(cli, &samples) == 0) {
-		if (samples.meta->session == page->session && reader_read_newest(samples.reader)) {
+		if (page != NULL && samples.meta->session == page->session &&
+		    reader_read_newest(samples.reader)) {
 			struct sample_header header = samples_header(&samples);
 
 			report.has_wkc = 1;

@@ -31,8 +31,8 @@ struct report {
 
 struct cli;
 /**
- * Look at the rest of the run directory; @page and @record as they were mapped. Release what was
- * mapped besides with report_release().
+ * Look at the rest of the run directory; @page (NULL: there is none) and @record as they were
+ * mapped. Release what was mapped besides with report_release().
  */
 void report_gather(struct cli *cli, const struct status_page *page,
 		   const struct record_status *record, struct report *ret_report);

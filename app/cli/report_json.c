@@ -198,6 +198,7 @@ static void write_uplink(struct json *js, const struct report *report)
 	json_u64(js, "uploaded_bytes", GET(up->uploaded_bytes));
 	json_u64(js, "waiting", GET(up->waiting));
 	json_u64(js, "waiting_bytes", GET(up->waiting_bytes));
+	json_u64(js, "waiting_utc_s", GET(up->waiting_utc_s));
 	json_u64(js, "deleted", GET(up->deleted));
 	json_u64(js, "failures", GET(up->failures));
 	json_u64(js, "uploaded_utc_s", GET(up->uploaded_utc_s));

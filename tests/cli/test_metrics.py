@@ -126,7 +126,60 @@ def test_the_rules_are_valid_and_ask_for_figures_that_there_are(daemon: Fake) ->
         [PROMTOOL, "check", "rules", RULES], capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stdout + done.stderr
-    assert re.search(r"\b10 rules found", done.stdout)
+    assert re.search(r"\b14 rules found", done.stdout)
+
+
+@needs_promtool
+def test_the_rules_of_the_upload_alert_in_time_and_not_before(tmp_path: Path) -> None:
+    """By promtool, over hours that nobody waits for. A recording waits from 1 h on."""
+    assert PROMTOOL is not None
+    up, retrying = 'ecdaq_service_up{service="uplink"}', 'ecdaq_uplink_state{state="retrying"}'
+    cases = tmp_path / "cases.json"
+    alert = {"instance": "rig1"}
+
+    def case(name: str, series: dict[str, str], quiet: str, alarmed: str, **labels: str) -> dict:
+        def named(metric: str) -> str:
+            bare, _, more = metric.partition("{")
+            return f'{bare}{{instance="rig1"{"," + more if more else "}"}'
+
+        (rule,) = re.findall(rf"- alert: {name}\n(?:(?!\s*- alert).*\n)*", RULES.read_text())
+        texts = dict(re.findall(r'(summary|description): "(.*)"', rule))
+        notes = {k: v.replace("{{ $labels.instance }}", "rig1") for k, v in texts.items()}
+        expected = alert | labels | {"severity": "critical" if "Deleted" in name else "warning"}
+        return {
+            "interval": "1m",
+            "input_series": [{"series": named(k), "values": v} for k, v in series.items()],
+            "alert_rule_test": [
+                {"eval_time": quiet, "alertname": name, "exp_alerts": []},
+                {
+                    "eval_time": alarmed,
+                    "alertname": name,
+                    "exp_alerts": [{"exp_labels": expected, "exp_annotations": notes}],
+                },
+            ],
+        }
+
+    tests = [
+        case("EcdaqUplinkDown", {up: "0x10 1x60 0x60"}, "74m", "80m", service="uplink"),
+        case(
+            "EcdaqUplinkFailing",
+            {retrying: "0x30 1x60", "ecdaq_uplink_failures_total": "0x30 1+1x60"},
+            "44m", "50m", state="retrying",
+        ),
+        case(
+            "EcdaqUplinkBehind",
+            {"ecdaq_uplink_waiting_timestamp_seconds": "0x59 3600x900"}, "7h4m", "7h7m",
+        ),
+        case("EcdaqUplinkDeleted", {"ecdaq_uplink_deleted_recordings_total": "0x30 1x60"},
+             "29m", "35m"),
+    ]  # fmt: skip
+    cases.write_text(
+        json.dumps({"rule_files": [str(RULES)], "evaluation_interval": "1m", "tests": tests})
+    )
+    done = subprocess.run(
+        [PROMTOOL, "test", "rules", cases], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_rules_and_dashboard_ask_for_figures_that_there_are(daemon: Fake) -> None:
@@ -134,14 +187,15 @@ def test_rules_and_dashboard_ask_for_figures_that_there_are(daemon: Fake) -> Non
     source = (ROOT / "app" / "cli" / "metrics.c").read_text()
     # Of services that the fake does not have.
     known |= {f"ecdaq_recorder_{n}" for n in re.findall(r'RECORD\("(\w+)"', source)}
+    known |= {f"ecdaq_uplink_{n}" for n in re.findall(r'UPLINK\("(\w+)"', source)}
     known |= {f"ecdaq_stream_{n}" for n in re.findall(r'STREAM\("(\w+)"', source)}
-    known |= set(re.findall(r'"(ecdaq_recorder_\w+)"', source))
+    known |= set(re.findall(r'"(ecdaq_(?:recorder|uplink)_\w+)"', source))
     dashboard = json.loads(DASHBOARD.read_text())
     asked = [t["expr"] for panel in dashboard["panels"] for t in panel["targets"]]
     for text in (RULES.read_text(), *asked):
         for name in re.findall(r"\becdaq_\w+", text):
             assert re.sub(r"_bucket$", "", name) in known, name
-    assert len(asked) >= 12
+    assert len(asked) >= 16
 
 
 @pytest.fixture
@@ -249,6 +303,20 @@ def test_a_real_prometheus_scrapes_it_and_alerts(
     changed.rename(path)
     [alert] = wait_for(query, 'ALERTS{alertname="EcdaqSlaveLost"}')
     assert alert["metric"]["slave"] == "piccolo1"
+    # A recording that waits too long for its upload, and one that was deleted before.
+    old = time.time() - 7 * 3600
+    changed.write_text(
+        text + f"ecdaq_uplink_waiting_timestamp_seconds {old:.0f}\n"
+        "ecdaq_uplink_deleted_recordings_total 0\n"
+    )
+    changed.rename(path)
+    wait_for(query, 'ALERTS{alertname="EcdaqUplinkBehind",alertstate="pending"}')
+    changed.write_text(
+        text + "ecdaq_uplink_waiting_timestamp_seconds 0\necdaq_uplink_deleted_recordings_total 2\n"
+    )
+    changed.rename(path)
+    wait_for(query, 'ALERTS{alertname="EcdaqUplinkDeleted"}')
+    wait_for(query, 'absent(ALERTS{alertname="EcdaqUplinkBehind"})')
 
 
 def test_the_server_of_the_page_has_them_too(daemon: Fake, make_web: Callable[..., Web]) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import datetime
 import hashlib
 import json
 import os
@@ -16,7 +17,7 @@ from pathlib import Path
 
 import pyarrow.parquet
 import pytest
-from ecdaq import CONFIG, OK, ROOT, Fake, ecdaq
+from ecdaq import CONFIG, ECDAQ, OK, ROOT, Fake, ecdaq
 from recording import Bench, wait_until
 from uplink_bench import (
     BUCKET,
@@ -141,6 +142,38 @@ def test_a_link_that_is_down_is_one_line_however_long_it_is(bench: Bench, moto: 
     down = f"{endpoint}/{BUCKET}: Couldn't connect to server"
     assert lines(uplink.stop()) == [down, f"{endpoint}: bucket {BUCKET}: uploading"] * 2
     expect_uploaded(uplink, paths)
+
+
+def test_metrics_say_what_waits_since_when_and_whether_it_fails(bench: Bench, moto: Store) -> None:
+    def metrics() -> dict[str, float]:
+        words = [ECDAQ, "metrics", "--run-dir", str(bench.run_dir)]
+        text = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+        found = (line.rpartition(" ") for line in text.splitlines() if "ecdaq_uplink_" in line)
+        return {name: float(value) for name, _, value in found if not name.startswith("#")}
+
+    paths = record_small(bench, 2)
+    begun = datetime.datetime.strptime(paths[0].name[6:22], "%Y%m%dT%H%M%SZ")
+    link = Link(moto.port)
+    link.cut()
+    uplink = Uplink(bench, moto, link.port)
+    uplink.start()
+    uplink.wait_message("Couldn't connect to server")
+    state = 'ecdaq_uplink_state{{state="{}"}}'.format
+    wait_until("a failure", lambda: metrics().get(state("retrying")) == 1)
+    found = metrics()
+    assert (
+        found["ecdaq_uplink_waiting_timestamp_seconds"]
+        == begun.replace(tzinfo=datetime.UTC).timestamp()
+    )
+    assert found["ecdaq_uplink_waiting_recordings"] == 2
+    assert found["ecdaq_uplink_failures_total"] >= 1
+    link.restore()
+    wait_until("all recordings", lambda: metrics()["ecdaq_uplink_waiting_recordings"] == 0)
+    wait_until("it is idle", lambda: metrics()[state("idle")] == 1)
+    found = metrics()
+    assert found["ecdaq_uplink_waiting_timestamp_seconds"] == 0
+    assert (found[state("retrying")], found["ecdaq_uplink_recordings_total"]) == (0, 2)
+    uplink.stop()
 
 
 def test_wrong_credentials_are_one_line_and_renewed_ones_are_used(

@@ -235,7 +235,7 @@ struct stream_status {
 	_Atomic uint64_t heartbeat;
 };
 
-#define UPLINK_STATUS_MAGIC UINT64_C(0x316c707571616463) /* "cdaqupl1" */
+#define UPLINK_STATUS_MAGIC UINT64_C(0x326c707571616463) /* "cdaqupl2" */
 
 enum uplink_state {
 	UPLINK_IDLE = 0,
@@ -265,6 +265,7 @@ struct uplink_status {
 	_Atomic uint64_t deleted;        /* before they were uploaded */
 	_Atomic uint64_t failures;       /* attempts */
 	_Atomic uint64_t uploaded_utc_s; /* Unix time of the newest upload; 0: none yet */
+	_Atomic uint64_t waiting_utc_s;  /* when the oldest that waits was begun; 0: none waits */
 	_Atomic uint64_t heartbeat;
 };
 

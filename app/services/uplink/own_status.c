@@ -51,6 +51,7 @@ void own_status_put(struct own_status *own)
 	COPY(page, now, deleted);
 	COPY(page, now, failures);
 	COPY(page, now, uploaded_utc_s);
+	COPY(page, now, waiting_utc_s);
 	atomic_fetch_add_explicit(&page->heartbeat, 1, memory_order_relaxed);
 }
 

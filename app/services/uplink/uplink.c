@@ -182,13 +182,20 @@ static void count_waiting(struct uplink *u)
 {
 	uint64_t bytes = 0;
 	uint64_t count = 0;
+	int64_t oldest_s = 0;
 
 	for (size_t i = 0; i < u->queue.count; i++) {
-		if (!u->queue.item[i].is_uploaded) {
+		const struct queue_item *item = &u->queue.item[i];
+
+		if (!item->is_uploaded) {
+			int64_t begun_s = store_name_utc_s(item->entry.name);
+
 			count++;
-			bytes += u->queue.item[i].entry.bytes;
+			bytes += item->entry.bytes;
+			oldest_s = oldest_s == 0 || begun_s < oldest_s ? begun_s : oldest_s;
 		}
 	}
+	set(&u->own.now.waiting_utc_s, oldest_s > 0 ? (uint64_t)oldest_s : 0);
 	set(&u->own.now.waiting, count);
 	set(&u->own.now.waiting_bytes, bytes);
 }
