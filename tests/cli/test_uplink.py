@@ -17,6 +17,7 @@ from pathlib import Path
 
 import pyarrow.parquet
 import pytest
+import upload_fleet
 from ecdaq import CONFIG, ECDAQ, OK, ROOT, Fake, ecdaq
 from recording import Bench, wait_until
 from uplink_bench import (
@@ -415,3 +416,10 @@ def test_options_that_cannot_be_used_are_one_line(bench: Bench, moto: Store) -> 
     uplink.credentials.chmod(0o600)
     uplink.credentials.write_text("[default]\naws_access_key_id = a\n")
     assert "expected lines aws_access_key_id" in uplink.run("--check").stderr
+
+
+def test_the_recordings_of_a_fleet_go_through_one_store_to_one_query(tmp_path: Path) -> None:
+    found = upload_fleet.run(tmp_path, 6, 10)
+    assert (found.appliances, found.recorded) == (6, found.wanted)
+    assert (found.doubled, found.missing) == (0, 0)
+    assert found.files >= 12  # some of each

@@ -152,6 +152,14 @@ ALL = (
         ),
     ),
     subject(
+        "upload-fleet",
+        "Recordings of 50 appliances through one object store to one query",
+        (
+            "python tests/cli/upload_fleet.py",
+            partial(run, [sys.executable, "tests/cli/upload_fleet.py"], "."),
+        ),
+    ),
+    subject(
         "kills",
         "Stream and uplink of two appliances while their servers are killed, 10 minutes",
         (
