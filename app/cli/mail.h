@@ -20,6 +20,8 @@ struct mail {
 	struct cli *cli;
 	const char *type; /* --type, as given; NULL: none */
 	int is_json;
+	int is_indices; /* of sdo list */
+	uint64_t count; /* of sdo list; 0: all */
 	struct admin_request request;
 	struct admin_transfer transfer;
 	uint8_t *data; /* of the request; NULL: it is in request.data */

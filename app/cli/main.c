@@ -109,6 +109,7 @@ static const struct verb verbs[] = {
 	  "ecdaq sdo read 0 0x1c12 --complete          all subindices, as bytes\n"
 	  "ecdaq sdo write 0 0x1c12 '01 00 00 16' --complete\n"
 	  "ecdaq sdo list 0                            the object dictionary\n"
+	  "ecdaq sdo list 0 0x1018                     one object of it\n"
 	  "ecdaq sdo startup 0                         what ecdaqd writes on the way to OP\n\n"
 	  "INDEX and SUB are hexadecimal; :SUB may be left out for 0. Types: BOOL SINT INT DINT "
 	  "LINT\n"

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* ecdaq sdo: objects of a slave by CoE. Lists of them: sdo_list.c. */
+#include <string.h>
+
 #include "base/args.h"
 #include "cli/mail.h"
 #include "cli/sdo_list.h"
@@ -63,10 +65,21 @@ static enum exit_code take_slave(struct mail *mail, char **operands)
 
 static enum exit_code list_objects(struct mail *mail, char **operands, int count)
 {
-	enum exit_code result = take_slave(mail, operands);
+	struct sdo_part part = { .is_indices = mail->is_indices, .count = mail->count };
+	enum exit_code result = EXIT_CODE_OK;
 
-	(void)count;
-	return result == EXIT_CODE_OK ? sdo_list(mail) : result;
+	if (count == 3) {
+		result = mail_parse_object(mail, operands[2]);
+		part.index = mail->request.index;
+		part.subindex = mail->request.subindex;
+		part.is_one = !mail->is_indices;
+	}
+	if (result == EXIT_CODE_OK && part.count > 0 && !part.is_one && !part.is_indices) {
+		return cli_fail(mail->cli, EXIT_CODE_USAGE,
+				"list: --count is of --indices, or of an object INDEX:SUB");
+	}
+	result = result == EXIT_CODE_OK ? take_slave(mail, operands) : result;
+	return result == EXIT_CODE_OK ? sdo_list(mail, &part) : result;
 }
 
 static enum exit_code list_startup(struct mail *mail, char **operands, int count)
@@ -85,7 +98,7 @@ enum exit_code verb_sdo(struct cli *cli, int argc, char **argv)
 	static const struct mail_action actions[] = {
 		{ "read", 3, 3, "read: expected SLAVE INDEX:SUB", read_object },
 		{ "write", 4, 4, "write: expected SLAVE INDEX:SUB VALUE", write_object },
-		{ "list", 2, 2, "list: expected SLAVE", list_objects },
+		{ "list", 2, 3, "list: expected SLAVE [INDEX:SUB]", list_objects },
 		{ "startup", 2, 2, "startup: expected SLAVE", list_startup },
 	};
 	struct mail mail;
@@ -94,10 +107,14 @@ enum exit_code verb_sdo(struct cli *cli, int argc, char **argv)
 		{ "type", 't', args_text, &mail.type, "TYPE", "data type of the object" },
 		{ "complete", 0, args_flag, &is_complete, NULL,
 		  "complete access: all subindices; VALUE is bytes in hex" },
+		{ "indices", 0, args_flag, &mail.is_indices, NULL,
+		  "list: the indices of the objects only" },
+		{ "count", 0, args_count, &mail.count, "N",
+		  "list: N entries from INDEX:SUB on, or N indices" },
 		{ "json", 0, args_flag, &mail.is_json, NULL, "the value as a JSON object" },
 	};
 	struct args args = {
-		.options = options, .option_count = 3, .operands_min = 2, .operands_max = 4
+		.options = options, .option_count = 5, .operands_min = 2, .operands_max = 4
 	};
 	enum exit_code result;
 
@@ -106,6 +123,10 @@ enum exit_code verb_sdo(struct cli *cli, int argc, char **argv)
 		return result;
 	}
 	mail.request.argument[0] = (uint32_t)is_complete;
+	if ((mail.is_indices || mail.count > 0) && strcmp(args.operands[0], "list") != 0) {
+		return cli_fail(cli, EXIT_CODE_USAGE, "%s: has no option %s", args.operands[0],
+				mail.is_indices ? "--indices" : "--count");
+	}
 	return mail_run(&mail, actions, sizeof(actions) / sizeof(actions[0]), args.operands,
 			args.operand_count);
 }

@@ -92,11 +92,15 @@ static enum exit_code take(struct mail *mail, enum admin_verb verb, void *ret, s
 }
 
 /* Arrays and records may have gaps. */
-static enum exit_code list_entries(struct mail *mail, unsigned last, struct json *js)
+static enum exit_code list_entries(struct mail *mail, const struct sdo_part *part, unsigned last,
+				   struct json *js)
 {
 	enum exit_code result = EXIT_CODE_OK;
 
-	for (unsigned sub = 0; sub <= last && result == EXIT_CODE_OK; sub++) {
+	if (part->count > 0 && part->count <= last && part->subindex + part->count - 1 < last) {
+		last = part->subindex + (unsigned)part->count - 1;
+	}
+	for (unsigned sub = part->subindex; sub <= last && result == EXIT_CODE_OK; sub++) {
 		struct admin_sdo_entry entry = { .index = 0 };
 		int is_refused;
 
@@ -120,7 +124,7 @@ static enum exit_code list_entries(struct mail *mail, unsigned last, struct json
 	return result;
 }
 
-static enum exit_code list_object(struct mail *mail)
+static enum exit_code list_object(struct mail *mail, const struct sdo_part *part)
 {
 	struct admin_sdo_object object = { .index = 0 };
 	struct json js;
@@ -138,15 +142,16 @@ static enum exit_code list_object(struct mail *mail)
 	if (!mail->is_json) {
 		put_name(object.name,
 			 printf("0x%04x %s", object.index, code_to_str(object.object_code)));
-		return list_entries(mail, object.subindex_max, &js);
+		return list_entries(mail, part, object.subindex_max, &js);
 	}
 	json_object_begin(&js, NULL);
 	json_u64(&js, "slave", mail->request.slave_pos);
 	json_u64(&js, "index", object.index);
 	json_text(&js, "name", object.name);
 	json_text(&js, "code", code_to_str(object.object_code));
+	json_u64(&js, "last", object.subindex_max);
 	json_array_begin(&js, "entry");
-	result = list_entries(mail, object.subindex_max, &js);
+	result = list_entries(mail, part, object.subindex_max, &js);
 	json_array_end(&js);
 	json_object_end(&js);
 	json_end_line(&js);
@@ -182,16 +187,61 @@ static enum exit_code read_indices(struct mail *mail, uint16_t **ret_indices, si
 	return EXIT_CODE_OK;
 }
 
-enum exit_code sdo_list(struct mail *mail)
+static int compare_indices(const void *a, const void *b)
 {
-	uint16_t *indices = NULL;
-	size_t count = 0;
-	enum exit_code result = read_indices(mail, &indices, &count);
+	return *(const uint16_t *)a - *(const uint16_t *)b;
+}
 
+/* In ascending order, so that the part behind any index can be asked for. */
+static void show_indices(const struct mail *mail, const struct sdo_part *part, uint16_t *indices,
+			 size_t count)
+{
+	size_t at = 0;
+	size_t end = count;
+	struct json js;
+
+	qsort(indices, count, sizeof(*indices), compare_indices);
+	while (at < count && indices[at] < part->index) {
+		at++;
+	}
+	if (part->count > 0 && part->count < count - at) {
+		end = at + (size_t)part->count;
+	}
+	if (!mail->is_json) {
+		for (; at < end; at++) {
+			printf("0x%04x\n", indices[at]);
+		}
+		return;
+	}
+	json_init(&js, stdout);
+	json_object_begin(&js, NULL);
+	json_u64(&js, "slave", mail->request.slave_pos);
+	json_array_begin(&js, "indices");
+	for (; at < end; at++) {
+		json_u64(&js, NULL, indices[at]);
+	}
+	json_array_end(&js);
+	json_u64(&js, "left", count - end);
+	json_object_end(&js);
+	json_end_line(&js);
+}
+
+enum exit_code sdo_list(struct mail *mail, const struct sdo_part *part)
+{
+	uint16_t one = part->index;
+	uint16_t *indices = NULL;
+	size_t count = 1;
+	enum exit_code result = part->is_one ? EXIT_CODE_OK
+					     : read_indices(mail, &indices, &count);
+
+	if (result == EXIT_CODE_OK && part->is_indices) {
+		show_indices(mail, part, indices, count);
+		count = 0;
+	}
 	for (size_t i = 0; i < count && result == EXIT_CODE_OK; i++) {
-		mail->request.index = indices[i];
+		mail->request.index = part->is_one ? one : indices[i];
 		mail->request.subindex = 0;
-		result = list_object(mail);
+		result = list_object(mail, part);
 	}
 	free(indices);
 	return result;

@@ -200,7 +200,29 @@ def test_a_dictionary_with_gaps_is_listed_up_to_an_entry_that_is_refused(daemon:
     last = first["entry"][2]
     assert (last["name"], last["type"], last["access"]) == ("e" * 63, "0x0801", "rrrw--")
     assert (last["bits"], last["rxpdo"], last["txpdo"]) == (16, False, True)
-    assert second["entry"] == []
+    assert (first["last"], second["entry"]) == (3, [])
+
+
+def test_a_dictionary_can_be_listed_in_parts(daemon: Fake) -> None:
+    def subindices(*words: str) -> tuple[int, list[int]]:
+        found = json_of(daemon("sdo", "list", "0", "0x6000" + words[0], "--json", *words[1:]))
+        return found["index"], [entry["subindex"] for entry in found["entry"]]
+
+    assert subindices("") == (0x6000, [0, 1, 3])
+    assert subindices(":1", "--count", "2") == (0x6000, [1])  # the second one is a gap
+    assert subindices(":2") == (0x6000, [3])
+    assert subindices(":3", "--count", "18446744073709551615") == (0x6000, [3])
+    assert subindices(":4") == (0x6000, [])
+    assert works(daemon("sdo", "list", "0", "--indices")) == "0x6000\n0x7000\n"
+
+    def indices(*words: str) -> tuple[list[int], int]:
+        found = json_of(daemon("sdo", "list", "0", "--indices", "--json", *words))
+        return found["indices"], found["left"]
+
+    assert indices() == ([0x6000, 0x7000], 0)
+    assert indices("--count", "1") == ([0x6000], 1)
+    assert indices("0x6001", "--count", "1") == ([0x7000], 0)
+    assert indices("0x7001", "--count", "9") == ([], 0)
 
 
 def test_clear_sets_counters_to_zero(fake: Callable[..., Fake]) -> None:
