@@ -124,13 +124,16 @@ static enum exit_code list_entries(struct mail *mail, const struct sdo_part *par
 	return result;
 }
 
-static enum exit_code list_object(struct mail *mail, const struct sdo_part *part)
+static enum exit_code list_object(struct mail *mail, const struct sdo_part *part, uint16_t index)
 {
 	struct admin_sdo_object object = { .index = 0 };
 	struct json js;
 	int is_refused;
-	enum exit_code result = take(mail, ADMIN_SDO_OBJECT, &object, sizeof(object), &is_refused);
+	enum exit_code result;
 
+	mail->request.index = index;
+	mail->request.subindex = 0;
+	result = take(mail, ADMIN_SDO_OBJECT, &object, sizeof(object), &is_refused);
 	if (is_refused) {
 		return admin_judge(mail->cli, &mail->transfer.reply);
 	}
@@ -228,20 +231,23 @@ static void show_indices(const struct mail *mail, const struct sdo_part *part, u
 
 enum exit_code sdo_list(struct mail *mail, const struct sdo_part *part)
 {
-	uint16_t one = part->index;
 	uint16_t *indices = NULL;
-	size_t count = 1;
-	enum exit_code result = part->is_one ? EXIT_CODE_OK
-					     : read_indices(mail, &indices, &count);
+	size_t count = 0;
+	enum exit_code result;
 
-	if (result == EXIT_CODE_OK && part->is_indices) {
+	if (part->is_one) {
+		return list_object(mail, part, part->index);
+	}
+	result = read_indices(mail, &indices, &count);
+	if (indices == NULL) {
+		return result;
+	}
+	if (part->is_indices) {
 		show_indices(mail, part, indices, count);
 		count = 0;
 	}
 	for (size_t i = 0; i < count && result == EXIT_CODE_OK; i++) {
-		mail->request.index = part->is_one ? one : indices[i];
-		mail->request.subindex = 0;
-		result = list_object(mail, part);
+		result = list_object(mail, part, indices[i]);
 	}
 	free(indices);
 	return result;

@@ -144,6 +144,12 @@ static void abort_sdo(struct admin_reply *reply, uint32_t code, const char *text
 	reply->slave_code = code;
 }
 
+/* 0x8000:2, which no list has, and 0x8001:2, which one has. */
+static int is_refresh_time(const struct admin_request *rq)
+{
+	return (rq->index == 0x8000 || rq->index == 0x8001) && rq->subindex == 2;
+}
+
 static void answer_read(struct fake *f, const struct admin_request *rq, struct admin_reply *reply)
 {
 	uint8_t bytes[4];
@@ -158,7 +164,7 @@ static void answer_read(struct fake *f, const struct admin_request *rq, struct a
 		give(reply, bytes, rq->subindex == 0 ? 1 : 2);
 	} else if (rq->index == 0x2000) {
 		f->is_long = 1;
-	} else if (rq->index == 0x8000 && rq->subindex == 2) {
+	} else if (is_refresh_time(rq)) {
 		put_le16(bytes, f->refresh_ms);
 		give(reply, bytes, 2);
 	} else {
@@ -168,27 +174,30 @@ static void answer_read(struct fake *f, const struct admin_request *rq, struct a
 
 static void answer_write(struct fake *f, const struct admin_request *rq, struct admin_reply *reply)
 {
-	if (rq->index == 0x8000 && rq->subindex == 2 && rq->data_len == 2) {
+	if (is_refresh_time(rq) && rq->data_len == 2) {
 		f->refresh_ms = get_le16(rq->data);
 		return;
 	}
 	abort_sdo(reply, 0x08000022, "slave 0 (piccolo0): SDO write: data cannot be stored");
 }
 
-/* Object 0x6000 has a gap and a long name, 0x7000 an entry that is not described. */
+/* Object 0x6000 has a gap and a long name, 0x7000 an entry that is not described, 0x8001 more
+ * entries than are asked for at a time. */
 static void answer_list(struct admin_reply *reply)
 {
-	uint8_t indices[4];
+	static const uint16_t objects[] = { 0x6000, 0x7000, 0x8001 };
+	uint8_t indices[sizeof(objects)];
 
-	put_le16(indices, 0x6000);
-	put_le16(indices + 2, 0x7000);
+	for (size_t i = 0; i < sizeof(objects) / sizeof(objects[0]); i++) {
+		put_le16(indices + 2 * i, objects[i]);
+	}
 	give(reply, indices, sizeof(indices));
 }
 
 static void answer_object(const struct admin_request *rq, struct admin_reply *reply)
 {
 	struct admin_sdo_object object = { .index = rq->index,
-					   .subindex_max = 3,
+					   .subindex_max = rq->index == 0x8001 ? 5 : 3,
 					   .object_code = 9 };
 
 	memset(object.name, 'o', sizeof(object.name) - 1);
@@ -206,7 +215,7 @@ static void answer_entry(const struct admin_request *rq, struct admin_reply *rep
 	memset(entry.name, 'e', sizeof(entry.name) - 1);
 	if (rq->index == 0x7000) {
 		abort_sdo(reply, 0x08000000, "slave 0 (piccolo0): description: general error");
-	} else if (rq->subindex == 2) {
+	} else if (rq->index != 0x8001 && rq->subindex == 2) {
 		abort_sdo(reply, 0x06090011, "slave 0 (piccolo0): description: no subindex");
 	} else {
 		give(reply, &entry, sizeof(entry));

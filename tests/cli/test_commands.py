@@ -213,16 +213,16 @@ def test_a_dictionary_can_be_listed_in_parts(daemon: Fake) -> None:
     assert subindices(":2") == (0x6000, [3])
     assert subindices(":3", "--count", "18446744073709551615") == (0x6000, [3])
     assert subindices(":4") == (0x6000, [])
-    assert works(daemon("sdo", "list", "0", "--indices")) == "0x6000\n0x7000\n"
+    assert works(daemon("sdo", "list", "0", "--indices")) == "0x6000\n0x7000\n0x8001\n"
 
     def indices(*words: str) -> tuple[list[int], int]:
         found = json_of(daemon("sdo", "list", "0", "--indices", "--json", *words))
         return found["indices"], found["left"]
 
-    assert indices() == ([0x6000, 0x7000], 0)
-    assert indices("--count", "1") == ([0x6000], 1)
-    assert indices("0x6001", "--count", "1") == ([0x7000], 0)
-    assert indices("0x7001", "--count", "9") == ([], 0)
+    assert indices() == ([0x6000, 0x7000, 0x8001], 0)
+    assert indices("--count", "1") == ([0x6000], 2)
+    assert indices("0x6001", "--count", "1") == ([0x7000], 1)
+    assert indices("0x8002", "--count", "9") == ([], 0)
 
 
 def test_clear_sets_counters_to_zero(fake: Callable[..., Fake]) -> None:

@@ -13,7 +13,7 @@
 
 #include <stdint.h>
 
-#define WEB_COMMAND_MAGIC UINT32_C(0x31574445) /* "EDW1": the digit is the version */
+#define WEB_COMMAND_MAGIC UINT32_C(0x32574445) /* "EDW2": the digit is the version */
 
 enum web_verb {
 	WEB_NONE = 0,
@@ -28,7 +28,7 @@ enum {
 	WEB_SECRET_BYTES = 32, /* of a token, of a session's name, of its secret */
 	WEB_SECRET_TEXT_BYTES = 2 * WEB_SECRET_BYTES + 1, /* in hexadecimal */
 	WEB_BODY_BYTES = 1024,
-	WEB_TEXT_BYTES = 2048,
+	WEB_TEXT_BYTES = 16384,
 	WEB_ANSWER_S = 70, /* a reply comes within so much, or never */
 	WEB_TOKEN_MINUTES = 10,
 	WEB_TOKEN_MINUTES_MAX = 24 * 60,

@@ -10,7 +10,7 @@
 #include "base/web_command.h"
 #include "web/sessions.h"
 
-enum { COMMAND_LINES = 8, COMMAND_WORDS = 8, COMMAND_WORD_BYTES = 160 };
+enum { COMMAND_LINES = 8, COMMAND_WORDS = 10, COMMAND_WORD_BYTES = 160 };
 
 /* The lines of a body. */
 struct command_body {
@@ -21,7 +21,9 @@ struct command_body {
 
 /* The arguments of ecdaq; word[count] is NULL. */
 struct command {
-	enum role role; /* that it takes, at least */
+	enum role role;     /* that it takes, at least */
+	unsigned exchanges; /* with a mailbox at most, paced; 0: it is done at once */
+	int is_watching;    /* only reads: no use of the session, no line in the log */
 	int count;
 	const char *word[COMMAND_WORDS + 1];
 	char joined[COMMAND_WORD_BYTES]; /* CHANNEL=VALUE */

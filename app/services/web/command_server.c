@@ -25,6 +25,7 @@
 /* SPARE: for tokens, which ecdaq-web cannot use up. */
 enum { CLIENTS = 24, SPARE = 4, IDLE_MS = 100, BUSY_MS = 5, LINE_BYTES = 400 };
 #define REQUEST_NS (5 * NS_PER_S)
+#define EXCHANGE_NS (NS_PER_S / 5) /* of all pages together: mailboxes are slow, and not theirs */
 #define COMMAND_NS (60 * NS_PER_S)
 
 enum { OK = 200, BAD = 400, NOT_LOGGED_IN = 401, FORBIDDEN = 403, REFUSED = 409 };
@@ -36,7 +37,10 @@ struct client {
 	int64_t end_ns;
 	int pipe; /* of the command that is done; -1: none yet */
 	int export;
-	size_t filled; /* of reply.text */
+	int is_paced;    /* its command */
+	int is_watching; /* its command */
+	int is_cut;      /* what the tool printed is longer than reply.text */
+	size_t filled;   /* of reply.text */
 	char who[LINE_BYTES];
 	struct web_reply reply;
 };
@@ -50,6 +54,7 @@ struct command_server {
 	struct listener page;
 	struct listener token;
 	struct exports exports;
+	int64_t mailbox_ns; /* from when on a mailbox may be asked again */
 	struct client client[CLIENTS + SPARE];
 	struct sessions sessions;
 };
@@ -142,8 +147,43 @@ static void make_token(struct command_server *s, struct client *c, const struct 
 	report(s, "a token for one %s, good for %ld min", role_to_str(role), minutes);
 }
 
+/* Is it the turn of a command to a mailbox? One at a time, so that others find a place. */
+static int may_ask_mailbox(const struct command_server *s)
+{
+	for (int i = 0; i < CLIENTS; i++) {
+		if (s->client[i].pipe >= 0 && s->client[i].is_paced) {
+			return 0;
+		}
+	}
+	return now_of(s) >= s->mailbox_ns;
+}
+
+/* The arguments of the tool, started with @words. 1: it is being done. */
+static int start_tool(struct command_server *s, struct client *c, const char *const *words,
+		      const struct command *command)
+{
+	/* posix_spawn() only reads them */
+	int r = exports_start(&s->exports, (char *const *)(uintptr_t)words, EXPORTS_ERRORS_TO_PIPE,
+			      &c->pipe);
+
+	if (r < 0) {
+		answer(c, BUSY,
+		       r == -EBUSY ? "other commands are being done: try again\n"
+				   : "ecdaq cannot be started\n");
+		return 0;
+	}
+	c->export = r;
+	c->is_paced = command->exchanges > 0;
+	c->is_watching = command->is_watching;
+	c->end_ns = now_of(s) + COMMAND_NS;
+	if (c->is_paced) {
+		s->mailbox_ns = now_of(s) + command->exchanges * EXCHANGE_NS;
+	}
+	return 1;
+}
+
 /* 1: it is being done. */
-static int begin_command(struct command_server *s, struct client *c, const struct session *session,
+static int begin_command(struct command_server *s, struct client *c, struct session *session,
 			 const struct command_body *body)
 {
 	const char *words[COMMAND_WORDS + 4] = { "ecdaq", "--run-dir", s->run_dir };
@@ -161,6 +201,13 @@ static int begin_command(struct command_server *s, struct client *c, const struc
 		answer(c, FORBIDDEN, "the role of this log-in may not do that\n");
 		return 0;
 	}
+	if (!command.is_watching) {
+		session_use(session, now_of(s));
+	}
+	if (command.exchanges > 0 && !may_ask_mailbox(s)) {
+		answer(c, TOO_MANY, "mailboxes are asked one at a time, five times a second\n");
+		return 0;
+	}
 	memcpy(words + 3, command.word, sizeof(command.word[0]) * (size_t)(command.count + 1));
 	used = (size_t)snprintf(c->who, sizeof(c->who), "%s %u:", role_to_str(session->role),
 				session->number);
@@ -168,18 +215,7 @@ static int begin_command(struct command_server *s, struct client *c, const struc
 		used += (size_t)snprintf(c->who + used, sizeof(c->who) - used, " %s",
 					 body->line[i]);
 	}
-	/* posix_spawn() only reads them */
-	r = exports_start(&s->exports, (char *const *)(uintptr_t)words, EXPORTS_ERRORS_TO_PIPE,
-			  &c->pipe);
-	if (r < 0) {
-		answer(c, BUSY,
-		       r == -EBUSY ? "other commands are being done: try again\n"
-				   : "ecdaq cannot be started\n");
-		return 0;
-	}
-	c->export = r;
-	c->end_ns = now_of(s) + COMMAND_NS;
-	return 1;
+	return start_tool(s, c, words, &command);
 }
 
 /* A request of a session that there is. 1: it is being done. */
@@ -187,6 +223,7 @@ static int do_for(struct command_server *s, struct client *c, struct session *se
 		  enum web_verb verb, const struct command_body *body)
 {
 	if (verb == WEB_SESSION) {
+		session_use(session, now_of(s));
 		answer_session(c, session);
 		return 0;
 	}
@@ -288,15 +325,18 @@ static void finish_command(struct command_server *s, struct client *c)
 	}
 	c->export = -1;
 	c->reply.status = r > 0 ? OK : REFUSED;
-	if (r > 0) {
+	if (r > 0 && c->is_cut) {
+		answer(c, FAILED, "done, but what it says is longer than an answer may be\n");
+	}
+	if (r > 0 && !c->is_watching) {
 		report(s, "%s: done", c->who);
-	} else {
+	} else if (r <= 0 && !c->is_watching) {
 		report(s, "%s: %.*s", c->who, (int)strcspn(c->reply.text, "\n"), c->reply.text);
 	}
 	send_answer(s, c);
 }
 
-/* What the tool prints, up to the end; what does not fit is left out. */
+/* What the tool prints, up to the end. */
 static void read_command(struct command_server *s, struct client *c)
 {
 	char buf[WEB_TEXT_BYTES];
@@ -315,6 +355,7 @@ static void read_command(struct command_server *s, struct client *c)
 
 		memcpy(c->reply.text + c->filled, buf, bytes);
 		c->filled += bytes;
+		c->is_cut = c->is_cut || bytes < (size_t)n;
 	} else if (n == 0 || (errno != EAGAIN && errno != EINTR)) {
 		finish_command(s, c);
 	}

@@ -216,10 +216,12 @@ struct session *sessions_find(struct sessions *s, const char *text, int64_t now_
 			found = &s->session[i];
 		}
 	}
-	if (found != NULL) {
-		found->idle_end_ns = now_ns + SESSION_IDLE_NS;
-	}
 	return found;
+}
+
+void session_use(struct session *session, int64_t now_ns)
+{
+	session->idle_end_ns = now_ns + SESSION_IDLE_NS;
 }
 
 int session_has_secret(const struct session *session, const char *text)

@@ -67,8 +67,10 @@ int sessions_make_token(struct sessions *s, enum role role, int64_t now_ns, int6
  */
 int sessions_log_in(struct sessions *s, const char *text, int64_t now_ns,
 		    struct session **ret_session);
-/** The session of the name @text, NULL: none; it counts as used. */
+/** The session of the name @text, NULL: none. */
 struct session *sessions_find(struct sessions *s, const char *text, int64_t now_ns);
+/** Somebody uses it: its time without use begins anew. */
+void session_use(struct session *session, int64_t now_ns);
 /** Is @text the secret of the session? */
 int session_has_secret(const struct session *session, const char *text);
 void session_end(struct session *session);

@@ -9,10 +9,16 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-static int is_fixed(const char *word)
+/* A word of the body; what is not from there is fixed. */
+static int is_given(const struct command_body *body, const char *word)
 {
-	return strcmp(word, "--json") == 0 || strcmp(word, "--force") == 0 ||
-	       strcmp(word, "--reset") == 0;
+	return word >= body->text && word < body->text + sizeof(body->text);
+}
+
+/* As the tool takes it: "-5" and "-.5" are none. */
+static int is_option(const char *word)
+{
+	return word[0] == '-' && word[1] != '.' && (word[1] < '0' || word[1] > '9');
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
@@ -34,9 +40,12 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 			abort();
 		}
 		for (int i = 0; i < command.count; i++) {
-			if (command.word[i][0] == '-' && (i != 1 || !is_fixed(command.word[i]))) {
+			if (is_given(&body, command.word[i]) && is_option(command.word[i])) {
 				abort();
 			}
+		}
+		if (command.joined[0] != '\0' && is_option(command.joined)) {
+			abort();
 		}
 	}
 	return 0;

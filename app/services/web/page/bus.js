@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The view Bus: the tree of ports, and all that is known of one slave.
+import { Dictionary } from "./dictionary.js";
 import { branches } from "./tree.js";
 import { button, row, set_level, set_text } from "./table.js";
 
@@ -32,6 +33,7 @@ export class BusView {
     this.on_choose = on_choose;
     this.command = command;
     this.chosen = NaN;
+    this.dictionary = new Dictionary(command);
     const chosen = () => [String(this.chosen)];
     this.add_buttons("bus-commands", "the bus", () => [], [["Scan anew", "rescan"], ["Reset counters", "clear"]]);
     this.add_buttons("slave-commands", "this slave", chosen, [["Reset error counters", "errors"]]);
@@ -58,6 +60,7 @@ export class BusView {
   read_place(place) {
     this.chosen = number_of(place);
     by_id("bus-slave").hidden = true;
+    this.dictionary.choose(NaN);
     this.mark();
   }
 
@@ -157,9 +160,11 @@ export class BusView {
     const panel = by_id("bus-slave");
     if (slave.position !== this.chosen || slave.name === undefined) {
       panel.hidden = true;
+      this.dictionary.choose(NaN);
       return;
     }
     panel.hidden = false;
+    this.dictionary.choose(slave.position, Object.values(slave.found).join(" "));
     set_text(by_id("bus-slave-name"), `${slave.position} ${slave.name}: ${slave.state}`);
     set_level(by_id("bus-slave-name"), slave.level);
     set_text(by_id("bus-slave-hint"), slave.hint);

@@ -38,6 +38,12 @@ TEST(web_command, each_command_is_a_verb_of_the_tool_for_a_role)
 		{ "rescan", "rescan --force", ROLE_ENGINEER },
 		{ "clear", "clear", ROLE_ENGINEER },
 		{ "errors\n0", "crc --reset 0", ROLE_ENGINEER },
+		{ "objects\n1\n0x1000", "sdo list --json --indices --count 1000 1 0x1000",
+		  ROLE_OPERATOR },
+		{ "object\n1\n0x1018:0a", "sdo list --json --count 4 1 0x1018:0a", ROLE_OPERATOR },
+		{ "read\n0\n0x1018:1", "sdo read --json 0 0x1018:1", ROLE_OPERATOR },
+		{ "write\nINT\n0\n0x8000:2\n-5", "sdo write --type INT 0 0x8000:2 -5",
+		  ROLE_ENGINEER },
 	};
 	char words[WEB_BODY_BYTES];
 	struct command command;
@@ -46,6 +52,29 @@ TEST(web_command, each_command_is_a_verb_of_the_tool_for_a_role)
 		CHECK_EQ(parse(good[i].text, &command, words), 0);
 		CHECK_STR(words, good[i].words);
 		CHECK_EQ(command.role, good[i].role);
+	}
+}
+
+TEST(web_command, what_asks_a_mailbox_has_its_cost_and_what_only_reads_is_no_use)
+{
+	static const struct {
+		const char *text;
+		unsigned exchanges;
+		int is_watching;
+	} want[] = {
+		{ "set\na\n1", 0, 0 },
+		{ "objects\n0\n0x1000", 1, 1 },
+		{ "object\n0\n0x1000", 5, 1 },
+		{ "read\n0\n0x1000", 1, 1 },
+		{ "write\nINT\n0\n0x1000\n1", 1, 0 },
+	};
+	char words[WEB_BODY_BYTES];
+	struct command command;
+
+	for (size_t i = 0; i < sizeof(want) / sizeof(want[0]); i++) {
+		CHECK_EQ(parse(want[i].text, &command, words), 0);
+		CHECK_EQ(command.exchanges, want[i].exchanges);
+		CHECK_EQ(command.is_watching, want[i].is_watching);
 	}
 }
 
@@ -69,6 +98,17 @@ TEST(web_command, no_word_becomes_an_option_and_others_are_refused)
 		{ "state\nOP\n-1", -EINVAL },
 		{ "state\nOP\nall", -EINVAL },
 		{ "rescan\n1", -EINVAL },
+		{ "objects\n0", -EINVAL },
+		{ "object\n0\n-h", -EINVAL },
+		{ "object\n0\n0x1018:1 ", -EINVAL },
+		{ "object\n--help\n0x1018", -EINVAL },
+		{ "read\n0\n0x1018\n1", -EINVAL },
+		{ "read\n0\n--complete", -EINVAL },
+		{ "write\nINT\n0\n0x8000:2", -EINVAL },
+		{ "write\nINT\n0\n0x8000:2\n-h", -EINVAL },
+		{ "write\nINT\n0\n0x8000:2\n--complete", -EINVAL },
+		{ "write\nINT\n0\n0x8000:2\n-", -EINVAL },
+		{ "write\n-t\n0\n0x8000:2\n1", -EINVAL },
 		{ "errors\n--json", -EINVAL },
 		{ "", -EBADMSG },
 		{ "\n", -EBADMSG },

@@ -117,6 +117,26 @@ TEST(sessions, wrong_tokens_are_limited_for_a_minute_and_a_good_one_is_not)
 	CHECK_EQ(sessions_log_in(s, "x", T0 + 60 * NS_PER_S, &session), -EACCES);
 }
 
+static int use(struct sessions *s, const char *id, int64_t now_ns)
+{
+	struct session *session = sessions_find(s, id, now_ns);
+
+	if (session != NULL) {
+		session_use(session, now_ns);
+	}
+	return session != NULL;
+}
+
+TEST(sessions, to_find_a_session_is_no_use_of_it)
+{
+	struct sessions *s = make();
+	char id[WEB_SECRET_TEXT_BYTES];
+
+	session_text(log_in(s, ROLE_VIEWER, T0)->id, id);
+	CHECK_EQ(sessions_find(s, id, T0 + SESSION_IDLE_NS - 1) != NULL, 1);
+	CHECK_EQ(sessions_find(s, id, T0 + SESSION_IDLE_NS) == NULL, 1);
+}
+
 TEST(sessions, a_session_ends_when_it_is_idle_and_after_its_life)
 {
 	struct sessions *s = make();
@@ -124,14 +144,14 @@ TEST(sessions, a_session_ends_when_it_is_idle_and_after_its_life)
 	int64_t now_ns = T0;
 
 	session_text(log_in(s, ROLE_VIEWER, T0)->id, id);
-	CHECK_EQ(sessions_find(s, id, T0 + SESSION_IDLE_NS - 1) != NULL, 1);
-	CHECK_EQ(sessions_find(s, id, T0 + 2 * SESSION_IDLE_NS - 2) != NULL, 1);
-	CHECK_EQ(sessions_find(s, id, T0 + 3 * SESSION_IDLE_NS - 2) == NULL, 1);
+	CHECK_EQ(use(s, id, T0 + SESSION_IDLE_NS - 1), 1);
+	CHECK_EQ(use(s, id, T0 + 2 * SESSION_IDLE_NS - 2), 1);
+	CHECK_EQ(use(s, id, T0 + 3 * SESSION_IDLE_NS - 2), 0);
 	CHECK_EQ(is_zero(s->session, sizeof(s->session)), 1);
 
 	session_text(log_in(s, ROLE_VIEWER, T0)->id, id);
 	for (now_ns = T0; now_ns < T0 + SESSION_LIFE_NS; now_ns += SESSION_IDLE_NS / 2) {
-		CHECK_EQ(sessions_find(s, id, now_ns) != NULL, 1);
+		CHECK_EQ(use(s, id, now_ns), 1);
 	}
 	CHECK_EQ(sessions_find(s, id, T0 + SESSION_LIFE_NS) == NULL, 1);
 }
