@@ -6,9 +6,11 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import socket
 import stat
 import struct
+import subprocess
 from collections.abc import Callable
 
 import npm
@@ -16,6 +18,7 @@ import pytest
 from browser import Browser
 from ecdaq import NO_DAEMON, REFUSED, USAGE, Fake, ecdaq, fails, json_of
 from recording import Bench
+from test_web import VIEWER
 from test_web_views import AXE, FOUND
 from web_bench import Web
 from web_client import RejectedError, WebSocket, http
@@ -314,6 +317,26 @@ def test_it_starts_again_and_nobody_is_logged_in_any_more(
     assert session.ask("set", LED, "1")[0] == 401
     again.stop()
     assert list(again.folder.iterdir()) == []
+
+
+def test_the_published_client_of_foxglove_gets_no_service_even_with_a_log_in(
+    daemon: Fake, web: Web, web_command: WebCommand
+) -> None:
+    session = Session(web, web_command.token("engineer"))
+    folder = npm.install(VIEWER, "@foxglove/ws-protocol")
+    shutil.copy(VIEWER / "services.js", folder)
+    done = subprocess.run(
+        ["node", "services.js", f"ws://127.0.0.1:{web.port}", session.cookie],
+        cwd=folder, capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert (found["capabilities"], found["services"]) == (["parameters"], [])
+    assert found["responses"] == 0
+    assert found["status"]["message"].startswith("a request was ignored")
+    assert json_of(daemon("watch", LED, "--count", "1", "--json"))["values"] == {LED: 0}
+    # The same log-in may do it where it may.
+    assert session.ask("set", LED, "1")[0] == 200
 
 
 def press(browser: Browser, selector: str) -> None:
