@@ -24,6 +24,7 @@ UPDATE_DISKS = os.environ.get("ECDAQ_UPDATE_DISKS", "2000")
 FUZZ_TARGETS = os.environ.get("ECDAQ_FUZZ_TARGETS", "eni esi").split()
 FUZZ_SECONDS = int(os.environ.get("ECDAQ_FUZZ_SECONDS", "3600"))
 FIRST_BOOTS = os.environ.get("ECDAQ_FIRST_BOOTS", "12")
+WEB_HOUR_SECONDS = os.environ.get("ECDAQ_WEB_HOUR_SECONDS", "3600")
 UPDATE_BOOTS = os.environ.get("ECDAQ_UPDATE_BOOTS", "8")
 
 
@@ -141,6 +142,14 @@ ALL = (
         (
             "python tests/cli/web_figures.py",
             partial(run, [sys.executable, "tests/cli/web_figures.py"], "."),
+        ),
+    ),
+    subject(
+        "web-hour",
+        f"ecdaq-web and its page, open for {WEB_HOUR_SECONDS} s (ECDAQ_WEB_HOUR_SECONDS)",
+        (
+            f"python tests/cli/web_hour.py {WEB_HOUR_SECONDS}",
+            partial(run, [sys.executable, "tests/cli/web_hour.py", WEB_HOUR_SECONDS], "."),
         ),
     ),
     subject(
