@@ -36,10 +36,16 @@
 #ifndef PRODUCER_SLAVES
 #define PRODUCER_SLAVES 2
 #endif
+#ifndef PRODUCER_ADCS
+#define PRODUCER_ADCS 1
+#endif
 enum {
 	SLAVES = PRODUCER_SLAVES,
-	CHANNELS = 3 * SLAVES + 1,
-	SLAVE_BYTES = 14,
+	ADCS = PRODUCER_ADCS,
+	SLAVE_CHANNELS = ADCS + 2,
+	CHANNELS = SLAVE_CHANNELS * SLAVES + 1,
+	TIMES_AT = 2 * ADCS, /* counter, sample_time: behind the values */
+	SLAVE_BYTES = TIMES_AT + 12,
 	IMAGE_BYTES = 1 + SLAVES * SLAVE_BYTES
 };
 
@@ -122,13 +128,13 @@ static void add_channel(struct meta *m, unsigned n, const char *name, unsigned s
 	snprintf(ch->name, sizeof(ch->name), "piccolo%u.%s", slave, name);
 	ch->slave_pos = (uint16_t)slave;
 	ch->index = strcmp(name, "led") == 0 ? 0x7000 : 0x6000;
-	ch->subindex = (uint8_t)(n % 3 + 1);
+	ch->subindex = (uint8_t)(n % SLAVE_CHANNELS + 1);
 	ch->type = (uint8_t)type;
 	ch->direction = strcmp(name, "led") == 0 ? CHANNEL_OUTPUT : CHANNEL_INPUT;
 	ch->bit_len = (uint8_t)bits;
 	ch->bit_offset = offset;
 	ch->scale = 1;
-	if (strcmp(name, "adc") == 0) {
+	if (strncmp(name, "adc", 3) == 0) {
 		snprintf(ch->unit, sizeof(ch->unit), "V");
 		ch->scale = 3.3 / 4096;
 	}
@@ -157,10 +163,17 @@ static void describe(struct meta *m, uint64_t session)
 		info->slave_pos = (uint16_t)s;
 		info->has_dc = 1;
 		info->is_dc_reference = s == 0;
-		info->counter_channel = (int32_t)n + 1;
+		info->counter_channel = (int32_t)n + ADCS;
 		add_channel(m, n++, "adc", s, CHANNEL_UINT, 16, base);
-		add_channel(m, n++, "counter", s, CHANNEL_UINT, 16, base + 16);
-		add_channel(m, n++, "sample_time", s, CHANNEL_UINT, 64, base + 32);
+		for (unsigned i = 1; i < ADCS; i++) {
+			char name[16];
+
+			snprintf(name, sizeof(name), "adc%u", i + 1);
+			add_channel(m, n++, name, s, CHANNEL_UINT, 16, base + 16 * i);
+		}
+		base += 8 * TIMES_AT;
+		add_channel(m, n++, "counter", s, CHANNEL_UINT, 16, base);
+		add_channel(m, n++, "sample_time", s, CHANNEL_UINT, 64, base + 16);
 	}
 	add_channel(m, n, "led", 1, CHANNEL_BOOL, 1, 0);
 }
@@ -174,9 +187,11 @@ static void fill_image(uint8_t *image, uint64_t cycle, int64_t dc_ns)
 		uint8_t *p = image + 1 + (size_t)s * SLAVE_BYTES;
 		double volt = 1 + 0.5 * sin(2 * M_PI * (t - 0.25 * s));
 
-		put_le16(p, (uint16_t)lround(volt / 3.3 * 4096));
-		put_le16(p + 2, (uint16_t)cycle);
-		put_le64(p + 4, (uint64_t)dc_ns);
+		for (unsigned i = 0; i < ADCS; i++) {
+			put_le16(p + (size_t)2 * i, (uint16_t)lround(volt / 3.3 * 4096));
+		}
+		put_le16(p + TIMES_AT, (uint16_t)cycle);
+		put_le64(p + TIMES_AT + 2, (uint64_t)dc_ns);
 	}
 }
 

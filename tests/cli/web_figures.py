@@ -1,15 +1,19 @@
 # SPDX-License-Identifier: MIT
 """What a client of ecdaq-web costs, and how old a sample is when it is drawn.
 
-python tests/cli/web_figures.py [SECONDS]
+python tests/cli/web_figures.py [SECONDS [HISTORY_MINUTES]]
 
-Samples of two and of 512 slaves with three channels each, at 1 kHz, without a bus; clients of the
-protocol that ask as the page does; for the age of a sample the page itself in a browser.
+Samples of two slaves with three channels each, of 64 with 16 and of 512 with three, at 1 kHz,
+without a bus; clients of the protocol that ask as the page does; for the age of a sample the page
+itself in a browser. Of the first two also an hour of history: recorded as fast as it goes, then
+continued live by the same session, with a recorder; the scope has the whole hour open. Processor
+time is that of ecdaq-web and of the processes that it starts to read recordings.
 """
 
 from __future__ import annotations
 
 import json
+import shutil
 import statistics
 import sys
 import tempfile
@@ -17,6 +21,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from subprocess import Popen
 from typing import Any
 
 import recording
@@ -28,6 +33,8 @@ REDRAW_S = 0.04
 SAMPLE_TIME = 2  # piccolo0.sample_time: DC time of the edge
 DC_START_NS = 800_000_000 * 10**9  # of the producer
 DRAW: dict[str, Any] = {"channels": [0, 3], "cycles": 2000, "pixels": 900, "end": 0}
+START_NS = 1_795_700_000_000_000_000  # of a session with history
+CHUNK = 300_000  # cycles that are in a ring at a time while the history is made
 RISING = {"edge": "rising", "trigger": 0, "level": 1, "before": 500}
 
 
@@ -130,6 +137,44 @@ def ages_ms(web: Web, folder: Path, seconds: float) -> list[float]:
     ]
 
 
+def produce(bench: recording.Bench, program: Path, first: int, *words: str) -> Popen[str]:
+    """A ring of the session, from this cycle on."""
+    (bench.run_dir / "samples").unlink(missing_ok=True)
+    tai = START_NS + first * 10**6
+    return bench.start(
+        program, bench.run_dir, "--session", str(START_NS), "--tai", str(tai),
+        "--first", str(first), *words,
+    )  # fmt: skip
+
+
+def record(bench: recording.Bench, program: Path, cycles: int) -> None:
+    """So many cycles, as fast as it goes."""
+    for first in range(0, cycles, CHUNK):
+        count = min(CHUNK, cycles - first)
+        producer = produce(bench, program, first, "--cycles", str(count), "--depth", str(1 << 19))
+        assert producer.wait(600) == 0
+        recorder = bench.record("--once", "--set", "record.budget=64GiB")
+        _, output = recorder.communicate(timeout=3600)
+        assert recorder.returncode == 0, output
+
+
+def on_history(program: Path, cycles: int, act: Callable[[Web], None]) -> None:
+    with tempfile.TemporaryDirectory(prefix="ecdaq-web-") as folder:
+        run_dir = Path(tempfile.mkdtemp(prefix="ecdaq-web-", dir="/dev/shm"))
+        bench = recording.Bench(run_dir, Path(folder))
+        try:
+            record(bench, program, cycles)
+            size = bench.recorded_bytes()
+            print(f"  {cycles / 60000:g} min of history: {size / 1e9:.2f} GB", flush=True)
+            produce(bench, program, cycles, "--cycles", "100000000", "--pace", "--events", "1")
+            recording.wait_until("a ring", (run_dir / "samples").exists)
+            bench.record("--set", "record.budget=64GiB")
+            act(Web(bench, **{"web.clients": "64", "record.dir": folder}))
+        finally:
+            bench.close()
+            shutil.rmtree(run_dir)
+
+
 def on_bench(program: Path, act: Callable[[Web, Path], None]) -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -152,11 +197,30 @@ def print_costs(web: Web, seconds: float) -> None:
     while first.draw(**DRAW | {"cycles": 60000, "end": 0})[0].get("first", 0) == 0:
         wait_seconds(0.5)  # until there is a minute of samples
     first.close()
+    print_views(web, seconds, VIEWS)
+
+
+def print_history(web: Web, seconds: float, cycles: int) -> None:
+    """With the whole of it in the scope, up to the newest sample."""
+    client = Client(web.port)
+    client.wait_for("table", lambda m: m["channels"])
+    started = time.monotonic()
+    head, values, _ = client.draw(**DRAW | {"cycles": cycles})
+    took = time.monotonic() - started
+    assert head["op"] == "picture", head
+    empty = sum(value != value for value in values[0][: head["pixels"]])
+    print(f"  first picture after {took:.2f} s, {empty} of {head['pixels']} columns empty")
+    client.close()
+    view = {f"Scope, {cycles / 60000:g} min": {"op": "draw"} | DRAW | {"cycles": cycles}}
+    print_views(web, seconds, view)
+
+
+def print_views(web: Web, seconds: float, views: dict[str, dict[str, Any]]) -> None:
     nobody, cpu = time.monotonic(), web.cpu_seconds()
     wait_seconds(seconds)
     idle = 100 * (web.cpu_seconds() - cpu) / (time.monotonic() - nobody)
     print(f"  {'no client':30} {'':>12} {idle:10.2f} %")
-    for view, request in VIEWS.items():
+    for view, request in views.items():
         for count in (1, 8):
             sent, share, pictures = measure(web, count, seconds, request)
             share -= idle / count
@@ -174,10 +238,17 @@ def print_ages(web: Web, folder: Path, seconds: float) -> None:
 
 def main(arguments: list[str]) -> None:
     seconds = float(arguments[0]) if arguments else 5
-    producers = {2: recording.PRODUCER, 512: Path(f"{recording.PRODUCER}_512")}
-    for slaves, program in producers.items():
-        print(f"{slaves} slaves x 3 channels, 1 kHz; of one client, {seconds:g} s each:")
+    history = int(float(arguments[1]) * 60000) if len(arguments) > 1 else 3_600_000
+    benches = {
+        "2 slaves x 3 channels": (recording.PRODUCER, history),
+        "64 slaves x 16 channels": (Path(f"{recording.PRODUCER}_64x16"), history),
+        "512 slaves x 3 channels": (Path(f"{recording.PRODUCER}_512"), 0),
+    }
+    for what, (program, cycles) in benches.items():
+        print(f"{what}, 1 kHz; of one client, {seconds:g} s each:", flush=True)
         on_bench(program, lambda web, _: print_costs(web, seconds))
+        if cycles > 0:
+            on_history(program, cycles, lambda web, n=cycles: print_history(web, seconds, n))
     print("from the wake of a cycle to the browser's frame that shows its sample, window of 2 s:")
     if find() is None:
         print("  no chromium-headless-shell here")

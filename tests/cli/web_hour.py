@@ -4,10 +4,10 @@
 python tests/cli/web_hour.py [SECONDS]
 
 Samples of two slaves at 1 kHz, without a bus. A page stays open in a browser and goes from view to
-view; a viewer stays subscribed to everything; clients of both protocols connect, subscribe, draw and leave, some of them in the middle of
-a message; files, figures and log-ins are asked for. After a warm-up, in which the memory for
-messages fills, both are looked at: the server when all but these two have left, the page after a
-garbage collection.
+view; a viewer stays subscribed to everything; clients of both protocols connect, subscribe, draw
+and leave, some of them in the middle of a message; files, figures and log-ins are asked for. After
+a warm-up, in which the memory for messages fills, both are looked at: the server when all but these
+two have left, the page after a garbage collection.
 """
 
 from __future__ import annotations
