@@ -39,7 +39,7 @@ DRAWS = (
 )
 # What may be more at the end than after the warm-up.
 SERVER_BYTES = 512 * 1024
-HEAP_BYTES = 160 * 1024
+HEAP_BYTES = 512 * 1024
 NODES = 200
 LISTENERS = 20
 
