@@ -145,3 +145,34 @@ def test_the_scope_saves_what_it_shows_as_a_recording(
     assert found == list(range(found[0], found[-1] + 1))
     assert len(found) == 1000
     assert browser.problems() == []
+
+
+def test_a_live_window_waits_until_its_newest_samples_are_recorded(
+    bench: Bench,
+    make_web: Callable[..., Web],
+    make_browser: Callable[..., Browser],
+    tmp_path: Path,
+) -> None:
+    """With chunks of 2 s: after the 2 s of the default the end would not always be there."""
+    config = tmp_path / "slow.yaml"
+    config.write_text("record:\n  chunk_period: 2s\n  sync_period: 2s\n")
+    bench.produce("--cycles", "1000000", "--pace")
+    bench.record("--config", str(config))
+    server = make_web(config, record_dir=str(bench.folder))
+    browser = make_browser(server, "#scope?c=piccolo0.adc&w=1")
+    browser.wait_for("document.querySelector('#scope-rows td')?.textContent === 'piccolo0.adc'")
+    browser.value("new Promise((done) => setTimeout(done, 1500))")  # of live samples
+    browser.value(
+        "window.asked = performance.now(); HTMLAnchorElement.prototype.click = function () {"
+        " const waited = performance.now() - asked;"
+        " fetch(this.getAttribute('href')).then((r) => r.arrayBuffer()).then((data) => {"
+        " window.saved = [this.download, waited, Array.from(new Uint8Array(data))]; }); };"
+        " { const s = document.querySelector('#scope-save'); s.value = 'mcap';"
+        " s.dispatchEvent(new Event('input')); }"
+    )
+    browser.wait_for("window.saved !== undefined", 60)
+    name, waited_ms, data = browser.value("saved")
+    assert waited_ms >= 4500
+    found = cycles(bytes(data))
+    assert len(found) == 1000
+    assert name == f"ecdaq-{found[0]}-{found[-1]}.mcap"

@@ -25,7 +25,7 @@ static void put_channel(struct json *js, const struct channel *ch)
 	json_object_end(js);
 }
 
-char *page_table(const struct channel_table *table)
+char *page_table(const struct channel_table *table, int64_t recorded_ms)
 {
 	char session[24] = "";
 	struct text t;
@@ -38,6 +38,7 @@ char *page_table(const struct channel_table *table)
 	}
 	json_text(&t.json, "session", session);
 	json_u64(&t.json, "period_ns", table == NULL ? 0 : table->meta.period_ns);
+	json_i64(&t.json, "recorded_ms", recorded_ms);
 	json_array_begin(&t.json, "slaves");
 	for (uint32_t i = 0; table != NULL && i < table->meta.slave_count; i++) {
 		json_text(&t.json, NULL, table->slaves[i].name);

@@ -47,8 +47,9 @@ struct page_status {
 };
 
 /* Texts; free() them. NULL without memory. */
-/** Slaves and channels of the session; @table NULL: there is none yet. */
-char *page_table(const struct channel_table *table);
+/** Slaves and channels of the session; @table NULL: there is none yet. A sample is in a recording
+ * after @recorded_ms. */
+char *page_table(const struct channel_table *table, int64_t recorded_ms);
 char *page_state(const struct page_status *status);
 /** A value for each channel; NaN: not good. */
 char *page_values(const double *value, uint32_t count, uint64_t cycle);

@@ -20,6 +20,7 @@ enum {
 	/* After a picture that took so long no other one is drawn for a multiple of that: the
 	 * clients together take a third of a processor at most. */
 	DRAW_PAUSE = 2,
+	RECORDED_SPARE_MS = 900,
 };
 #define REFRESH_NS (250 * NS_PER_MS)
 
@@ -50,7 +51,8 @@ struct server_pages {
 	char *table;
 	uint64_t session; /* of table; 0: none */
 	uint64_t table_number;
-	char *values; /* NULL: no session */
+	int64_t recorded_ms; /* after which a sample is in a recording */
+	char *values;        /* NULL: no session */
 };
 
 struct page_client {
@@ -106,7 +108,10 @@ int server_pages_create(struct server *s)
 		return r;
 	}
 	p->value = calloc(LIMIT_CHANNELS, sizeof(p->value[0]));
-	p->table = page_table(NULL);
+	p->recorded_ms =
+		(s->cfg->record_chunk_period_ns + s->cfg->record_sync_period_ns) / NS_PER_MS +
+		RECORDED_SPARE_MS;
+	p->table = page_table(NULL, p->recorded_ms);
 	return p->value == NULL || p->table == NULL ? -ENOMEM : 0;
 }
 
@@ -139,7 +144,7 @@ static void refresh_table(struct server_pages *p)
 	p->values = NULL;
 	if (session != p->session) {
 		free(p->table);
-		p->table = page_table(table);
+		p->table = page_table(table, p->recorded_ms);
 		p->session = session;
 		p->table_number++;
 	}

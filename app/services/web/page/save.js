@@ -3,8 +3,6 @@
 import { paint, plot_area } from "./chart.js";
 import { SvgContext } from "./svg.js";
 
-const RECORDER_MS = 2000; // after which the recorder has written what is new
-
 function follow(href, name) {
   const made = document.createElement("a");
   made.href = href;
@@ -18,11 +16,11 @@ function download(blob, name) {
   setTimeout(() => URL.revokeObjectURL(href), 10000);
 }
 
-// The cycles of the picture with all channels, as they were recorded.
-export function save_recording({ first, cycles }, session, is_live) {
+// The cycles of the picture with all channels, as they were recorded; of a live one when the newest ones are.
+export function save_recording({ first, cycles }, { session, recorded_ms }, is_live) {
   const last = first + cycles - 1;
   const href = `window.mcap?session=${session}&from=${first}&to=${last}`;
-  setTimeout(() => follow(href, `ecdaq-${first}-${last}.mcap`), is_live ? RECORDER_MS : 0);
+  setTimeout(() => follow(href, `ecdaq-${first}-${last}.mcap`), is_live ? recorded_ms : 0);
 }
 
 // The options of chart.js, and the channels of the table.

@@ -281,7 +281,7 @@ export class Scope {
       return;
     }
     if (kind === "mcap") {
-      save_recording(this.picture, this.table.session, this.is_live());
+      save_recording(this.picture, this.table, this.is_live());
       return;
     }
     save_as(kind, this.canvas, this.picture, { ...this.options(), channels: this.channels_of(this.picture) });

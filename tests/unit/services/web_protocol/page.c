@@ -129,9 +129,9 @@ TEST(web_protocol, values_that_are_not_good_are_null)
 
 TEST(web_protocol, a_page_without_a_master_has_a_table_without_channels)
 {
-	char *text = page_table(NULL);
+	char *text = page_table(NULL, 2000);
 
-	CHECK_STR(text, "{\"op\":\"table\",\"session\":\"\",\"period_ns\":0,\"slaves\":[],"
-			"\"channels\":[]}");
+	CHECK_STR(text, "{\"op\":\"table\",\"session\":\"\",\"period_ns\":0,"
+			"\"recorded_ms\":2000,\"slaves\":[],\"channels\":[]}");
 	free(text);
 }
