@@ -53,7 +53,7 @@ static void refresh(struct esc *esc, enum esc_side side, int64_t t_ns, uint16_t 
 {
 	uint8_t *r = esc->reg;
 
-	if (esc_touches(addr, len, ESC_REG_SM, ESC_LIMIT_SM * ESC_SM_BYTES)) {
+	if (esc_touches(addr, len, ESC_REG_SM, (size_t)ESC_LIMIT_SM * ESC_SM_BYTES)) {
 		esc_sm_to_registers(esc, addr, len);
 	}
 	if (addr + len > ESC_REG_DC_SYSTEM_TIME && addr < ESC_REG_USER_RAM) {
