@@ -66,7 +66,7 @@ struct platform platform_posix(void)
 
 int platform_tai_offset_s(int32_t *ret_offset_s)
 {
-	struct clock_quality quality;
+	struct clock_quality quality = { .tai_offset_s = 0 };
 	int r = posix_clock_quality(NULL, &quality);
 
 	if (r == 0) {

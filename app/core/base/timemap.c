@@ -44,9 +44,7 @@ struct timemap *timemap_create(int32_t tai_offset_s)
 	struct timemap *map = calloc(1, sizeof(*map));
 
 	if (map != NULL) {
-		map->state.tai_offset_s = tai_offset_s;
-		map->state.clock_error_ns = -1;
-		map->state.clock_estimate_ns = -1;
+		map->state = timemap_state_unknown(tai_offset_s);
 		map->tai_offset_next_s = tai_offset_s;
 	}
 	return map;

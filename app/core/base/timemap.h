@@ -32,6 +32,14 @@ struct timemap_state {
 	int32_t tai_offset_s; /* TAI - UTC in use; 0: the kernel's is unset and CLOCK_TAI is UTC */
 };
 
+/** Before the first pair. */
+static inline struct timemap_state timemap_state_unknown(int32_t tai_offset_s)
+{
+	return (struct timemap_state){ .clock_error_ns = -1,
+				       .clock_estimate_ns = -1,
+				       .tai_offset_s = tai_offset_s };
+}
+
 enum timemap_news {
 	TIMEMAP_QUIET,   /* nothing new */
 	TIMEMAP_UPDATED, /* a new state, in line with the one before */

@@ -230,9 +230,7 @@ static int fail(struct sink *s, int error, const char *what)
 void sink_begin_session(struct sink *s, const struct layout *layout, enum sink_news news)
 {
 	s->layout = layout;
-	s->timemap = (struct timemap_state){ .tai_offset_s = layout_meta(layout)->tai_offset_s,
-					     .clock_error_ns = -1,
-					     .clock_estimate_ns = -1 };
+	s->timemap = timemap_state_unknown(layout_meta(layout)->tai_offset_s);
 	if (news == SINK_NEW_SESSION) {
 		s->resume.session = layout_meta(layout)->session;
 		s->resume.next_cycle = 0;
