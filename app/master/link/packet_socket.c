@@ -15,6 +15,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "link/packet_ring.h"
 #include "wire/datagram.h"
 
 #ifndef PACKET_IGNORE_OUTGOING
@@ -25,6 +26,7 @@ enum { SOCKET_BUFFER_BYTES = 1 << 20, BUSY_POLL_US = 50, SPIN_CPUS_MIN = 3 };
 
 struct packet_socket {
 	int fd;
+	struct packet_ring ring;
 	int is_spinning;
 	int has_sent;                /* [owner of the transport] and not looked for a frame since */
 	_Atomic int interface_index; /* [service] changes when the NIC was removed and came back */
@@ -51,31 +53,21 @@ static int packet_send(void *ctx, const uint8_t *frame, size_t frame_len)
 	return (size_t)r == frame_len ? 0 : -EIO;
 }
 
-/* One look: a frame's length, -errno. -EAGAIN is nothing, or one of our own outgoing frames or a
- * jumbo frame, which are passed over one a look: the caller minds its deadline between them. */
-static int take_frame(const struct packet_socket *ps, uint8_t *frame, size_t capacity)
-{
-	struct sockaddr_ll from = { 0 };
-	socklen_t from_len = sizeof(from);
-	ssize_t r = recvfrom(ps->fd, frame, capacity, MSG_DONTWAIT | MSG_TRUNC,
-			     (struct sockaddr *)&from, &from_len);
-
-	if (r < 0) {
-		return errno == EINTR ? -EAGAIN : -errno;
-	}
-	return (size_t)r <= capacity && from.sll_pkttype != PACKET_OUTGOING ? (int)r : -EAGAIN;
-}
-
+/* An error of the interface ends each wait at once until it is asked for. It is not reported: what
+ * happened to the link is_up() tells, and it may be back before the deadline. */
 static void sleep_for_frame(const struct packet_socket *ps, int64_t left_ns)
 {
 	struct pollfd pfd = { .fd = ps->fd, .events = POLLIN };
 	struct timespec ts = { .tv_sec = left_ns / NS_PER_S, .tv_nsec = left_ns % NS_PER_S };
+	int error;
+	socklen_t error_len = sizeof(error);
 
-	ppoll(&pfd, 1, &ts, NULL);
+	if (ppoll(&pfd, 1, &ts, NULL) > 0 && (pfd.revents & POLLERR) != 0) {
+		getsockopt(ps->fd, SOL_SOCKET, SO_ERROR, &error, &error_len);
+	}
 }
 
-/* Right behind a frame that was sent its answer is not there: a look would be one system call for
- * nothing. */
+/* Right behind a frame that was sent its answer is not there. */
 static void wait_behind_send(struct packet_socket *ps, mono_t deadline)
 {
 	int64_t left_ns = ps->has_sent && !ps->is_spinning ? deadline.ns - now_ns() : 0;
@@ -93,7 +85,9 @@ static int packet_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t dea
 
 	wait_behind_send(ps, deadline);
 	for (;;) {
-		int r = take_frame(ps, frame, capacity);
+		/* One frame a look, also of those passed over: the deadline is minded between them.
+		 */
+		int r = packet_ring_take(&ps->ring, frame, capacity);
 		int64_t now = now_ns();
 
 		if (r >= 0) {
@@ -102,12 +96,8 @@ static int packet_receive(void *ctx, uint8_t *frame, size_t capacity, mono_t dea
 			}
 			return r;
 		}
-		/* -ENETDOWN is reported once; the link may be back before the deadline. */
 		if (now >= deadline.ns) {
 			return -EAGAIN;
-		}
-		if (r != -EAGAIN && r != -ENETDOWN) {
-			return r;
 		}
 		if (!ps->is_spinning) {
 			sleep_for_frame(ps, deadline.ns - now);
@@ -180,6 +170,7 @@ static void packet_destroy(void *ctx)
 {
 	struct packet_socket *ps = ctx;
 
+	packet_ring_close(&ps->ring);
 	close(ps->fd);
 	free(ps);
 }
@@ -221,7 +212,8 @@ static void list_interfaces(char *buf, size_t buf_bytes)
 	if_freenameindex(all);
 }
 
-static int open_bound(const char *interface, int *ret_fd, char *error, size_t error_bytes)
+static int open_bound(const char *interface, int *ret_fd, struct packet_ring *ret_ring, char *error,
+		      size_t error_bytes)
 {
 	char there[160];
 	unsigned index = if_nametoindex(interface);
@@ -246,8 +238,16 @@ static int open_bound(const char *interface, int *ret_fd, char *error, size_t er
 		return r;
 	}
 	tune(fd);
+	r = packet_ring_open(fd, ret_ring);
+	if (r < 0) {
+		snprintf(error, error_bytes, "interface %s: no ring for received frames: %s",
+			 interface, strerror(-r));
+		close(fd);
+		return r;
+	}
 	r = bind_to(fd, (int)index);
 	if (r < 0) {
+		packet_ring_close(ret_ring);
 		snprintf(error, error_bytes, "interface %s: cannot bind to it: %s", interface,
 			 strerror(-r));
 		close(fd);
@@ -274,6 +274,7 @@ int packet_socket_open(const char *interface, enum packet_wait wait,
 		       struct transport *ret_transport, char *error, size_t error_bytes)
 {
 	struct packet_socket *ps;
+	struct packet_ring ring = { 0 };
 	int fd = -1;
 	int index;
 
@@ -283,16 +284,18 @@ int packet_socket_open(const char *interface, enum packet_wait wait,
 			 interface, IF_NAMESIZE - 1);
 		return -ENODEV;
 	}
-	index = open_bound(interface, &fd, error, error_bytes);
+	index = open_bound(interface, &fd, &ring, error, error_bytes);
 	if (index < 0) {
 		return index;
 	}
 	ps = calloc(1, sizeof(*ps));
 	if (ps == NULL) {
+		packet_ring_close(&ring);
 		close(fd);
 		return -ENOMEM;
 	}
 	ps->fd = fd;
+	ps->ring = ring;
 	ps->is_spinning = resolve_wait(wait);
 	atomic_init(&ps->interface_index, index);
 	memcpy(ps->interface, interface, strlen(interface) + 1);

@@ -60,6 +60,16 @@ int ppoll(struct pollfd *fds, nfds_t nfds, const struct timespec *timeout, const
 	return (int)syscall(SYS_ppoll, fds, nfds, &left, mask, (size_t)_NSIG / 8);
 }
 
+/* Counts the reads of it, too. */
+static unsigned reads;
+
+ssize_t recvfrom(int fd, void *buf, size_t len, int flags, struct sockaddr *addr,
+		 socklen_t *addr_len)
+{
+	reads++;
+	return syscall(SYS_recvfrom, fd, buf, len, flags, addr, addr_len);
+}
+
 static void move_to_own_network(void)
 {
 	static int is_there;
@@ -162,6 +172,80 @@ TEST(packet_socket, a_frame_is_waited_for_before_the_first_look_behind_a_send)
 	transport.destroy(transport.ctx);
 }
 
+/* More frames than the ring of received ones has slots, in bursts; none is read by a system call.
+ */
+TEST(packet_socket, frames_are_taken_in_order_without_a_system_call)
+{
+	struct transport transport = open_loopback(PACKET_WAIT_SLEEP);
+	struct platform platform = platform_posix();
+	unsigned before = reads;
+
+	for (unsigned burst = 0; burst < 100; burst++) {
+		uint8_t frame[ECAT_FRAME_MAX_BYTES];
+		uint8_t got[ECAT_FRAME_MAX_BYTES];
+		mono_t soon = mono_add(platform.now(NULL), (span_t){ NS_PER_S });
+		size_t len = 0;
+
+		for (unsigned i = 0; i < 8; i++) {
+			len = make_frame(frame, (uint8_t)(8 * burst + i));
+			CHECK_EQ(transport.send(transport.ctx, frame, len), 0);
+		}
+		for (unsigned i = 0; i < 8; i++) {
+			make_frame(frame, (uint8_t)(8 * burst + i));
+			CHECK_EQ(transport.receive(transport.ctx, got, sizeof(got), soon, NULL),
+				 len);
+			CHECK_MEM(got, frame, len);
+		}
+	}
+	CHECK_EQ(reads - before, 0);
+	transport.destroy(transport.ctx);
+}
+
+/* A network interface that lives as long as the descriptor. */
+static int make_interface(const char *name)
+{
+	struct ifreq ifr = { .ifr_flags = IFF_TAP | IFF_NO_PI };
+	int tap = open("/dev/net/tun", O_RDWR | O_CLOEXEC);
+	int fd = socket(AF_INET, SOCK_DGRAM, 0);
+
+	snprintf(ifr.ifr_name, sizeof(ifr.ifr_name), "%s", name);
+	if (tap < 0 || ioctl(tap, TUNSETIFF, &ifr) < 0) {
+		SKIP("no TAP interfaces here");
+	}
+	ifr.ifr_flags = IFF_UP;
+	CHECK(fd >= 0);
+	CHECK_EQ(ioctl(fd, SIOCSIFFLAGS, &ifr), 0);
+	close(fd);
+	return tap;
+}
+
+/* The error of an interface that went down would end each wait at once. */
+TEST(packet_socket, an_interface_that_goes_down_does_not_make_a_wait_spin)
+{
+	static const char name[] = "ecdaqtest1";
+	struct transport transport;
+	struct platform platform = platform_posix();
+	char error[PACKET_ERROR_BYTES];
+	uint8_t got[ECAT_FRAME_MAX_BYTES];
+	unsigned before;
+	int tap;
+
+	move_to_own_network();
+	tap = make_interface(name);
+	if (packet_socket_open(name, PACKET_WAIT_SLEEP, &transport, error, sizeof(error)) ==
+	    -EPERM) {
+		SKIP("raw sockets are not allowed");
+	}
+	close(tap);
+	before = waits;
+	while (transport.receive(transport.ctx, got, sizeof(got),
+				 mono_add(platform.now(NULL), (span_t){ 5 * NS_PER_MS }),
+				 NULL) >= 0) {
+	}
+	CHECK(waits - before < 20); /* frames of the kernel's own that came before, and two */
+	transport.destroy(transport.ctx);
+}
+
 /* Not before the deadline, and not ticks behind it as a socket's own time-out (T01); generous for a
  * loaded machine. */
 static void check_deadline(enum packet_wait wait)
@@ -204,24 +288,6 @@ TEST(packet_socket, frame_longer_than_the_buffer_is_passed_over)
 				   mono_add(platform.now(NULL), (span_t){ 5 * NS_PER_MS }), NULL),
 		 -EAGAIN);
 	transport.destroy(transport.ctx);
-}
-
-/* A network interface that lives as long as the descriptor. */
-static int make_interface(const char *name)
-{
-	struct ifreq ifr = { .ifr_flags = IFF_TAP | IFF_NO_PI };
-	int tap = open("/dev/net/tun", O_RDWR | O_CLOEXEC);
-	int fd = socket(AF_INET, SOCK_DGRAM, 0);
-
-	snprintf(ifr.ifr_name, sizeof(ifr.ifr_name), "%s", name);
-	if (tap < 0 || ioctl(tap, TUNSETIFF, &ifr) < 0) {
-		SKIP("no TAP interfaces here");
-	}
-	ifr.ifr_flags = IFF_UP;
-	CHECK(fd >= 0);
-	CHECK_EQ(ioctl(fd, SIOCSIFFLAGS, &ifr), 0);
-	close(fd);
-	return tap;
 }
 
 TEST(packet_socket, an_interface_that_is_deleted_and_recreated_is_used_again)
