@@ -2,9 +2,8 @@
 /*
  * A real NIC: a packet socket bound to EtherCAT's type, with a ring of received frames. Receiving
  * never blocks past the caller's deadline: it looks at the ring without sleeping (spin), or sleeps
- * in ppoll for the time left. A cable pulled
- * or a NIC taken down costs lost frames only; is_up() binds again when the interface was removed
- * and came back.
+ * in ppoll for the time left. A cable pulled or a NIC taken down costs lost frames only; is_up()
+ * binds again when the interface was removed and came back.
  */
 #ifndef LINK_PACKET_SOCKET_H
 #define LINK_PACKET_SOCKET_H
