@@ -448,6 +448,8 @@ wait_for_end()
 		! is_view_stopped || kill -STOP "$$"
 		for name in "${!pid[@]}"; do
 			has_ended "$name" || continue
+			# A signal for all of the group: it may have ended before this shell saw its own.
+			[ "$interrupted" = no ] || return 0
 			case $name$status in
 			sync0*)
 				unset 'pid[sync0]'

@@ -294,11 +294,12 @@ int64_t pdi_spi_access(struct pdi_spi *spi, uint8_t *address, size_t address_len
 	int is_usual = !spi->is_selected && address_len == ADDRESS_OCTETS + 1 && len > 0 &&
 		       (address[1] & 7) == SPI_ADDRESS_EXTENSION && (address[2] & 3) == 0;
 	unsigned command = is_usual ? address[2] >> 2 & 7u : SPI_NOP;
-	uint16_t start =
-		is_usual ? (uint16_t)(address[0] << 5 | address[1] >> 3 | (address[2] >> 5) << 13)
-			 : 0;
+	uint16_t start = 0;
 	int64_t addressed_ns;
 
+	if (is_usual) {
+		start = (uint16_t)(address[0] << 5 | address[1] >> 3 | (address[2] >> 5) << 13);
+	}
 	if (command == SPI_READ_WAIT_STATE && in != NULL && can_read_whole(start, out, len)) {
 		addressed_ns = begin_whole(spi, address);
 		read_whole(spi, start, in, len);
