@@ -125,11 +125,11 @@ def test_a_mailbox_is_asked_a_few_times_a_second_whoever_asks(
     assert time.monotonic() - started >= 0.5
 
 
-def test_an_answer_that_is_too_long_is_not_cut_off(
+def test_an_object_of_2048_bytes_is_read_whole(
     daemon: Fake, web: Web, web_command: WebCommand
 ) -> None:
     session = Session(web, web_command.token("operator"))
-    status, text = ask(session, "read", "0", "0x2000")  # 2048 bytes: it fits
+    status, text = ask(session, "read", "0", "0x2000")
     assert (status, len(json.loads(text)["bytes"])) == (200, 3 * 2048 - 1)
 
 
