@@ -11,10 +11,13 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
+
+if TYPE_CHECKING:
+    from measure.page import Subject
 
 ROOT = Path(__file__).resolve().parents[2]
 SLAVES_MOST = 128  # what the loops have room for
@@ -148,13 +151,41 @@ def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
     return options
 
 
+def command_of(arguments: Sequence[str]) -> str:
+    return " ".join(["./build.sh bench", *arguments])
+
+
+def write(
+    options: argparse.Namespace,
+    subject: Subject,
+    arguments: Sequence[str],
+    run: Callable[[Path], list[str]],
+    reason: Callable[[], str] = str,
+) -> int:
+    """The page of @subject, with the lines of @run; the exit code. @reason: what else is said where
+    there are none."""
+    from measure.page import NotMeasuredError, write_index, write_page
+    from measure.subjects import PAGES
+
+    try:
+        made = replace(subject, commands=(command_of(arguments),), measure=run)
+        page = write_page(ROOT, made, options.page)
+    except (NotMeasuredError, FileNotFoundError, RuntimeError) as why:
+        print(f"build.sh: bench: {why}{reason()}", file=sys.stderr)
+        return 1
+    if not options.page:
+        write_index(ROOT, PAGES)
+    print(f"{subject.name}: wrote {page}", flush=True)
+    return 0
+
+
 def measure(options: argparse.Namespace, arguments: Sequence[str]) -> int:
     from bench.page import lines_of
     from bench.rounds import Bench, Plan, write_json
     from bench.running import programs_are_there
     from foreign import Unavailable
-    from measure.page import NotMeasuredError, commit, machine, write_index, write_page
-    from measure.subjects import PAGES, PEERS
+    from measure.page import commit, machine
+    from measure.subjects import PEERS
 
     slaves = [0] if options.interface else options.slaves or SLAVES["peers"]
     try:
@@ -163,35 +194,24 @@ def measure(options: argparse.Namespace, arguments: Sequence[str]) -> int:
     except (Unavailable, PermissionError) as why:
         print(f"build.sh: bench: {why}", file=sys.stderr)
         return 1
-    command = " ".join(["./build.sh bench", *arguments])
 
     def run(_: Path) -> list[str]:
         at = commit(ROOT)
         bench.run()
         if options.json:
-            head = {"command": command, "commit": at, "machine": machine()}
+            head = {"command": command_of(arguments), "commit": at, "machine": machine()}
             write_json(options.json, bench, head)
         return lines_of(bench)
 
-    try:
-        # The page has the commit from before the run.
-        subject = replace(PEERS, commands=(command,), measure=run)
-        page = write_page(ROOT, subject, options.page)
-    except NotMeasuredError as why:
-        print(f"build.sh: bench: {why}; {bench.first_reason()}", file=sys.stderr)
-        return 1
-    if not options.page:
-        write_index(ROOT, PAGES)
-    print(f"peers: wrote {page}", flush=True)
-    return 0
+    # The page has the commit from before the run.
+    return write(options, PEERS, arguments, run, lambda: f"; {bench.first_reason()}")
 
 
 def measure_virtual(options: argparse.Namespace, arguments: Sequence[str]) -> int:
     from bench import virtual
-    from measure.page import NotMeasuredError, commit, machine, write_index, write_page
-    from measure.subjects import PAGES, SIM
+    from measure.page import commit, machine
+    from measure.subjects import SIM
 
-    command = " ".join(["./build.sh bench", *arguments])
     cores = os.cpu_count() or 1
     seeds = options.seeds or 8
 
@@ -202,38 +222,24 @@ def measure_virtual(options: argparse.Namespace, arguments: Sequence[str]) -> in
             for slaves in options.slaves or SLAVES["sim"]
         ]
         if options.json:
-            head = {"command": command, "commit": at, "machine": machine(), "seeds": seeds}
+            head = {
+                "command": command_of(arguments),
+                "commit": at,
+                "machine": machine(),
+                "seeds": seeds,
+            }
             whole = head | {"cycles": options.cycles, "rows": virtual.figures(rows)}
             options.json.write_text(json.dumps(whole, indent=1) + "\n")
         return virtual.lines_of(rows, options.cycles, seeds, cores)
 
-    try:
-        page = write_page(ROOT, replace(SIM, commands=(command,), measure=run), options.page)
-    except (NotMeasuredError, FileNotFoundError, RuntimeError) as why:
-        print(f"build.sh: bench: {why}", file=sys.stderr)
-        return 1
-    if not options.page:
-        write_index(ROOT, PAGES)
-    print(f"sim: wrote {page}", flush=True)
-    return 0
+    return write(options, SIM, arguments, run)
 
 
 def measure_setup(options: argparse.Namespace, arguments: Sequence[str]) -> int:
     from bench import setup
-    from measure.page import NotMeasuredError, write_index, write_page
-    from measure.subjects import PAGES, SETUP
+    from measure.subjects import SETUP
 
-    command = " ".join(["./build.sh bench", *arguments])
-    try:
-        subject = replace(SETUP, commands=(command,), measure=setup.lines_of)
-        page = write_page(ROOT, subject, options.page)
-    except NotMeasuredError as why:
-        print(f"build.sh: bench: {why}", file=sys.stderr)
-        return 1
-    if not options.page:
-        write_index(ROOT, PAGES)
-    print(f"setup: wrote {page}", flush=True)
-    return 0
+    return write(options, SETUP, arguments, setup.lines_of)
 
 
 def main(arguments: Sequence[str]) -> int:

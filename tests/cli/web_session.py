@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import socket
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from ecdaq import BIN, ecdaq, works
@@ -13,6 +14,7 @@ from web_bench import SECONDS, Web
 from web_client import http
 
 WEB_COMMAND = BIN / "ecdaq-web-command"
+ROLES = ("viewer", "operator", "engineer")
 
 
 class WebCommand:
@@ -69,3 +71,17 @@ class Session:
         fields = {"Cookie": self.cookie} | headers
         status, _, text = post(self.web, path, "\n".join([self.secret, *words]), **fields)
         return status, text
+
+
+def expect_by_role(
+    role: str,
+    commands: Sequence[tuple[str, tuple[str, ...]]],
+    ask: Callable[..., tuple[int, str]],
+) -> None:
+    """Of the commands, those that need @role or less are done, the others refused."""
+    for needed, words in commands:
+        status, text = ask(*words)
+        is_allowed = ROLES.index(role) >= ROLES.index(needed)
+        assert (status == 200) == is_allowed, (words, status, text)
+        if not is_allowed:
+            assert (status, text) == (403, "the role of this log-in may not do that\n")
